@@ -37,10 +37,10 @@ struct Problem {
 };
 
 // Numbers of a run.  STEP is the flight step, CONTACT_STEP the longest step in contact, which is halved up to HALVINGS times; with more
-// than CALM_ENERGY (J above the first well) flight steps are shorter too.
+// than CALM_ENERGY (J above the first well) flight steps are shorter too.  Flights after impulsive contact lower than LOWEST (m) are none.
 enum RunNumber : int {
     TICK, STEP, END, OUTPUT_INTERVAL, LAST_QUARTER, WELL_SIGN, CONTACT_STEP, HALVINGS, DECIDE_ENERGY, DECIDE_REACH, DECIDE_CROSSINGS,
-    MAX_STEPS, STRETCH, CALM_ENERGY, RUN_NUMBERS
+    MAX_STEPS, STRETCH, CALM_ENERGY, LOWEST, RUN_NUMBERS
 };
 // Numbers of a signal (signals.hpp): of a tone, with its period in ticks, 0 if it has none; of pieces; of a sweep.  SHIFT is the time of
 // its own at which a run begins, s; MOST_ are bounds of value, slope and second derivative.
@@ -60,9 +60,9 @@ enum Statistic : int {
 // Of each channel; of a force only WORK, GROSS_WORK and LOST are not 0, of a circuit only LOST, its part in the last quarter and
 // PEAK_FORCE.
 enum OfChannel : int { IMPACTS, IMPULSE, WORK, GROSS_WORK, LOST, LATE_LOST, PEAK_FORCE, DEEPEST, CONTACT_TIME, TOUCHING, ONSET, OF_CHANNEL };
-// Of a sample, and in addition penetration, force, potential energy, work and loss of each channel.
+// Of a sample, and in addition penetration, force, potential energy, work and loss of each channel, state of its law.
 enum OfSample : int { SAMPLE_TIME, BEAM_ENERGY, SAMPLE_DISSIPATED, OF_SAMPLE };
-enum ChannelSample : int { SAMPLE_DEPTH, SAMPLE_FORCE, SAMPLE_POTENTIAL, SAMPLE_WORK, SAMPLE_LOST, CHANNEL_SAMPLE };
+enum ChannelSample : int { SAMPLE_DEPTH, SAMPLE_FORCE, SAMPLE_POTENTIAL, SAMPLE_WORK, SAMPLE_LOST, SAMPLE_STATE, CHANNEL_SAMPLE };
 enum OfImpact : int { IMPACT_CHANNEL, IMPACT_ONSET, IMPACT_DURATION, IMPACT_FORCE, IMPACT_IMPULSE, OF_IMPACT };
 
 // Records of one run; a kernel returns when the room is used up, and goes on from *saved* in the next call.

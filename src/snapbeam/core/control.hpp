@@ -17,6 +17,11 @@ namespace SNAPBEAM_SET {
 constexpr double GRADING = 0.5, RELEASE = 0.5, CONTACT_TURN = 0.35, NEARER = 0.2, STRETCH_LIMIT = 4.0;
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 
+template <class L> struct Group;
+template <class L> void hit(Group<L> &runs, int number, typename L::Marks on);
+template <class L> void jumped_velocity(Group<L> &runs, typename L::Marks which);
+template <class L> void hold_together(Group<L> &runs, Channel<L> &c);
+
 // What a channel does at the end of a step.
 template <class L> struct Event {
     typename L::Marks flip;       // the contact opens or closes
@@ -46,7 +51,7 @@ template <class L> struct Group {
     Cell *spare;                  // rows and channels that a record puts aside
     Channel<L> *spare_channel;
     Real jump, turned;            // next jump of a signal, ticks; steps since tones were taken from the time
-    Real step, contact_step, end, limit, output_interval, halvings, most_steps, stretch, stretch_at_rest, calm, energy;
+    Real step, contact_step, end, limit, output_interval, halvings, most_steps, stretch, stretch_at_rest, calm, energy, lowest;
     int run[L::runs], output[L::runs], next_jump[L::runs];
 
     void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
@@ -94,7 +99,7 @@ template <class L> struct Group {
         for (long i = 0; i < long(s->composition.distinct) * n * 4 * problem->levels; ++i) tables[i] = Plain(0.0);
         alive = again = landing = z.jumping = FromBits<Marks>::of(0);
         Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &contact_step, &halvings,
-                         &most_steps, &stretch, &stretch_at_rest, &calm, &energy, &jump, &turned, &z.t, &z.ticks};
+                         &most_steps, &stretch, &stretch_at_rest, &calm, &energy, &lowest, &jump, &turned, &z.t, &z.ticks};
         for (Real *x : zeros) *x = Real(0.0);
         z.tick = z.sign = z.parts = Real(1.0), z.h = z.gq = z.qr = z.along_g = z.along_r = Number(0.0), z.next_gq = Cell(0.0);
         z.flows = own;
@@ -110,7 +115,7 @@ template <class L> struct Group {
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             c.law = problem->laws[j];
-            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state; });
+            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state, c.memory = law.memory, c.impulsive = law.impulsive; });
             c.circuit = c.law == CIRCUIT, c.harvests = c.circuit || c.law == LINEAR_DAMPING;
             c.uses = 0;
             for (int i = 0; i < z.signals; ++i)
@@ -173,7 +178,7 @@ template <class L> struct Group {
         set_lane(z.tick, l, of_run(i, TICK)), set_lane(step, l, of_run(i, STEP)), set_lane(end, l, of_run(i, END));
         set_lane(output_interval, l, of_run(i, OUTPUT_INTERVAL)), set_lane(z.sign, l, of_run(i, WELL_SIGN));
         set_lane(contact_step, l, of_run(i, CONTACT_STEP)), set_lane(halvings, l, of_run(i, HALVINGS)), set_lane(most_steps, l, of_run(i, MAX_STEPS));
-        set_lane(stretch_at_rest, l, of_run(i, STRETCH)), set_lane(calm, l, of_run(i, CALM_ENERGY)), set_lane(z.t, l, 0.0), set_lane(stretch, l, 0.0);
+        set_lane(stretch_at_rest, l, of_run(i, STRETCH)), set_lane(calm, l, of_run(i, CALM_ENERGY)), set_lane(lowest, l, of_run(i, LOWEST)), set_lane(z.t, l, 0.0), set_lane(stretch, l, 0.0);
         set_lane(z.parts, l, s->parts(of_run(i, STEP) * of_run(i, TICK)));
         for (int k = 0; k < z.signals; ++k) {
             const double *numbers = batch->signals + (long(i) * z.signals + k) * SIGNAL_NUMBERS;
@@ -191,7 +196,7 @@ template <class L> struct Group {
             for (int m = 0; m < modes; ++m) set_element<L>(c.row, s->place[m], l, row[m]);
             for (int k = 0; k < problem->law_numbers; ++k)
                 set_lane(c.P[k], l, batch->numbers[(long(i) * z.channels + j) * problem->law_numbers + k]);
-            set_lane(c.rest, l, rest[j]), set_lane(c.offset, l, batch->offset[long(i) * z.channels + j]);
+            set_lane(c.rest, l, rest[j]), set_lane(c.offset, l, batch->offset[long(i) * z.channels + j] - (c.memory ? lane(value(c.P[c.state]), l) : 0.0));
             for (int k = 0; k < z.channels; ++k) {
                 const double *other = batch->rows + long(row_of[k]) * modes;
                 double product = 0.0;
@@ -265,15 +270,15 @@ template <class L> struct Group {
                 continue;
             }
             const Number d = penetration(z, c, z.q), r = signal_slope(z, c) - dot<L>(c.row, z.p, n);
-            if (continued) c.closed = c.closed & (c.pressing | (!which));  // what does not press begins again as apart
+            if (continued && !c.memory) c.closed = c.closed & (c.pressing | (!which));  // what does not press begins again as apart
             assign(which, c.d0, select(c.closed, d, continued ? min(d, Number(0.0)) : d)), assign(which, c.r0, r);
             assign(which, c.safe, z.t);
             if (continued) continue;
             for (int l = 0; l < L::runs; ++l) {
                 if (!(fresh >> l & 1u)) continue;
                 const double since = batch->since[long(run[l]) * z.channels + j], depth = lane(value(d), l), rate = lane(value(r), l);
-                const bool closed = since == since ? since >= 0.0 : depth > 0.0 || (depth == 0.0 && rate > 0.0);
-                set_lane(c.closed, l, closed), set_lane(c.pressing, l, closed);
+                const bool closed = since == since ? since >= 0.0 : !c.impulsive && (depth > 0.0 || (depth == 0.0 && rate > 0.0));
+                set_lane(c.closed, l, closed), set_lane(c.pressing, l, closed && (!c.memory || (rate > 0.0 && depth >= lane(value(yield_of(c)), l))));
                 set_lane(c.onset, l, since > 0.0 ? -since : 0.0);
                 if (!closed && depth > 0.0) set_lane(c.d0, l, 0.0);
                 if (closed) set_lane(c.deepest, l, depth > 0.0 ? depth : 0.0);
@@ -281,6 +286,12 @@ template <class L> struct Group {
         }
         assign(which, energy, totals.energy(z, true));
         if (!continued) totals.start(z, which, energy);
+        for (int j = 0; j < z.channels; ++j) {  // in touch and closing
+            Channel<L> &c = z.channel[j];
+            if (!c.impulsive) continue;
+            const Marks hits = which & (!c.closed) & (!(value(c.d0) < Real(0.0))) & (value(c.r0) > Real(0.0));
+            if (any(hits)) hit(*this, j, hits), jumped_velocity(*this, hits);
+        }
         if (!continued && batch->recorder && batch->recorder->marks[4]) {  // goes on from a state that was saved
             const double *from = batch->recorder->saved;
             visit([&](auto &x) { __builtin_memcpy(&x, from, sizeof(x)), from += sizeof(x) / sizeof(double); });
@@ -408,6 +419,16 @@ template <class L> struct Group {
             }
     }
 
+    SNAPBEAM_FN static Number yield_of(const Channel<L> &c) {
+        return with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.yield(c.P); else return Number(0.0); });
+    }
+    // Positive while a closed contact goes on as it does: it presses, it yields and deepens, or it is elastic.
+    SNAPBEAM_FN static Number going_on(const Channel<L> &c, Number d, Number r, Number f) {
+        if (c.memory) return select(c.pressing, r, yield_of(c) - d);
+        const Number raw = c.impulsive ? f : with_law(c.law, [&](auto law) { return law.pressing(max(d, Number(0.0)), r, c.P); });
+        return select(c.pressing, raw, -raw);
+    }
+
     // --- inspect --------------------------------------------------------------------------------------------------------
     // Fraction of the step at which the gap of a contact closes; 2 where it does not.
     Real closing(Channel<L> &c, Marks near) {
@@ -493,6 +514,7 @@ template <class L> struct Group {
             }
             c.d1 = penetration(z, c, z.q1);
             c.r1 = signal_slope(z, c) - dot<L>(c.row, z.p1, n);
+            if (c.impulsive && any(c.closed)) hold_together(*this, c);
             touching |= any(alive & c.closed);
         }
         Real length = ticks, which = event;
@@ -505,16 +527,14 @@ template <class L> struct Group {
             Real at = Real(NEVER);
             Event<L> &e = events[j];
             e.flip = mine, e.force = FromBits<Marks>::of(0);
-            if (c.lossy) {  // where the force of a closed contact changes its sign
+            if (c.lossy || c.memory) {  // where the force of a closed contact changes its sign, or its branch
                 const Marks active = c.pressing;
-                const Number raw = with_law(c.law, [&](auto law) { return law.pressing(max(c.d1, Number(0.0)), c.r1, c.P); });
-                const Real f1 = select(active, value(raw), -value(raw));  // positive: as it was
+                const Real f1 = value(going_on(c, c.d1, c.r1, c.f));
                 const Marks wrong = alive & c.closed & (f1 < Real(0.0)) & (active | (d1 > Real(0.0)));
                 const Marks cut_before = mine & c.closed & (!differ(e.at_force, Real(1.0)));
                 const Marks first = wrong & (!cut_before);
                 if (any(first)) {
-                    const Number before = with_law(c.law, [&](auto law) { return law.pressing(max(c.d0, Number(0.0)), c.r0, c.P); });
-                    const Real f0 = max(select(active, value(before), -value(before)), Real(0.0));
+                    const Real f0 = max(value(going_on(c, c.d0, c.r0, c.first_f)), Real(0.0));
                     e.low = select(first, Real(0.0), e.low), e.low_f = select(first, f0, e.low_f), e.high_f = select(first, f1, e.high_f);
                     at = select(first, max(nearest(ticks * (f0 / (f0 - f1))), Real(1.0)), at);
                     e.high = select(first, ticks, e.high);
@@ -540,7 +560,7 @@ template <class L> struct Group {
                 const Marks off = on_gap & right & differ(better, ticks) & (tries < Real(CORRECTIONS)) & (better < ticks + ticks);
                 at = select(off, better, at), e.flip = e.flip & (!off);
             }
-            const Marks leaving = others & c.closed & (d1 <= Real(0.0)) & (!at_force);
+            const Marks leaving = others & c.closed & (d1 <= Real(0.0)) & (!at_force) & FromBits<Marks>::of(c.impulsive ? 0 : ~0u);
             if (any(leaving)) {
                 const Cubic<Real> gap(-max(d0, Real(0.0)), -r0, -d1, -r1, value(z.h));
                 const Marks cut = leaving & (d0 > Real(0.0)) & (d1 < Real(0.0));
@@ -618,18 +638,32 @@ template <class L> struct Group {
             const Marks off = ok & c.closed & e.flip, on = ok & (!c.closed) & e.flip, force = ok & e.force;
             assign(ok, c.d0, c.d1), assign(ok, c.r0, c.r1);
             if (!any(off | on | force)) continue;
-            const Marks ends = (off | force) & c.pressing, begins = on | (force & (!c.pressing));
+            if (c.memory && any(force)) turn_back(c, force);
+            if (c.impulsive) {
+                if (any(on)) hit(*this, j, on);
+                if (any(force)) close_impact(c, j, force);
+                c.closed = c.closed & (!force), c.pressing = c.closed;
+                changed = changed | on | force;
+                continue;
+            }
+            const Marks ends = c.memory ? off : (off | force) & c.pressing, begins = c.memory ? on : on | (force & (!c.pressing));
             if (any(ends)) close_impact(c, j, ends);
-            if (any(force)) {  // what is stored where the force ceases is lost, and is there again where it begins
+            if (c.memory) {  // from an intact surface it yields at once
+                c.pressing = (c.pressing & (!(off | force))) | (force & (!c.pressing)) | (on & (!(value(yield_of(c)) > Real(0.0))));
+            } else if (any(force)) {  // what is stored where the force ceases is lost, and is there again where it begins
                 const Number d = max(c.d1, Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(d, c.P); });
                 c.sums[snapbeam::LOST] += select(force, select(c.pressing, stored, -stored), Number(0.0));
             }
-            c.pressing = (c.pressing & (!(off | force))) | begins;
+            if (!c.memory) c.pressing = (c.pressing & (!(off | force))) | begins;
             c.closed = (c.closed & (!off)) | on;
             assign(begins, c.onset, z.t);
             assign(on | off, c.d0, Number(0.0));  // the gap at an event is zero
             changed = changed | on | off | force;
         }
+        Marks struck = FromBits<Marks>::of(0);
+        for (int j = 0; j < z.channels; ++j)
+            if (z.channel[j].impulsive) struck = struck | (ok & events[j].flip);
+        if (any(struck)) jumped_velocity(*this, struck);
         if (any(jumped))  // the velocity of a striker may jump
             for (int j = 0; j < z.channels; ++j) {
                 Channel<L> &c = z.channel[j];
@@ -647,6 +681,16 @@ template <class L> struct Group {
         const Marks spent = ok & (totals.sum[snapbeam::STEPS] >= most_steps);
         const Marks reached = ok & (z.t >= min(limit, end));
         if (any(diverged | early | spent | reached)) stop_at(bits(diverged), bits(early), bits(spent), bits(reached));
+    }
+
+    // A contact begins to yield, or turns back: then it keeps a larger indentation, and what it stored and does not give back is lost.
+    void turn_back(Channel<L> &c, Marks at) {
+        const Marks turns = at & c.pressing;
+        const Number grown = with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.grown(c.d1, c.P); else return Number(0.0); });
+        const Number growth = select(turns, grown - c.P[c.state], Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(c.d1, c.P); });
+        c.P[c.state] += growth, c.offset -= growth, c.d0 -= growth, c.d1 -= growth;
+        assign(turns, c.deepest, c.d1);
+        c.sums[snapbeam::LOST] += select(turns, stored - with_law(c.law, [&](auto law) { return law.potential(c.d1, c.P); }), Number(0.0));
     }
 
     void close_impact(Channel<L> &c, int j, Marks off) {
@@ -705,7 +749,7 @@ template <class L> struct Group {
         to[2 * modes] = lane(z.sign, l);
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
-            to[2 * modes + 1 + j] = lane(Marks(c.closed & c.pressing), l) ? lane(z.t, l) - lane(c.onset, l) : -1.0;
+            to[2 * modes + 1 + j] = lane(Marks(acting(c)), l) ? lane(z.t, l) - lane(c.onset, l) : -1.0;
             to[2 * modes + 1 + z.channels + j] = c.state < 0 ? 0.0 : lane(value(c.P[c.state]), l);
         }
     }
@@ -716,7 +760,7 @@ template <class L> struct Group {
         totals.finish(z, mine);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
-            const bool pressed = c.contact && lane(Marks(c.closed & c.pressing), l);
+            const bool pressed = c.contact && lane(Marks(acting(c)), l);
             const bool goes_on = batch->outputs && !batch->recorder;
             if (pressed && goes_on) {  // the run goes on elsewhere: what the contact gave so far
                 set_lane(c.sums[CONTACT_TIME], l, lane(value(c.sums[CONTACT_TIME]), l) + (lane(z.t, l) - (lane(c.onset, l) > 0.0 ? lane(c.onset, l) : 0.0)) * lane(z.tick, l));
@@ -752,6 +796,7 @@ template <class L> struct Group {
 
 }  // namespace SNAPBEAM_SET
 
+#include "impact.hpp"
 #include "observers.hpp"
 
 namespace SNAPBEAM_SET {

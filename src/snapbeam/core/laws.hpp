@@ -16,8 +16,9 @@
 // affine: the force is linear in y;  contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force
 // is the channel's signal;  state: place among the numbers of a state of the law's own, or -1.
 //
-// A circuit has a state z that changes with time, its x: z' = rate(z, y, P).  A contact with memory has one that stays as it is but
-// where the contact yields or turns back; that event is the change of the sign of yields(x, y, P, on), *on*: it yields already.
+// A circuit has a state z that changes with time, its x: z' = rate(z, y, P).  A contact with memory has one that stays as it is until
+// the contact turns back from beyond yield(P); then it grows to grown(x, P), and so does what x is measured from.  An impulsive
+// contact lasts no time, or is held together by the force that this takes (impact.hpp).
 #pragma once
 #include "number.hpp"
 
@@ -26,13 +27,15 @@ namespace SNAPBEAM_SET {
 enum LawNumber : int {
     HERTZ, POWER_LAW, LAYERED_HERTZ, HUNT_CROSSLEY, KELVIN_VOIGT,
     LOCAL_SPRING, ELECTROSTATIC, MAGNETIC, QUADRATIC_DAMPING, COULOMB_FRICTION, LINEAR_DAMPING,
-    EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT, LAWS
+    EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT, ELASTIC_PLASTIC, RESTITUTION, LAWS
 };
 
 template <int NUMBERS> struct ContactLaw {
     static constexpr int numbers = NUMBERS;
     static constexpr int state = -1;
-    static constexpr bool contact = true, lossy = false, timed = false, affine = true;
+    static constexpr bool contact = true, lossy = false, timed = false, affine = true, memory = false, impulsive = false;
+    template <class T> static SNAPBEAM_FN T yield(const T *) { return T(INFINITY); }
+    template <class T> static SNAPBEAM_FN T grown(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T pressing(T, T, const T *) { return T(1.0); }
     template <class T> static SNAPBEAM_FN T low(const T *) { return T(-INFINITY); }
@@ -41,7 +44,7 @@ template <int NUMBERS> struct ContactLaw {
 template <int NUMBERS> struct ForceLaw {
     static constexpr int numbers = NUMBERS;
     static constexpr int state = -1;
-    static constexpr bool contact = false, lossy = false, timed = false, affine = false;
+    static constexpr bool contact = false, lossy = false, timed = false, affine = false, memory = false, impulsive = false;
     template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T loss(T, T y, T f, const T *) { return -(f * y); }
     template <class T> static SNAPBEAM_FN T rate(T, T, const T *) { return T(0.0); }
@@ -101,6 +104,31 @@ struct KelvinVoigt : ContactLaw<2> {  // f = k d + c d'
     template <class T> static SNAPBEAM_FN T potential(T d, const T *P) { return T(0.5) * P[0] * d * d; }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *P) { return P[0]; }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return P[1]; }
+};
+
+// f = min[k_1 (d + D), k_2 d]; P: k_1, k_2, D.  What unloads from d_m beyond the yield leaves D = (d_m + D) (1 - k_1/k_2).
+struct ElasticPlastic : ContactLaw<3> {
+    static constexpr int state = 2;
+    static constexpr bool memory = true;
+    template <class T> static SNAPBEAM_FN T force(T d, T, const T *P) { return min(P[0] * (d + P[2]), P[1] * d); }
+    template <class T> static SNAPBEAM_FN T yield(const T *P) {
+        const T stiffer = P[1] - P[0];
+        return select(stiffer > T(0.0), P[2] * P[0] / max(stiffer, T(1e-300)), T(INFINITY));
+    }
+    template <class T> static SNAPBEAM_FN T potential(T d, const T *P) {  // the integral of the force, with what unloading will not give back
+        const T whole = d + P[2], first = T(0.5) * (P[0] * whole * whole - P[0] * P[1] * P[2] * P[2] / max(P[1] - P[0], T(1e-300)));
+        return select(P[1] * d > P[0] * whole, first, T(0.5) * P[1] * d * d);
+    }
+    template <class T> static SNAPBEAM_FN T stiffness(T, const T *P) { return P[1]; }
+    template <class T> static SNAPBEAM_FN T grown(T d, const T *P) { return max((d + P[2]) * (T(1.0) - P[0] / P[1]), P[2]); }
+};
+// Newton's law: the velocity of separation is e times that of approach.  P: e, then of the constraint that holds the contact
+// together r.omega^2 r/(r.r)^2, the stiffness that it cancels along the row.
+struct Restitution : ContactLaw<2> {
+    static constexpr bool lossy = true, affine = false, impulsive = true;
+    template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T stiffness(T, const T *P) { return P[1]; }
 };
 
 struct LocalSpring : ForceLaw<2> {  // f = -(k + k_3 u^2) u; one that softens is valid up to where its force is zero
@@ -184,6 +212,8 @@ template <class F> SNAPBEAM_FN auto with_law(int number, F function) {
     case QUADRATIC_DAMPING: return function(QuadraticDamping());
     case COULOMB_FRICTION: return function(CoulombFriction());
     case LINEAR_DAMPING: return function(LinearDamping());
+    case ELASTIC_PLASTIC: return function(ElasticPlastic());
+    case RESTITUTION: return function(Restitution());
     case CIRCUIT: return function(Circuit());
     case EXTERNAL_FORCE: case BASE: case AXIAL_LOAD: return function(Timed());
     default: return function(Hertz());

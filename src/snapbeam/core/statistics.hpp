@@ -111,7 +111,7 @@ template <class L> struct Totals {
             if (c.timed || (c.contact && !contacts)) continue;
             const Number x = c.contact ? max(c.d0, Number(0.0)) : along(z, c, z.q);
             const Number stored = with_law(c.law, [&](auto law) { return law.potential(x, c.P); });
-            all += c.contact ? select(c.closed & c.pressing, stored, Number(0.0)) : stored;
+            all += c.contact ? select(acting(c), stored, Number(0.0)) : stored;
         }
         return value(all);
     }
@@ -306,7 +306,10 @@ template <class L> struct Totals {
         if (!c.active) return;
         Marks acts = ok;
         if (c.contact) {
-            acts = ok & c.closed & c.pressing;
+            acts = ok & acting(c);
+            if (c.impulsive) {  // the force that holds it together
+                assign(acts, c.hardest, max(c.hardest, max(c.first_f, c.f))), assign(acts, c.deepest, c.hardest);
+            } else {
             const Cubic<Number> depth(c.d0, c.r0, c.d1, c.r1, z.h);
             assign(acts, c.deepest, max(c.deepest, max(max(c.d0, c.d1), zero)));
             const auto turns = acts & (c.r0 > zero) & (c.r1 < zero);
@@ -318,6 +321,7 @@ template <class L> struct Totals {
                 const auto top = (bend < zero) & (abs(tilt) < Number(-2.0) * bend);
                 const Number peak = max(max(f0, f1), select(top, fm - tilt * tilt / (Number(8.0) * bend), fm));
                 assign(acts, c.hardest, max(c.hardest, peak));
+            }
             }
             c.own_impulse += select(acts, c.impulse, zero);
         }

@@ -41,7 +41,7 @@ template <class L> struct Channel {
     typedef typename L::Real Real;
     int law;
     int state;                   // place of a state of its own in P, or -1
-    bool contact, lossy, timed, affine, circuit, harvests, active;
+    bool contact, lossy, timed, affine, memory, impulsive, circuit, harvests, active;
     int uses;                    // signals that it adds
     int *signal;
     double *factor;
@@ -56,7 +56,7 @@ template <class L> struct Channel {
     Number z;                    // of a circuit, the state at the kick at hand, at last at the end of the step
     Number early;                // of a lossy channel 2/w^2 times the integral of (w - t) f over a kick of w: f if it is constant
     Number d0, r0, d1, r1;
-    typename L::Marks closed, pressing;
+    typename L::Marks closed, pressing;  // pressing: of one with memory, beyond its yield and deeper ever
     Real onset, safe;            // tick of the onset; time until which the contact cannot close, ticks
     // increments of the step, and sums of the run
     Number impulse, work, lost;
@@ -87,7 +87,7 @@ template <class L> struct Runs {
     bool direct;                          // nothing acts but the tension: the first flow begins from q, p, k
 };
 
-constexpr int BLOCK_ARRAYS = 15;
+constexpr int BLOCK_ARRAYS = 16;
 constexpr double FOLLOWS = 8.0;  // decay of a circuit in a step, lam h, beyond which it follows the beam
 constexpr double RESOLVED = 1.5; // and, of order 6, below which a step is as long as wanted
 
@@ -135,6 +135,18 @@ template <class L> SNAPBEAM_FN typename L::Number signal_slope(const Runs<L> &z,
     typename L::Number s = typename L::Number(0.0);
     for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), z.signal[c.signal[i]].slope(), s);
     return s;
+}
+template <class L> SNAPBEAM_FN typename L::Number signal_bend(const Runs<L> &z, const Channel<L> &c) {
+    typename L::Number s = typename L::Number(0.0);
+    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), z.signal[c.signal[i]].acceleration(), s);
+    return s;
+}
+// Acceleration along a row by the linear modes.
+template <class L> SNAPBEAM_FN typename L::Number linear_acceleration(const Structure<L> &s, const typename L::Cell *row, const typename L::Cell *q, const typename L::Cell *p) {
+    typedef typename L::Cell Cell;
+    Cell sum = Cell(0.0);
+    for (int i = 0; i < s.size(); ++i) sum = fma(-row[i], fma(Cell(s.omega[i] * s.omega[i]), q[i], Cell(Cell(2.0) * s.sigma[i]) * p[i]), sum);
+    return L::total(sum);
 }
 
 // Tension at q, where the cells of g.q are known: r = Gq and the factors of the acceleration.
@@ -195,12 +207,14 @@ template <class L> SNAPBEAM_FN typename L::Number penetration(const Runs<L> &z, 
     return c.offset + signal_of(z, c) - along(z, c, q);
 }
 
-// Force of a channel at x and y; of a contact only while it is closed, and a lossy one presses.
+// Runs in which a contact acts: it is closed, and a lossy one presses.
+template <class L> SNAPBEAM_FN typename L::Marks acting(const Channel<L> &c) { return c.memory ? c.closed : c.closed & c.pressing; }
+// Force of a channel at x and y; of a contact only where it acts.
 template <class L>
 SNAPBEAM_FN typename L::Number force_at(const Channel<L> &c, typename L::Number x, typename L::Number y) {
     typedef typename L::Number Number;
     const Number f = with_law(c.law, [&](auto law) { return law.force(c.contact ? max(x, Number(0.0)) : x, y, c.P); });
-    return c.contact ? select(c.closed & c.pressing, f, Number(0.0)) : f;
+    return c.contact ? select(acting(c), f, Number(0.0)) : f;
 }
 
 // Power lost by a force f at x and y, of a contact beyond that of its force at y = 0.
@@ -322,7 +336,8 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
     const int n = s.size();
     Number *v = z.block, *a = v + z.channels, *y = a + z.channels, *slope = y + z.channels, *change = slope + z.channels;
     Number *f = change + z.channels, *impulse = f + z.channels, *lost = impulse + z.channels, *elastic = lost + z.channels;
-    Number *tip = elastic + z.channels, *twice = tip + z.channels, *x = twice + z.channels, *flow = x + z.channels, *gain = flow + z.channels, *settled = gain + z.channels;
+    Number *tip = elastic + z.channels, *twice = tip + z.channels, *x = twice + z.channels, *flow = x + z.channels, *gain = flow + z.channels, *settled = gain + z.channels, *wanted = settled + z.channels;
+    int held = 0;
     Real decay = Real(0.0);
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
@@ -340,11 +355,12 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
             }
         }
         impulse[i] = lost[i] = twice[i] = Number(0.0);
+        if (c.impulsive) ++held, wanted[i] = signal_bend(z, c) - a[i] - linear_acceleration(s, c.row, z.q1, z.p1);
         tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
         elastic[i] = c.contact ? force_at(c, c.x, Number(0.0)) : Number(0.0);
         const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]);
         const Number damping = with_law(c.law, [&](auto law) { return law.damping(c.contact ? max(c.x, Number(0.0)) : c.x, fastest, c.P); });
-        decay += value(product_seen(c, z.late[i]) * (c.contact ? select(c.closed & c.pressing, damping, Number(0.0)) : damping));
+        decay += value(product_seen(c, z.late[i]) * (c.contact ? select(acting(c), damping, Number(0.0)) : damping));
         if (c.circuit) decay += select(c.follows, Real(0.0), value(c.P[0] + sqrt(c.M[z.late[i]])));
     }
     const bool alone = count == 1 && z.channel[z.late[0]].affine;
@@ -380,6 +396,15 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
                 f[i] = force_at(c, x[i], y[i]);
             }
             for (int i = 0; i < count; ++i) f[i] += pulled_along(z, z.channel[z.late[i]], f, i, count);
+            for (int sweep = 0; sweep < (held > 1 ? 16 : held); ++sweep)  // held together, each by the others
+                for (int i = 0; i < count; ++i) {
+                    const Channel<L> &c = z.channel[z.late[i]];
+                    if (!c.impulsive) continue;
+                    f[i] = wanted[i];
+                    for (int j = 0; j < count; ++j)
+                        if (j != i) f[i] -= c.M[z.late[j]] * f[j];
+                    f[i] = select(acting(c), f[i] / c.M[z.late[i]], Number(0.0));
+                }
             const Number weight = Number(share[stage]) * step;
             for (int i = 0; i < count; ++i) {
                 const Channel<L> &c = z.channel[z.late[i]];

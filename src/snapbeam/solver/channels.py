@@ -17,11 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.contact.elastic_plastic import ElasticPlasticContact
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
 from snapbeam.model.contact.layered_hertz import LayeredHertz
 from snapbeam.model.contact.power_law import PowerLaw
+from snapbeam.model.contact.restitution import Restitution
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.components import Pieces, Sweep, Tone
 from snapbeam.model.drive.fixed_stop import FixedStop
@@ -37,6 +39,7 @@ from snapbeam.model.local_force import (
 from snapbeam.model.quantity import numbered, section_of, split_name
 from snapbeam.model.system import System
 from snapbeam.solver.further_contacts import LAW, OFFSET, REST, SINCE
+from snapbeam.solver.structure import Structure
 from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
@@ -51,6 +54,8 @@ LAWS: dict[type, tuple[int, tuple[str, ...]]] = {
     ElectrostaticForce: (6, ("voltage", "area", "gap")),
     MagneticForce: (7, ("strength", "gap")),
     QuadraticDamping: (8, ("coefficient",)),
+    ElasticPlasticContact: (15, ("loading_stiffness", "unloading_stiffness", "indentation")),
+    Restitution: (16, ("coefficient",)),
     CoulombFriction: (9, ("friction_force", "smoothing_velocity")),
 }
 """Number of each law in ``core/laws.hpp``, and the names of its numbers in their order there."""
@@ -203,13 +208,20 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         uses = {section_of("drive", number): 1.0}
         if base is not None and not base.striker_on_base:
             uses["base_excitation"] = -up if contact.striker.side == "below" else up
+        left = None
+        if contact.law.memory:
+            left = ensemble.starts[table["start_row"], 0, structure.mode_of_indentation(number - 1)]
         if number == 1:
-            values = [columns[f"contact.{name}"] for name in names]
+            values = [left if name == contact.law.memory else columns[f"contact.{name}"] for name in names]
+            if contact.law.impulsive:
+                values.append(_cancelled(structure, ensemble.contact_rows)[table["contact_row"]])
             built.add(law, ensemble.contact_rows, table["contact_row"], table["rest_contact"], uses, values, table["offset"], table["contact_time"])  # fmt: skip
             continue
         own = ensemble.others.numbers[:, number - 2]
         order = type(contact.law).numbers_type()._fields
-        values = [own[:, LAW + order.index(name)] for name in names]
+        values = [left if name == contact.law.memory else own[:, LAW + order.index(name)] for name in names]
+        if contact.law.impulsive:
+            values.append(_cancelled(structure, ensemble.others.rows)[ensemble.others.places[:, number - 2]])
         built.add(law, ensemble.others.rows, ensemble.others.places[:, number - 2], own[:, REST], uses, values, own[:, OFFSET], own[:, SINCE])  # fmt: skip
     for force, row in zip(system.local_forces, structure.local_forces, strict=True):
         law, names = _law(type(force), f"force {type(force).__name__}")
@@ -230,6 +242,11 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
     observed = np.array([structure.row_of_beam(row) for row in ensemble.contact_rows])
     built.place(observed, table["contact_row"], table["rest_contact"])
     return built.built(len(system.contacts))
+
+
+def _cancelled(structure: Structure, rows: _Array) -> _Array:
+    """r.omega^2 r/(r.r)^2: the stiffness along each row that a contact which is held together cancels."""
+    return np.asarray(np.sum((rows * structure.omega) ** 2, axis=1) / np.maximum(np.sum(rows**2, axis=1) ** 2, 1e-300))
 
 
 def _law(kind: type, words: str) -> tuple[int, tuple[str, ...]]:

@@ -38,7 +38,7 @@ Progress = Callable[[int, int], object]
 
 RUN = (
     "tick", "step", "end", "output_interval", "last_quarter", "well_sign", "contact_step", "halvings", "decide_energy",
-    "decide_reach", "decide_crossings", "max_steps", "stretch", "calm_energy",
+    "decide_reach", "decide_crossings", "max_steps", "stretch", "calm_energy", "lowest",
 )  # fmt: skip
 """Numbers of a run, in the order of ``core/api.hpp: RunNumber``."""
 STATISTICS = (
@@ -62,7 +62,7 @@ OF_CHANNEL = (
 )
 STATUS = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED, RunStatus.DIVERGED, RunStatus.STEP_LIMIT)
 """Status of a run by its number in the core."""
-OF_SAMPLE, CHANNEL_SAMPLE = 3, 5
+OF_SAMPLE, CHANNEL_SAMPLE = 3, 6
 """Numbers of a sample, and of each channel in it."""
 FEW_MODES = 16
 """Modes up to which runs are integrated side by side."""
@@ -91,8 +91,10 @@ class _Arrays:
         channels, structure = ensemble.channels, ensemble.structure
         assert channels is not None
         self.ensemble, self.channels = ensemble, channels
-        charges = [each.mode for each in structure.circuits if each.mode is not None]
-        kept = np.setdiff1d(np.arange(structure.omega.size), charges)
+        # charges and residual indentations are states of laws
+        states = [each.mode for each in structure.circuits if each.mode is not None]
+        states += [structure.mode_of_indentation(contact) for contact in structure.indentations]
+        kept = np.setdiff1d(np.arange(structure.omega.size), states)
         count, label = connected_components(structure.coupling[np.ix_(kept, kept)] != 0.0, directed=False)
         self.order = kept[np.argsort(label, kind="stable")]
         sizes = np.bincount(label, minlength=count).astype(np.int32)
@@ -100,7 +102,7 @@ class _Arrays:
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
         if np.isin(channels.laws, STEEP).any():
             halvings += _STEEP  # near a magnet or an electrode
-        lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10, 14)).any())
+        lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10, 14, 16)).any())
         fewest, per_decay = _PARTS[ensemble.order]
         wells = structure.unequal_wells
         has_two = structure.stretch > 0.0
@@ -200,6 +202,8 @@ class _Arrays:
         for circuit, channel in zip(structure.circuits, self.circuits.tolist(), strict=True):
             if circuit.mode is not None and laws is not None:
                 q[..., circuit.mode] = laws[..., channel] + q @ circuit.row
+        for contact in structure.indentations if laws is not None else ():
+            q[..., structure.mode_of_indentation(contact)] = laws[..., contact]
         return q, p
 
     def accumulators(self) -> NDArray[Any]:
@@ -345,7 +349,7 @@ def _recorded(
     channels = arrays.channels
     rows, values = recorder["rows"][:held], recorder["values"][:held]
     own = values[:, OF_SAMPLE:].reshape(held, channels.laws.size, CHANNEL_SAMPLE)
-    q, p = arrays.modes_of(rows, own[:, :, 0])
+    q, p = arrays.modes_of(rows, own[:, :, 5])
     contacts, others = own[:, : channels.contacts], own[:, channels.contacts :]
     found = np.zeros((held, 7 + len(WORKS) + arrays.circuits.size))
     if channels.contacts:

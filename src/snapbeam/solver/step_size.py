@@ -297,7 +297,7 @@ class _Bench:
 def _free_runs(rest: _Array, velocity: _Array, steps: _Array, counts: _Array) -> dict[str, Any]:
     """Runs of so many steps of so many seconds from one state, as the core gets them: about the well of sign -1."""
     runs, n = counts.size, rest.size
-    run = np.zeros((runs, 14))
+    run = np.zeros((runs, _core.RUN_NUMBERS))
     run[:, 0], run[:, 1], run[:, 5], run[:, 11] = steps, 1.0, -1.0, 1e15
     run[:, 2] = run[:, 3] = np.floor(counts)
     run[:, 6] = 1.0

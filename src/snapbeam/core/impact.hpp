@@ -1,0 +1,107 @@
+// Impacts that last no time, and contacts that are held together.
+//
+// Newton's law: where the gap closes at the rate r > 0, an impulse J = (1 + e) r/M along the row, M = r.r of all modes, leaves the
+// rate -e r; (1 - e^2) r^2/(2 M) is lost.  Impacts that follow each other ever faster (chatter) form a geometric series of flights; by
+// the acceleration a that presses the two together, the next one is e^2 r^2/(2 a) high, and all take 2 e r/[a (1 - e)].  Once both
+// are too small to be resolved, the contact is held together: what comes after does not depend on how the chatter ended.
+//
+// Held together, the tip prescribes displacement and velocity along the row.  The force that this takes,
+//
+//   f = [w'' - r.(k - omega^2 q - 2 sigma p) - sum_j M_j f_j]/M,
+//
+// acts in the kicks as any other (step.hpp); what a step leaves of the gap and its rate is taken away along the row.  Where it would
+// have to pull, the contact opens.
+#pragma once
+
+namespace SNAPBEAM_SET {
+
+constexpr double SOON = 0.05, NO_HEIGHT = 1e-4;  // rest of a chatter over the shortest period; heights over LOWEST that are none
+
+// Acceleration along the row of a contact that is open, by everything that acts, at the state of the runs.
+template <class L> SNAPBEAM_FN typename L::Number free_acceleration(Group<L> &runs, const Channel<L> &c) {
+    const Runs<L> &z = runs.z;
+    const int n = z.s->size();
+    typename L::Number a = dot<L>(c.row, z.k, n) + linear_acceleration(*z.s, c.row, z.q, z.p);
+    for (int j = 0; j < z.channels; ++j) {
+        const Channel<L> &other = z.channel[j];
+        if (&other == &c || other.law == AXIAL_LOAD || (other.contact && !any(acting(other)))) continue;
+        typename L::Number f;
+        if (other.timed) f = signal_of(z, other);
+        else if (other.circuit) f = other.P[other.state];
+        else {
+            const auto x = other.contact ? penetration(z, other, z.q) : along(z, other, z.q), v = dot<L>(other.row, z.p, n);
+            f = other.impulsive ? select(acting(other), other.f, typename L::Number(0.0)) : force_at(other, x, other.contact ? signal_slope(z, other) - v : v);
+        }
+        a = fma(c.M[j], f, a);
+    }
+    return a;
+}
+
+// Impacts of contact *number*, where its gap closes at the rate r0.
+template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
+    typedef typename L::Number Number;
+    typedef typename L::Real Real;
+    using namespace snapbeam;
+    Runs<L> &z = runs.z;
+    Channel<L> &c = z.channel[number];
+    const Number zero = Number(0.0), M = c.M[number], r = c.r0, away = c.P[0] * r, tip = signal_slope(z, c);
+    const Number pressed = signal_bend(z, c) - free_acceleration(runs, c);
+    const Number height = Number(0.5) * away * away / max(pressed, Number(1e-300)), lasts = Number(2.0) * away / max(pressed * (Number(1.0) - c.P[0]), Number(1e-300));
+    const Real fastest = Real(6.283185307179586 * SOON / runs.s->fastest);
+    auto stays = on & (value(pressed) > Real(0.0)) & (value(c.P[0]) < Real(1.0));
+    stays = stays & ((value(height) <= Real(NO_HEIGHT) * runs.lowest) | ((value(height) <= runs.lowest) & (value(lasts) <= fastest)));
+    const auto lands = stays & (!(value(c.P[0]) > Real(0.0)));  // without a rebound impact and held contact are one
+    const Number impulse = select(on, select(stays, r, r + away) / M, zero);
+    for (int i = 0; i < z.s->size(); ++i) z.p[i] = fma(typename L::Cell(impulse), c.row[i], z.p[i]);
+    const Number work = impulse * tip, left = select(stays, zero, away);
+    c.sums[WORK] += work, c.sums[GROSS_WORK] += abs(work);
+    c.sums[LOST] += select(on, Number(0.5) * (r * r - left * left) / M, zero);
+    const auto counts = on & (!lands);
+    c.sums[IMPACTS] += select(counts, Number(1.0), zero), c.sums[IMPULSE] += select(counts, impulse, zero);
+    assign(lands, c.own_impulse, impulse);
+    if (runs.batch->recorder && any(counts)) {
+        Recorder &to = *runs.batch->recorder;
+        double *row = to.impact_rows + to.marks[2]++ * OF_IMPACT;
+        row[IMPACT_CHANNEL] = number, row[IMPACT_ONSET] = lane(z.t, 0) * lane(z.tick, 0), row[IMPACT_DURATION] = 0.0;
+        row[IMPACT_FORCE] = NAN, row[IMPACT_IMPULSE] = lane(value(impulse), 0);
+    }
+    assign(on, c.d0, zero), assign(on, c.r0, -left), assign(on, c.safe, z.t);
+    assign(stays, c.onset, z.t);
+    c.closed = c.closed | stays, c.pressing = c.closed;
+}
+
+// After impacts: rates of all contacts and circuits, and what is observed.
+template <class L> void jumped_velocity(Group<L> &runs, typename L::Marks which) {
+    typedef typename L::Real Real;
+    using namespace snapbeam;
+    Runs<L> &z = runs.z;
+    const int n = z.s->size();
+    for (int j = 0; j < z.channels; ++j) {
+        Channel<L> &c = z.channel[j];
+        if (c.circuit) assign(which, c.r0, -fma(c.P[0], c.P[c.state], dot<L>(c.row, z.p, n)));
+        if (!c.contact) continue;
+        if (!c.impulsive) assign(which, c.r0, signal_slope(z, c) - dot<L>(c.row, z.p, n));
+        assign(which, c.safe, z.t);
+    }
+    auto &totals = runs.totals;
+    assign(which, totals.point.v, dot<L>(totals.row, z.p, n)), assign(which, totals.center.v, dot<L>(z.s->center, z.p, n));
+    assign(which, totals.sum[PEAK_VELOCITY], max(totals.sum[PEAK_VELOCITY], Real(abs(value(totals.point.v)))));
+    assign(which, totals.sum[PEAK_CENTER_VELOCITY], max(totals.sum[PEAK_CENTER_VELOCITY], Real(abs(value(totals.center.v)))));
+    assign(which, runs.energy, totals.energy(z, true));
+    totals.enter_well(z, which);
+}
+
+// A step in which a contact is held together: what it leaves of the gap and its rate is taken away.
+template <class L> void hold_together(Group<L> &runs, Channel<L> &c) {
+    typedef typename L::Number Number;
+    typedef typename L::Cell Cell;
+    Runs<L> &z = runs.z;
+    Number M = dot<L>(c.row, c.row, z.s->size());
+    M = select(M > Number(0.0), M, Number(1.0));  // lanes that have never run
+    const auto held = acting(c);
+    const Cell move = Cell(select(held, c.d1 / M, Number(0.0))), push = Cell(select(held, c.r1 / M, Number(0.0)));
+    for (int i = 0; i < z.s->size(); ++i) z.q1[i] = fma(move, c.row[i], z.q1[i]), z.p1[i] = fma(push, c.row[i], z.p1[i]);
+    assign(held, c.d1, Number(0.0)), assign(held, c.r1, Number(0.0));
+}
+
+}  // namespace SNAPBEAM_SET
