@@ -499,6 +499,7 @@ template <class L> struct Group {
         const int n = s->size();
         Marks redo = FromBits<Marks>::of(0), broken = FromBits<Marks>::of(0), pulled = FromBits<Marks>::of(0);
         bool touching = false;
+        for (int j = 0; j < z.channels; ++j) hold_together(*this, z.channel[j]);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             if (!c.contact) {  // out of the range in which a law is valid
@@ -514,7 +515,6 @@ template <class L> struct Group {
             }
             c.d1 = penetration(z, c, z.q1);
             c.r1 = signal_slope(z, c) - dot<L>(c.row, z.p1, n);
-            if (c.impulsive && any(c.closed)) hold_together(*this, c);
             touching |= any(alive & c.closed);
         }
         Real length = ticks, which = event;
@@ -547,9 +547,11 @@ template <class L> struct Group {
                     e.high = select(over, ticks, e.high), e.high_f = select(over, f1, e.high_f);
                     const Real next = nearest(e.low + (e.high - e.low) * (e.low_f / (e.low_f - e.high_f)));
                     const Marks better = cut_before & (tries < Real(CORRECTIONS)) & (abs(next - ticks) > step * Real(1e-9)) & (next > e.low) & (next < e.high);
-                    at = select(better, next, at);
+                    // what is held together opens where its force would pull, so that it does not land again at once
+                    const Marks pushes = under & (!better) & FromBits<Marks>::of(c.impulsive ? ~0u : 0u);
+                    at = select(better, next, select(pushes, e.high, at));
                     e.flip = e.flip & (!cut_before);
-                    e.force = cut_before & (!better);
+                    e.force = cut_before & (!better) & (!pushes);
                 }
             }
             const Marks at_force = e.force | (mine & c.closed & (!differ(e.at_force, Real(1.0))));

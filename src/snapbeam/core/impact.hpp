@@ -44,15 +44,17 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
     using namespace snapbeam;
     Runs<L> &z = runs.z;
     Channel<L> &c = z.channel[number];
-    const Number zero = Number(0.0), M = c.M[number], r = c.r0, away = c.P[0] * r, tip = signal_slope(z, c);
+    const int n = z.s->size();
+    const Number zero = Number(0.0), M = c.M[number], r = c.r0, away = c.P[0] * r, tip = signal_slope(z, c), bounce = select(on, (r + away) / M, zero);
+    for (int i = 0; i < n; ++i) z.p[i] = fma(typename L::Cell(bounce), c.row[i], z.p[i]);
     const Number pressed = signal_bend(z, c) - free_acceleration(runs, c);
     const Number height = Number(0.5) * away * away / max(pressed, Number(1e-300)), lasts = Number(2.0) * away / max(pressed * (Number(1.0) - c.P[0]), Number(1e-300));
     const Real fastest = Real(6.283185307179586 * SOON / runs.s->fastest);
     auto stays = on & (value(pressed) > Real(0.0)) & (value(c.P[0]) < Real(1.0));
     stays = stays & ((value(height) <= Real(NO_HEIGHT) * runs.lowest) | ((value(height) <= runs.lowest) & (value(lasts) <= fastest)));
     const auto lands = stays & (!(value(c.P[0]) > Real(0.0)));  // without a rebound impact and held contact are one
-    const Number impulse = select(on, select(stays, r, r + away) / M, zero);
-    for (int i = 0; i < z.s->size(); ++i) z.p[i] = fma(typename L::Cell(impulse), c.row[i], z.p[i]);
+    const Number stop = select(stays, -away / M, zero), impulse = bounce + stop;
+    for (int i = 0; i < n; ++i) z.p[i] = fma(typename L::Cell(stop), c.row[i], z.p[i]);
     const Number work = impulse * tip, left = select(stays, zero, away);
     c.sums[WORK] += work, c.sums[GROSS_WORK] += abs(work);
     c.sums[LOST] += select(on, Number(0.5) * (r * r - left * left) / M, zero);
@@ -76,6 +78,7 @@ template <class L> void jumped_velocity(Group<L> &runs, typename L::Marks which)
     using namespace snapbeam;
     Runs<L> &z = runs.z;
     const int n = z.s->size();
+    for (int i = 0; runs.batch->recorder && i < n; ++i) z.p1[i] = z.p[i];  // what is recorded at the end of the step
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         if (c.circuit) assign(which, c.r0, -fma(c.P[0], c.P[c.state], dot<L>(c.row, z.p, n)));
@@ -96,11 +99,16 @@ template <class L> void hold_together(Group<L> &runs, Channel<L> &c) {
     typedef typename L::Number Number;
     typedef typename L::Cell Cell;
     Runs<L> &z = runs.z;
+    if (!c.impulsive || !any(c.closed)) return;
+    c.d1 = penetration(z, c, z.q1), c.r1 = signal_slope(z, c) - dot<L>(c.row, z.p1, z.s->size());
     Number M = dot<L>(c.row, c.row, z.s->size());
     M = select(M > Number(0.0), M, Number(1.0));  // lanes that have never run
     const auto held = acting(c);
-    const Cell move = Cell(select(held, c.d1 / M, Number(0.0))), push = Cell(select(held, c.r1 / M, Number(0.0)));
-    for (int i = 0; i < z.s->size(); ++i) z.q1[i] = fma(move, c.row[i], z.q1[i]), z.p1[i] = fma(push, c.row[i], z.p1[i]);
+    const Number zero = Number(0.0), move = select(held, c.d1 / M, zero), push = select(held, c.r1 / M, zero);
+    // what this does to the energy of the beam is work of the striker or loss
+    const Number pulled = dot<L>(c.row, z.k1, z.s->size()) + linear_acceleration(*z.s, c.row, z.q1, z.p1);
+    c.impulse += push, c.work = fma(push, signal_slope(z, c), c.work), c.lost += Number(0.5) * push * c.r1 + move * pulled;
+    for (int i = 0; i < z.s->size(); ++i) z.q1[i] = fma(Cell(move), c.row[i], z.q1[i]), z.p1[i] = fma(Cell(push), c.row[i], z.p1[i]);
     assign(held, c.d1, Number(0.0)), assign(held, c.r1, Number(0.0));
 }
 

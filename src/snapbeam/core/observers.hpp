@@ -74,6 +74,7 @@ template <class L> void record_inside(Group<L> &run) {
         z.flows = run.own;
         for (int i = 0; i < z.signals; ++i) z.signal[i].set_length(run.s->composition, z.h);
         take_step(z);
+        for (int j = 0; j < z.channels; ++j) hold_together(run, z.channel[j]);
         write_sample(run, to.times[to.marks[0]], true);
         ++to.marks[0];
     }

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from snapbeam.model.axial_load import AxialLoadModulation
 from snapbeam.model.base_excitation import BaseExcitation, rigid_mass
 from snapbeam.model.contact.base import ContactLaw
-from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
 from snapbeam.model.diagnostics import doubts_of
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.fixed_stop import FixedStop
@@ -124,20 +123,6 @@ class System:
                         raise InputError(f"{name}: two have the label {label!r}; give each its own")
             elif given is not None and not isinstance(given, kind):
                 raise InputTypeError(f"{name} = {shown(given)}: must be {words}")
-        for number, contact in enumerate(self.contacts, 1):
-            law, striker = contact.law, contact.striker
-            section = section_of("contact", number)
-            if law.max_modes is not None and model.modes > law.max_modes:
-                raise InputError(
-                    f"{section} = {shown(law)} with modes = {model.modes}: Newton's law needs one mode, since the "
-                    "mass met by an impulse at a point falls to zero as modes are added; use one mode, or "
-                    f"{INSTEAD_OF_RESTITUTION}"
-                )
-            if striker.mass is not None and law.impulsive:
-                raise InputError(
-                    f"{section} = {law!r} with mass = {striker.mass:g} kg: under Newton's law the striker moves "
-                    f"as prescribed; leave out the mass and its suspension, or use {INSTEAD_OF_RESTITUTION}"
-                )
         if self.base_excitation is not None:
             rigid_mass(model)
         for each in (*self.forces, *self.harvesters):

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import os
 
+from snapbeam.util.diagnostics import Diagnostic, Severity, tell
 from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
 from snapbeam.model.quantity import section_of
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import updated
 from snapbeam.util.validation import InputError
+
+_MOBILITY = (
+    "{}: the mass that an impulse at a point meets falls to zero as modes are added, so that results under Newton's law belong to "
+    "modes = {}"
+)
 
 
 def is_native(engine: str) -> bool:
@@ -43,12 +49,19 @@ def check_integrable(system: System, engine: str = "auto") -> None:
                 f"{section}.law = {law!r}: has no {' and no '.join(missing)}, which engine = {engine!r} needs; write them as static "
                 "methods of (law, penetration): the integral of the force (J) and its derivative (N/m), or use engine = 'python'"
             )
+        if law.impulsive and used == "native" and system.model.modes > 1:
+            tell([Diagnostic("impulse-of-many-modes", _MOBILITY.format(section, system.model.modes), {}, Severity.INFO)])
         if law.impulsive and engine == "python":
             raise InputError(
                 f"{section}.law = {law!r}: an impact of no duration is not integrated by engine = 'python'; use engine = 'cpu', or "
                 f"{INSTEAD_OF_RESTITUTION}"
             )
-        if law.impulsive and len(contacts) > 1:
+        if law.impulsive and used != "native" and (system.model.modes > 1 or each.striker.mass is not None):
+            raise InputError(
+                f"{section} = {law!r}: with modes = {system.model.modes} and strikers that have a mass Newton's law is integrated by "
+                f"engine = 'native' alone; use that, one mode and a striker without mass, or {INSTEAD_OF_RESTITUTION}"
+            )
+        if law.impulsive and len(contacts) > 1 and used != "native":
             raise InputError(
                 f"{section} = {law!r} with several strikers: sticking under Newton's law includes one tip only; use "
                 f"{INSTEAD_OF_RESTITUTION}"

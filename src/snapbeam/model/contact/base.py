@@ -105,8 +105,6 @@ class ContactLaw:
     """Name of a residual indentation that is a part of the state; it is the last of the law's numbers."""
     vectorizable: ClassVar[bool] = False
     """True if the force needs only arithmetic and square roots, without branches: eight runs are computed at once."""
-    max_modes: ClassVar[int | None] = None
-    """Modes of a model that may be struck under this law."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)

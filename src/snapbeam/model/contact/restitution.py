@@ -17,10 +17,12 @@ INSTEAD_OF_RESTITUTION = (
 
 @dataclass(frozen=True)
 class Restitution(ContactLaw):
-    """Newton's law of impact for a single mode: the velocity of separation is e times that of approach.
+    """Newton's law of impact: the velocity of separation is e times that of approach.
 
-    The contact lasts no time, so nothing but one mode can use the law (the mass met by a point falls
-    to zero as modes are added).
+    The contact lasts no time.  Its impulse is (1 + e) times the velocity of approach over the mobility of the two bodies,
+    the sum of phi_i^2/m_i over the modes.  That sum grows with the number of modes, without a limit for a point: results
+    belong to a number of modes, and do not converge as modes are added.  Impacts that follow each other ever faster end in
+    a contact that is held together until its force would have to pull.
 
     Parameters
     ----------
@@ -41,7 +43,6 @@ class Restitution(ContactLaw):
     name = "restitution"
     properties = LawProperties(smooth=False)
     impulsive = True
-    max_modes = 1
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:
