@@ -68,6 +68,14 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
         row[IMPACT_FORCE] = NAN, row[IMPACT_IMPULSE] = lane(value(impulse), 0);
     }
     assign(on, c.d0, zero), assign(on, c.r0, -left), assign(on, c.safe, z.t);
+    for (int j = 0; j < z.channels; ++j) {  // rates of the other ones; what was held together there may part
+        Channel<L> &other = z.channel[j];
+        if (!other.contact || j == number) continue;
+        const Number change = c.M[j] * impulse;
+        other.r0 -= change, other.r1 -= change;
+        const auto parts = on & other.closed & FromBits<typename L::Marks>::of(other.impulsive ? ~0u : 0u) & (change > zero);
+        if (any(parts)) runs.close_impact(other, j, parts), other.closed = other.closed & (!parts), other.pressing = other.closed;
+    }
     assign(stays, c.onset, z.t);
     c.closed = c.closed | stays, c.pressing = c.closed;
 }

@@ -246,7 +246,9 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
 
 def _cancelled(structure: Structure, rows: _Array) -> _Array:
     """r.omega^2 r/(r.r)^2: the stiffness along each row that a contact which is held together cancels."""
-    return np.asarray(np.sum((rows * structure.omega) ** 2, axis=1) / np.maximum(np.sum(rows**2, axis=1) ** 2, 1e-300))
+    return np.asarray(
+        np.sum((rows * structure.omega) ** 2, axis=1) / np.maximum(np.sum(rows**2, axis=1) ** 2, 1e-300)
+    )
 
 
 def _law(kind: type, words: str) -> tuple[int, tuple[str, ...]]:

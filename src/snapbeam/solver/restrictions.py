@@ -50,7 +50,16 @@ def check_integrable(system: System, engine: str = "auto") -> None:
                 "methods of (law, penetration): the integral of the force (J) and its derivative (N/m), or use engine = 'python'"
             )
         if law.impulsive and used == "native" and system.model.modes > 1:
-            tell([Diagnostic("impulse-of-many-modes", _MOBILITY.format(section, system.model.modes), {}, Severity.INFO)])
+            tell(
+                [
+                    Diagnostic(
+                        "impulse-of-many-modes",
+                        _MOBILITY.format(section, system.model.modes),
+                        {},
+                        Severity.INFO,
+                    )
+                ]
+            )
         if law.impulsive and engine == "python":
             raise InputError(
                 f"{section}.law = {law!r}: an impact of no duration is not integrated by engine = 'python'; use engine = 'cpu', or "

@@ -1,0 +1,144 @@
+"""Newton's law of impact with several modes and strikers, against an own integration that jumps at every impact.
+
+Nothing of the solver is taken but the numbers of the structure.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import snapbeam as sb
+from snapbeam.model import default_values
+from snapbeam.solver.assemble import make_ensemble
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*the mass that an impulse at a point meets")
+STEEL = dict(
+    length=0.16, thickness=4e-4, width=15e-3, density=7800.0, young_modulus=200e9, buckling_level=3.35e-4
+)
+
+
+def bouncing(system, cycles, times):
+    """Amplitudes at *times*, and the number of impacts of each striker."""
+    ensemble = make_ensemble(system, sb.Integration(cycles=cycles, engine="native"))
+    structure, channels = ensemble.structure, ensemble.channels
+    n, omega = structure.omega.size, structure.omega
+    sigma, g, coupling = structure.damping_ratio * omega, structure.well, structure.coupling
+    contacts = range(len(system.contacts))
+    rows = [channels.rows[channels.row_of[0, j]] for j in contacts]
+    offsets = [float(channels.offset[0, j]) for j in contacts]
+
+    def tip(j, t):
+        drive = system.contacts[j].striker.drive
+        rate = drive.frequency_ratio * system.scale.omega
+        speed = drive.velocity_amplitude * system.scale.length * system.scale.omega
+        return speed / rate * np.sin(rate * t), speed * np.cos(rate * t)
+
+    def slope(t, y):
+        q, p = y[:n], y[n:]
+        pulled = coupling @ q
+        stretch = q @ pulled
+        tension = stretch * g + (2.0 * g @ q + stretch) * pulled
+        return np.r_[p, -(omega**2) * q - 2.0 * sigma * p - structure.nonlinear_stiffness * tension]
+
+    def gap(j):
+        def value(t, y):
+            return offsets[j] + tip(j, t)[0] - rows[j] @ y[:n]
+
+        value.direction, value.terminal = 1, True
+        return value
+
+    gaps = [gap(j) for j in contacts]
+    y, t, end = np.r_[ensemble.starts[0, 0], ensemble.starts[0, 1]], 0.0, times[-1]
+    found, impacts = np.zeros((times.size, n)), [0 for _ in contacts]
+    for j in contacts:
+        if abs(gaps[j](0.0, y)) < 1e-15:
+            y[n:] += (
+                rows[j]
+                * (1.0 + system.contacts[j].law.coefficient)
+                * (tip(j, 0.0)[1] - rows[j] @ y[n:])
+                / (rows[j] @ rows[j])
+            )
+            impacts[j] += 1
+    while t < end:
+        piece = solve_ivp(
+            slope,
+            (t, end),
+            y,
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-17,
+            dense_output=True,
+            events=gaps,
+            max_step=2e-5,
+        )
+        inside = (times >= t) & (times <= piece.t[-1])
+        if inside.any():
+            found[inside] = piece.sol(times[inside])[:n].T
+        t, y = piece.t[-1], piece.y[:, -1].copy()
+        for j in contacts if piece.status == 1 else ():
+            if piece.t_events[j].size:
+                e, row = system.contacts[j].law.coefficient, rows[j]
+                y[n:] += row * (1.0 + e) * (tip(j, t)[1] - row @ y[n:]) / (row @ row)
+                impacts[j] += 1
+    return structure.amplitudes(found), impacts
+
+
+def shaken(modes, *strikers):
+    model = sb.ReducedModel.from_beam(sb.Beam(**STEEL), modes=modes, damping_ratio=0.005)
+    contacts = [
+        sb.Contact(
+            sb.Restitution(e),
+            sb.Shaker(frequency_ratio=ratio, velocity_amplitude=speed, location=place),
+            **({} if i == 0 else {"label": f"tip_{i}"}),
+        )
+        for i, (e, ratio, speed, place) in enumerate(strikers)
+    ]
+    return sb.System(model, contacts=contacts)
+
+
+@pytest.mark.parametrize(
+    ("modes", "strikers"),
+    [
+        (3, [(0.8, 1.21, 0.3, 0.45)]),
+        (8, [(0.9, 0.7, 0.3, 0.45)]),
+        (4, [(0.7, 1.1, 0.2, 0.45), (0.9, 1.1, 0.15, 0.6)]),
+    ],
+)
+def test_every_impact_is_that_of_all_modes(modes, strikers):
+    system = shaken(modes, *strikers)
+    times = np.linspace(0.0, 1.5 * 2.0 * np.pi / system.scale.omega / strikers[0][1], 300)
+    expected, impacts = bouncing(system, 2, times)
+    for level, limit in (("standard", 1e-5), ("reference", 1e-8)):
+        run = sb.simulate(
+            system, sb.Integration(cycles=2, accuracy=level, engine="native"), sample_times=times
+        )
+        error = np.abs(run.dataset["modal_amplitude"].values - expected) / system.scale.length
+        assert error.max() < limit
+    met = run.impacts.where(run.impacts.onset <= times[-1], drop=True)
+    assert met.onset.size == sum(impacts) >= 2
+
+
+@pytest.mark.parametrize(("modes", "e"), list(itertools.product((1, 4, 8), (0.0, 0.5))))
+def test_a_contact_that_is_held_together_balances(modes, e):
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.02)
+    system = sb.System(
+        model,
+        contacts=[sb.Contact(sb.Restitution(e), sb.Shaker(frequency_ratio=0.15, velocity_amplitude=0.05))],
+    )
+    times = np.linspace(0.0, 2.0 * np.pi / system.scale.omega / 0.15, 300)[:-1]
+    found = []
+    for level in ("standard", "reference"):
+        run = sb.simulate(
+            system, sb.Integration(cycles=1, accuracy=level, engine="native"), sample_times=times
+        )
+        data = run.dataset
+        residual = data.energy_beam + data.energy_contact + data.energy_dissipated - data.striker_work
+        assert abs(residual).max() < 1e-4 * data.attrs["gross_work"]
+        assert run.impacts.duration.sum() > 0.2 * times[-1]
+        assert data.penetration_normalised.max() < 1e-9
+        found.append(data["modal_amplitude"].values / system.scale.length)
+    assert np.abs(found[0] - found[1]).max() < 1e-5
