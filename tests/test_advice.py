@@ -59,7 +59,7 @@ INSTEAD = {"hertz": HERTZ, "'hunt_crossley' with restitution and speed": LOSSY}
 ADVICE: list[tuple[Callable[[], Any], str, list[Callable[[], Any]]]] = [
     (
         lambda: integrable((NEWTON, SHAKER), modes=3),
-        "use one mode, or type = 'hertz', or 'hunt_crossley' with restitution and speed",
+        "use that, or one mode and a striker without mass, or type = 'hertz', or 'hunt_crossley' with restitution and speed",
         [
             lambda: integrable((NEWTON, SHAKER)),
             *(lambda law=law: integrable((law, SHAKER), modes=3) for law in INSTEAD.values()),
@@ -69,7 +69,7 @@ ADVICE: list[tuple[Callable[[], Any], str, list[Callable[[], Any]]]] = [
     ),
     (
         lambda: integrable((NEWTON, body(2.0))),
-        "leave out the mass and its suspension, or use type = 'hertz', or 'hunt_crossley' with restitution and speed",
+        "use that, or one mode and a striker without mass, or type = 'hertz', or 'hunt_crossley' with restitution and speed",
         [
             lambda: integrable((NEWTON, STOP)),
             *(lambda law=law: integrable((law, body(2.0))) for law in INSTEAD.values()),

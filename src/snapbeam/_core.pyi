@@ -23,3 +23,8 @@ def law_values(law: int, arrays: Mapping[str, Any]) -> None:
 
 def instruction_sets() -> list[str]:
     """Return the instruction sets that this build and this processor have, best first."""
+
+RUN_NUMBERS: int
+"""Numbers of a run, statistics of a run, and sums of a channel: the lengths of rows."""
+STATISTICS: int
+OF_CHANNEL: int

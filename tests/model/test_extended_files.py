@@ -97,15 +97,3 @@ def test_label_with_a_space_is_refused_with_one_that_works():
         config_from_mapping({"extends": "paper", "contact": stop})
     found = config_from_mapping({"extends": "paper", "contact": stop | {"label": "upper_stop"}}).system
     assert found.get("contact.upper_stop.gap") == 1e-5
-
-
-def test_restitution_of_several_modes_advises_a_law_that_has_one():
-    newton = {"type": "restitution", "coefficient": 0.6}
-    with pytest.raises(sb.InputError, match=r"use one mode, .*or 'hunt_crossley' with restitution and speed"):
-        config_from_mapping({"extends": "paper", "model": {"modes": 3}, "contact": newton})
-    law = {"type": "hunt_crossley", "restitution": 0.6, "speed": 0.2}
-    advised = config_from_mapping(
-        {"extends": "paper", "model": {"modes": 3}, "contact": law}
-    ).system.contact_law
-    assert advised.restitution(0.2) == pytest.approx(0.6)
-    assert sb.HuntCrossley.from_restitution(advised.stiffness, 0.6, 0.2) == advised

@@ -421,7 +421,6 @@ def test_another_number_of_modes_keeps_the_start() -> None:
         ({"force": 1.0}, "force: this system has no force"),
         ({"contacts": 1.0}, "contacts = 1.0: must be a list or tuple"),
         ({"contact.law": 3.0}, r"law = 3.0: must be a law of contact, such as HertzContact\(stiffness\)"),
-        ({"contact.law": sb.Restitution(0.5)}, "with modes = 3: Newton's law needs one mode"),
         ({"model": 3}, "model = 3: must be a ReducedModel"),
         ({"drive": 3}, "drive = 3: must be a drive"),
         ({"contact.striker": 3}, "striker = 3: must be a Striker or a Shaker"),

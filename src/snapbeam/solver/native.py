@@ -101,8 +101,9 @@ class _Arrays:
         assert channels is not None
         self.ensemble, self.channels = ensemble, channels
         # charges and residual indentations are states of laws
-        states = [each.mode for each in structure.circuits if each.mode is not None]
-        states += [structure.mode_of_indentation(contact) for contact in structure.indentations]
+        states: list[int] = [each.mode for each in structure.circuits if each.mode is not None]
+        first = structure.modes_of_bodies.stop
+        states += range(first, first + len(structure.indentations))
         kept = np.setdiff1d(np.arange(structure.omega.size), states)
         count, label = connected_components(structure.coupling[np.ix_(kept, kept)] != 0.0, directed=False)
         self.order = kept[np.argsort(label, kind="stable")]
@@ -203,16 +204,16 @@ class _Arrays:
         }
         self.batch["statistics"][:, 0] = -1.0
 
-    def modes_of(self, states: _Array, laws: _Array | None = None) -> tuple[_Array, _Array]:
+    def modes_of(self, states: _Array, laws: _Array) -> tuple[_Array, _Array]:
         """q and p of the structure, of those in the core and of the states of laws, shape (..., channels)."""
         n, structure = self.order.size, self.ensemble.structure
         q, p = np.zeros((2, *states.shape[:-1], structure.omega.size))
         q[..., self.order], p[..., self.order] = states[..., :n], states[..., n : 2 * n]
         for circuit, channel in zip(structure.circuits, self.circuits.tolist(), strict=True):
-            if circuit.mode is not None and laws is not None:
+            if circuit.mode is not None:
                 q[..., circuit.mode] = laws[..., channel] + q @ circuit.row
-        for contact in structure.indentations if laws is not None else ():
-            q[..., structure.mode_of_indentation(contact)] = laws[..., contact]
+        for mode, contact in enumerate(structure.indentations, structure.modes_of_bodies.stop):
+            q[..., mode] = laws[..., contact]
         return q, p
 
     def accumulators(self) -> NDArray[Any]:
@@ -236,13 +237,13 @@ class _Arrays:
         if further:
             for at, name in ((OTHER_IMPACTS, "impacts"), (OTHER_PEAK, "peak_force"), (OTHER_IMPULSE, "impulse"), (OTHER_WORK, "work")):  # fmt: skip
                 found["others"][:, :, at] = contacts[name][:, 1:]
-        for column, name in (
-            (CIRCUIT_LOSS, "lost"),
-            (CIRCUIT_LATE_LOSS, "late_lost"),
-            (CIRCUIT_PEAK, "peak_force"),
-        ):
-            if self.circuits.size:
-                found["circuits"][:, :, column] = of_channels[:, self.circuits, OF_CHANNEL.index(name)]
+        if self.circuits.size:
+            for at, name in (
+                (CIRCUIT_LOSS, "lost"),
+                (CIRCUIT_LATE_LOSS, "late_lost"),
+                (CIRCUIT_PEAK, "peak_force"),
+            ):
+                found["circuits"][:, :, at] = of_channels[:, self.circuits, OF_CHANNEL.index(name)]
         works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")
         found["gross_work"] = of_channels[:, :, works[1]].sum(axis=1)
         for j, law in enumerate(channels.laws.tolist()):

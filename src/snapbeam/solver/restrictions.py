@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 
-from snapbeam.util.diagnostics import Diagnostic, Severity, tell
 from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
 from snapbeam.model.quantity import section_of
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import updated
+from snapbeam.util.diagnostics import Diagnostic, Severity, tell
 from snapbeam.util.validation import InputError
 
 _MOBILITY = (
@@ -67,8 +67,8 @@ def check_integrable(system: System, engine: str = "auto") -> None:
             )
         if law.impulsive and used != "native" and (system.model.modes > 1 or each.striker.mass is not None):
             raise InputError(
-                f"{section} = {law!r}: with modes = {system.model.modes} and strikers that have a mass Newton's law is integrated by "
-                f"engine = 'native' alone; use that, one mode and a striker without mass, or {INSTEAD_OF_RESTITUTION}"
+                f"{section} = {law!r} with modes = {system.model.modes}: Newton's law of several modes, and of a striker with a mass, is "
+                f"integrated by engine = 'native'; use that, or one mode and a striker without mass, or {INSTEAD_OF_RESTITUTION}"
             )
         if law.impulsive and len(contacts) > 1 and used != "native":
             raise InputError(
