@@ -38,6 +38,7 @@ template <class L> struct Totals {
     Real late, decide_energy, decide_reach, decide_crossings;
     Plain *swing_u, *swing_v;  // weights of squared amplitudes, whose sums bound the errors of the cubics in a flight step
     Real modal_energy, high_energy, most_u, most_v;  // energies and those sums, where they were evaluated last
+    Real length;               // of the last step, s
 
     void lay_out(const Structure<L> &structure, const Runs<L> &, Arena &arena) {
         s = &structure;
@@ -49,11 +50,11 @@ template <class L> struct Totals {
         rest = point.u = point.v = center.u = center.v = Number(0.0);
         for (Real &x : sum) x = Real(0.0);
         late = decide_energy = decide_reach = decide_crossings = Real(0.0);
-        modal_energy = high_energy = most_u = most_v = Real(0.0);
+        modal_energy = high_energy = most_u = most_v = length = Real(0.0);
     }
     template <class F> void visit(F number) {
         number(point.u), number(point.v), number(center.u), number(center.v);
-        number(modal_energy), number(high_energy), number(most_u), number(most_v);
+        number(modal_energy), number(high_energy), number(most_u), number(most_v), number(length);
         for (Real &x : sum) number(x);
     }
     void load(const Batch &batch, int i, int l, const double *observed, double at_rest) {
@@ -72,6 +73,7 @@ template <class L> struct Totals {
         set_lane(decide_energy, l, run[DECIDE_ENERGY]), set_lane(decide_reach, l, run[DECIDE_REACH]);
         set_lane(decide_crossings, l, run[DECIDE_CROSSINGS]);
         for (Real &x : sum) set_lane(x, l, 0.0);
+        set_lane(length, l, 0.0);
         set_lane(sum[LAST_CROSSING], l, NAN), set_lane(sum[EARLY_STOP_TIME], l, NAN);
     }
     SNAPBEAM_FN Number height(const Runs<L> &z, const Cell *q) const { return fma(z.sign, rest, dot<L>(row, q, s->size())); }
@@ -179,7 +181,27 @@ template <class L> struct Totals {
         modal(z, now);
         assign(which, modal_energy, now[0]), assign(which, high_energy, now[1]), assign(which, most_u, now[2]), assign(which, most_v, now[3]);
     }
-    // By the rule of trapezoids: over equal steps its corrections cancel, and steps change where modes exchange little energy.
+    // By the rule of trapezoids with its correction h^2/12 (E_0' - E_1'), which cancels between steps of equal length.
+    void correct(const Runs<L> &z, Marks which, Real h, bool last) {
+        using namespace snapbeam;
+        Plain whole = Plain(0.0), high = Plain(0.0);
+        const Real near = well(z);
+        for (int i = 0; i < s->size(); ++i) {
+            const Plain p = value(z.p[i]), omega = Plain(s->omega[i]);
+            Plain own = value(z.k[i]) - Plain(2.0) * Plain(s->sigma[i]) * p - omega * omega * origin(z, near, i);
+            for (int j = 0; j < z.channels; ++j) {
+                const Channel<L> &c = z.channel[j];
+                if (c.active && c.law != AXIAL_LOAD) own = fma(Plain(value(last ? c.f : c.first_f)), value(c.row[i]), own);
+            }
+            own = Plain(s->beam[i]) * own * p;
+            whole += own, high = fma(Plain(s->high[i]), own, high);
+        }
+        Real rate, high_rate;
+        L::totals(whole, high, rate, high_rate);
+        const Real weight = select(which, Real(1.0 / 12.0) * (h * h - length * length), Real(0.0));
+        sum[ENERGY_TIME] = fma(weight, rate, sum[ENERGY_TIME]), sum[HIGH_ENERGY_TIME] = fma(weight, high_rate, sum[HIGH_ENERGY_TIME]);
+        length = select(which, h, length);
+    }
     void add_modes(const Runs<L> &z, Marks ok, Real h) {
         using namespace snapbeam;
         Real now[4];
@@ -272,6 +294,8 @@ template <class L> struct Totals {
         const Real u0 = value(point.u), v0 = value(point.v), u1 = value(end_u), v1 = value(end_v);
         const Real c0 = value(center.u), cv0 = value(center.v), c1 = value(end_c), cv1 = value(end_cv);
         const Real level = Real(s->problem->dividing_height);
+        const Marks changed = ok & differ(h, length);
+        if (s->problem->high && any(changed)) correct(z, changed, h, false);
         count_crossings(z, ok, c0 - level, cv0, c1 - level, cv1);
         widen(ok, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u0, v0, u1, v1, h), widen(ok, MIN_CENTER, MAX_CENTER, c0, cv0, c1, cv1, h);
         Real speed = fastest(u0, v0, u1, v1, h), center_speed = fastest(c0, cv0, c1, cv1, h);
@@ -407,6 +431,7 @@ template <class L> struct Totals {
     }
     void finish(Runs<L> &z, Marks which) {
         using namespace snapbeam;
+        if (s->problem->high) correct(z, which, Real(0.0), true);
         assign(which, sum[ENERGY], energy(z, true));
         assign(which, sum[DISPLACEMENT], Real(value(point.u))), assign(which, sum[CENTER], Real(value(center.u)));
     }
