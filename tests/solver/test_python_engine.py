@@ -93,9 +93,7 @@ def test_energy_of_high_modes_across_the_wells(midspan_amplitude):
     own, core = (sb.simulate(system, how(engine, 3)).summary for engine in ("python", "native"))
     assert own.zero_crossings == core.zero_crossings > 1
     assert own.last_zero_crossing == pytest.approx(core.last_zero_crossing, rel=1e-6)
-    assert own.high_frequency_energy_fraction == pytest.approx(
-        core.high_frequency_energy_fraction, rel=5e-6
-    )
+    assert own.high_frequency_energy_fraction == pytest.approx(core.high_frequency_energy_fraction, rel=5e-6)
 
 
 @pytest.mark.slow

@@ -502,7 +502,11 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     ]
     if further:
         plans = [_serving(each) for each in zip(plans, *further, strict=True)]
-    if integration.step is None and plans[0].order == 6 and _depends_on_velocity(system, is_native(integration.engine)):
+    if (
+        integration.step is None
+        and plans[0].order == 6
+        and _depends_on_velocity(system, is_native(integration.engine))
+    ):
         plans = [each.scaled(_GENERAL) for each in plans]
     if integration.step is None and any(_is_around(section) for section, _ in system.moving):
         fastest = fastest_of(system, columns, len(plans))

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from snapbeam import _core
-from snapbeam.solver.channels import AXIAL_LOAD, BASE, CIRCUIT, EXTERNAL_FORCE, LAW_NUMBERS, LINEAR_DAMPING, STEEP, Channels
+from snapbeam.solver.channels import (
+    AXIAL_LOAD,
+    BASE,
+    CIRCUIT,
+    EXTERNAL_FORCE,
+    LAW_NUMBERS,
+    LINEAR_DAMPING,
+    STEEP,
+    Channels,
+)
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import (
     CIRCUIT_LATE_LOSS,
@@ -223,7 +232,11 @@ class _Arrays:
         if further:
             for at, name in ((OTHER_IMPACTS, "impacts"), (OTHER_PEAK, "peak_force"), (OTHER_IMPULSE, "impulse"), (OTHER_WORK, "work")):  # fmt: skip
                 found["others"][:, :, at] = contacts[name][:, 1:]
-        for column, name in ((CIRCUIT_LOSS, "lost"), (CIRCUIT_LATE_LOSS, "late_lost"), (CIRCUIT_PEAK, "peak_force")):
+        for column, name in (
+            (CIRCUIT_LOSS, "lost"),
+            (CIRCUIT_LATE_LOSS, "late_lost"),
+            (CIRCUIT_PEAK, "peak_force"),
+        ):
             if self.circuits.size:
                 found["circuits"][:, :, column] = of_channels[:, self.circuits, OF_CHANNEL.index(name)]
         works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")

@@ -83,7 +83,9 @@ class Records:
     def observe(self, part: Any) -> None:
         """Samples and statistics of a piece: integrals by Gauss's rule in each step, extremes at its nodes and ends."""
         eq, found, n, structure = self.eq, self.found, self.eq.n, self.eq.structure
-        ends = np.union1d(part.t, part.t_events[0])  # crossings split a step: the energy of the modes jumps there
+        ends = np.union1d(
+            part.t, part.t_events[0]
+        )  # crossings split a step: the energy of the modes jumps there
         nodes, weights = nodes_of(ends).ravel(), (np.diff(ends)[:, None] * _WEIGHTS).ravel()
         inside = part.sol(nodes)
         every = np.concatenate((inside, part.y), axis=1)
