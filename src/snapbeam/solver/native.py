@@ -238,7 +238,7 @@ class _Arrays:
             (CIRCUIT_PEAK, "peak_force"),
         ):
             if self.circuits.size:
-                found["circuits"][:, :, column] = of_channels[:, self.circuits, OF_CHANNEL.index(name)]
+                found["circuits"][:, :, place] = of_channels[:, self.circuits, OF_CHANNEL.index(name)]
         works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")
         found["gross_work"] = of_channels[:, :, works[1]].sum(axis=1)
         for j, law in enumerate(channels.laws.tolist()):
