@@ -726,7 +726,7 @@ template <class L> struct Group {
             const unsigned bit = 1u << l;
             if (!((diverged | early | spent | reached) & bit)) continue;
             const bool over = lane(z.t, l) >= lane(end, l) || (diverged & bit);
-            if (batch->outputs > output[l] && ((reached | early) & bit)) write_output(l);
+            if (batch->outputs > output[l] && (batch->recorder || ((reached | early) & bit))) write_output(l);
             int status = RUNNING;
             if (diverged & bit) status = DIVERGED;
             else if (early & bit) status = EARLY_STOP;
@@ -790,6 +790,7 @@ template <class L> struct Group {
         for (int l = 0; l < L::runs; ++l)
             if (lane(alive, l)) write_statistics(l, snapbeam::RUNNING);
         if (!batch->recorder) return;
+        write_output(0), --output[0];
         double *to = batch->recorder->saved;
         visit([&](auto &x) { __builtin_memcpy(to, &x, sizeof(x)), to += sizeof(x) / sizeof(double); });
         batch->recorder->marks[4] = 1;

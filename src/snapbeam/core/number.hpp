@@ -303,7 +303,7 @@ template <class T> SNAPBEAM_FN T root(const Cubic<T> &u, T high) {
         const auto above = y > T(0.0);
         high = select(above, x, high), low = select(above, low, x);
         const T next = x - y / u.slope(x);
-        x = select((next > low) & (next < high), next, T(0.5) * (low + high));
+        x = select((next >= low) & (next <= high), next, T(0.5) * (low + high));  // at the root it is one of the bounds
     }
     return x;
 }

@@ -38,6 +38,7 @@ template <class L> struct Totals {
     Real late, decide_energy, decide_reach, decide_crossings;
     Plain *swing_u, *swing_v;  // weights of squared amplitudes, whose sums bound the errors of the cubics in a flight step
     Real modal_energy, high_energy, most_u, most_v;  // energies and those sums, where they were evaluated last
+    Real length;               // of the last step, s
 
     void lay_out(const Structure<L> &structure, const Runs<L> &, Arena &arena) {
         s = &structure;
@@ -49,11 +50,11 @@ template <class L> struct Totals {
         rest = point.u = point.v = center.u = center.v = Number(0.0);
         for (Real &x : sum) x = Real(0.0);
         late = decide_energy = decide_reach = decide_crossings = Real(0.0);
-        modal_energy = high_energy = most_u = most_v = Real(0.0);
+        modal_energy = high_energy = most_u = most_v = length = Real(0.0);
     }
     template <class F> void visit(F number) {
         number(point.u), number(point.v), number(center.u), number(center.v);
-        number(modal_energy), number(high_energy), number(most_u), number(most_v);
+        number(modal_energy), number(high_energy), number(most_u), number(most_v), number(length);
         for (Real &x : sum) number(x);
     }
     void load(const Batch &batch, int i, int l, const double *observed, double at_rest) {
@@ -72,6 +73,7 @@ template <class L> struct Totals {
         set_lane(decide_energy, l, run[DECIDE_ENERGY]), set_lane(decide_reach, l, run[DECIDE_REACH]);
         set_lane(decide_crossings, l, run[DECIDE_CROSSINGS]);
         for (Real &x : sum) set_lane(x, l, 0.0);
+        set_lane(length, l, 0.0);
         set_lane(sum[LAST_CROSSING], l, NAN), set_lane(sum[EARLY_STOP_TIME], l, NAN);
     }
     SNAPBEAM_FN Number height(const Runs<L> &z, const Cell *q) const { return fma(z.sign, rest, dot<L>(row, q, s->size())); }
@@ -116,18 +118,29 @@ template <class L> struct Totals {
         return value(all);
     }
 
+    // The well on whose side the centre is, as z.sign: until the next step begins, q may still be about the other one.
+    SNAPBEAM_FN Real well(const Runs<L> &z) const {
+        const Real first = Real(s->problem->center_rest > s->problem->dividing_height ? 1.0 : -1.0);
+        return s->problem->shift ? first * sum[snapbeam::SIDE] : z.sign;
+    }
+    // A well in mode i, as q.
+    SNAPBEAM_FN Plain origin(const Runs<L> &z, Real well, int i) const {
+        const Plain there = Plain(Real(0.5) * (Real(1.0) - well)), away = Plain(Real(0.5) * (z.sign - well));
+        return fma(there, Plain(s->second[i]), away * Plain(s->shift[i]));
+    }
     // Energies of the modes of the beam about the nearest well and of the high ones, and the sums that bound the errors of the cubics:
     // by the inequality of Cauchy and Schwarz (sum_i c_i A_i)^2 <= N sum_i c_i^2 A_i^2.
     void modal(const Runs<L> &z, Real *found) {
         Plain whole = Plain(0.0), high = Plain(0.0), u = Plain(0.0), v = Plain(0.0);
-        const Plain there = Plain(Real(0.5) * (Real(1.0) - z.sign));
+        const Real near = well(z);
+        const bool apart = s->problem->second || any(differ(near, z.sign));
         for (int i = 0; i < s->size(); ++i) {
             const Plain p = value(z.p[i]), oq = s->omega[i] * value(z.q[i]), square = fma(p, p, oq * oq);
             u = fma(swing_u[i], square, u), v = fma(swing_v[i], square, v);
             if (!s->problem->high) continue;
             Plain own = square;
-            if (s->problem->second) {
-                const Plain from = s->omega[i] * (value(z.q[i]) - there * s->second[i]);
+            if (apart) {
+                const Plain from = s->omega[i] * (value(z.q[i]) - origin(z, near, i));
                 own = fma(p, p, from * from);
             }
             own = Plain(s->beam[i]) * own;
@@ -136,12 +149,59 @@ template <class L> struct Totals {
         L::totals(whole, high, found[0], found[1]), L::totals(u, v, found[2], found[3]);
         found[0] = Real(0.5) * found[0], found[1] = Real(0.5) * found[1];
     }
+    // A step in which the centre is on the other side from a fraction of it *until* another: the energies there are about the other
+    // well.  Their difference -sum_i omega_i^2 (b_i - a_i) (q_i - (a_i + b_i)/2), of a well b to a well a, is linear in q, and a cubic
+    // in time.  From a step that ends on the other side (*once*) the rule of trapezoids gets the energy about the first well at its
+    // end, and its correction h^2/12 by the rates there, which does not cancel where the wells change.
+    void change_well(const Runs<L> &z, Marks found, Marks once, Real from, Real until) {
+        using namespace snapbeam;
+        const Real here = well(z), h = value(z.h);
+        Plain energy[4], high[4];  // at the beginning and its rate, at the end and its rate
+        for (int k = 0; k < 4; ++k) energy[k] = high[k] = Plain(0.0);
+        for (int i = 0; i < s->size(); ++i) {
+            const Plain a = origin(z, here, i), b = origin(z, -here, i), middle = Plain(0.5) * (a + b);
+            const Plain slope = Plain(s->beam[i]) * Plain(s->omega[i]) * Plain(s->omega[i]) * (a - b), high_slope = Plain(s->high[i]) * slope;
+            const Plain at[] = {value(z.q[i]) - middle, value(z.p[i]), value(z.q1[i]) - middle, value(z.p1[i])};
+            for (int k = 0; k < 4; ++k) energy[k] = fma(slope, at[k], energy[k]), high[k] = fma(high_slope, at[k], high[k]);
+        }
+        Real e[4], high_e[4];
+        for (int k = 0; k < 4; ++k) L::totals(energy[k], high[k], e[k], high_e[k]);
+        sum[ENERGY_TIME] += select(found, of_other_well(e, once, from, until, h), Real(0.0));
+        sum[HIGH_ENERGY_TIME] += select(found, of_other_well(high_e, once, from, until, h), Real(0.0));
+    }
+    SNAPBEAM_FN static Real of_other_well(const Real *e, Marks once, Real from, Real until, Real h) {
+        const Cubic<Real> path(e[0], e[1], e[2], e[3], h);
+        const auto integral = [&](Real x) {
+            return x * fma(x, fma(x, fma(x, Real(0.25) * path.c3, Real(1.0 / 3.0) * path.c2), Real(0.5) * path.c1), path.c0);
+        };
+        return h * (integral(until) - integral(from) + select(once, Real(1.0 / 12.0) * h * e[3] - Real(0.5) * e[2], Real(0.0)));
+    }
     void enter_well(const Runs<L> &z, Marks which) {
         Real now[4];
         modal(z, now);
         assign(which, modal_energy, now[0]), assign(which, high_energy, now[1]), assign(which, most_u, now[2]), assign(which, most_v, now[3]);
     }
-    // By the rule of trapezoids: over equal steps its corrections cancel, and steps change where modes exchange little energy.
+    // By the rule of trapezoids with its correction h^2/12 (E_0' - E_1'), which cancels between steps of equal length.
+    void correct(const Runs<L> &z, Marks which, Real h, bool last) {
+        using namespace snapbeam;
+        Plain whole = Plain(0.0), high = Plain(0.0);
+        const Real near = well(z);
+        for (int i = 0; i < s->size(); ++i) {
+            const Plain p = value(z.p[i]), omega = Plain(s->omega[i]);
+            Plain own = value(z.k[i]) - Plain(2.0) * Plain(s->sigma[i]) * p - omega * omega * origin(z, near, i);
+            for (int j = 0; j < z.channels; ++j) {
+                const Channel<L> &c = z.channel[j];
+                if (c.active && c.law != AXIAL_LOAD) own = fma(Plain(value(last ? c.f : c.first_f)), value(c.row[i]), own);
+            }
+            own = Plain(s->beam[i]) * own * p;
+            whole += own, high = fma(Plain(s->high[i]), own, high);
+        }
+        Real rate, high_rate;
+        L::totals(whole, high, rate, high_rate);
+        const Real weight = select(which, Real(1.0 / 12.0) * (h * h - length * length), Real(0.0));
+        sum[ENERGY_TIME] = fma(weight, rate, sum[ENERGY_TIME]), sum[HIGH_ENERGY_TIME] = fma(weight, high_rate, sum[HIGH_ENERGY_TIME]);
+        length = select(which, h, length);
+    }
     void add_modes(const Runs<L> &z, Marks ok, Real h) {
         using namespace snapbeam;
         Real now[4];
@@ -164,9 +224,9 @@ template <class L> struct Totals {
     }
 
     // Zero crossings of the centre, from values relative to the height that divides the wells.
-    SNAPBEAM_FN void count_crossings(Marks ok, Real t, Real h, Real tick, Real c0, Real v0, Real c1, Real v1) {
+    SNAPBEAM_FN void count_crossings(const Runs<L> &z, Marks ok, Real c0, Real v0, Real c1, Real v1) {
         using namespace snapbeam;
-        const Real side = sum[SIDE], zero = Real(0.0);
+        const Real side = sum[SIDE], zero = Real(0.0), h = value(z.h);
         const Marks once = ok & (side * c1 < zero);
         const Marks dips = ok & (!once) & (side * v0 < zero) & (side * v1 > zero);
         if (!any(once | dips)) return;
@@ -176,10 +236,12 @@ template <class L> struct Totals {
         if (!any(found)) return;
         const Cubic<Real> back(-side * c1, side * v1, -side * c0, side * v0, h);  // from the end: its last crossing is the first
         const Real share = select(once, root(away, Real(1.0)), Real(1.0) - root(back, min(back.summit(), Real(1.0))));
-        const Real count = select(once, Real(1.0), Real(2.0)), when = fma(share, h, t * tick);
+        const Real count = select(once, Real(1.0), Real(2.0)), when = fma(share, h, z.t * z.tick);
         sum[CROSSINGS] += select(found, count, zero);
-        sum[LATE_CROSSINGS] += select(found & (when > late * tick), count, zero);
+        sum[LATE_CROSSINGS] += select(found & (when > late * z.tick), count, zero);
         assign(found, sum[LAST_CROSSING], when);
+        if (s->problem->high && s->problem->shift)
+            change_well(z, found, once, select(once, share, root(away, min(away.summit(), Real(1.0)))), select(once, Real(1.0), share));
         assign(once, sum[SIDE], -side);
     }
 
@@ -232,7 +294,9 @@ template <class L> struct Totals {
         const Real u0 = value(point.u), v0 = value(point.v), u1 = value(end_u), v1 = value(end_v);
         const Real c0 = value(center.u), cv0 = value(center.v), c1 = value(end_c), cv1 = value(end_cv);
         const Real level = Real(s->problem->dividing_height);
-        count_crossings(ok, z.t, h, z.tick, c0 - level, cv0, c1 - level, cv1);
+        const Marks changed = ok & differ(h, length);
+        if (s->problem->high && any(changed)) correct(z, changed, h, false);
+        count_crossings(z, ok, c0 - level, cv0, c1 - level, cv1);
         widen(ok, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u0, v0, u1, v1, h), widen(ok, MIN_CENTER, MAX_CENTER, c0, cv0, c1, cv1, h);
         Real speed = fastest(u0, v0, u1, v1, h), center_speed = fastest(c0, cv0, c1, cv1, h);
         const Real slack = Real(1e-5), wider = Real(1.05), bound_u = sqrt(most_u), bound_v = sqrt(most_v);
@@ -371,6 +435,7 @@ template <class L> struct Totals {
     }
     void finish(Runs<L> &z, Marks which) {
         using namespace snapbeam;
+        if (s->problem->high) correct(z, which, Real(0.0), true);
         assign(which, sum[ENERGY], energy(z, true));
         assign(which, sum[DISPLACEMENT], Real(value(point.u))), assign(which, sum[CENTER], Real(value(center.u)));
     }

@@ -390,12 +390,10 @@ def _recorded(
 
 
 def _last(arrays: _Arrays, recorder: Any, accumulators: NDArray[Any]) -> Last:
-    """Final state of the run."""
+    """State of the run where it stands; not finite if it diverged."""
     n, contacts = arrays.order.size, max(1, arrays.channels.contacts)
     final, count = arrays.batch["states"], arrays.channels.laws.size
     q, p = arrays.modes_of(final[0, 0], final[0, 0, 2 * n + 1 + count :])
-    if not np.isfinite(final).all():
-        return Last(np.zeros_like(q), np.zeros_like(p), 1, np.full(contacts, -1.0))
     ticks = final[0, 0, 2 * n + 1 : 2 * n + 1 + contacts] if arrays.channels.contacts else np.full(1, -1.0)
     return Last(q, p, int(final[0, 0, 2 * n]), np.where(ticks > 0.0, ticks / arrays.finer, ticks))
 

@@ -41,6 +41,8 @@ class Records:
         self.places = np.stack((structure.row_of_beam(row), structure.center))
         self.at_rest = np.array([float(table["rest_contact"]), structure.center_rest])
         self.level = float(structure.dividing_height)
+        wells = ensemble.structure.unequal_wells
+        self.second_well = ensemble.structure.shift + (0.0 if wells is None else wells.second)
         self.onset, self.begun = [0.0] * count, [0.0] * count
         """Of each contact: onset of the present impact, and its impulse until then."""
         self.loads = [False] * count
@@ -81,7 +83,10 @@ class Records:
     def observe(self, part: Any) -> None:
         """Samples and statistics of a piece: integrals by Gauss's rule in each step, extremes at its nodes and ends."""
         eq, found, n, structure = self.eq, self.found, self.eq.n, self.eq.structure
-        nodes, weights = nodes_of(part.t).ravel(), (np.diff(part.t)[:, None] * _WEIGHTS).ravel()
+        ends = np.union1d(
+            part.t, part.t_events[0]
+        )  # crossings split a step: the energy of the modes jumps there
+        nodes, weights = nodes_of(ends).ravel(), (np.diff(ends)[:, None] * _WEIGHTS).ravel()
         inside = part.sol(nodes)
         every = np.concatenate((inside, part.y), axis=1)
         heights, rates = self.at_rest[:, None] + self.places @ every[:n], self.places @ every[n : 2 * n]
@@ -97,7 +102,7 @@ class Records:
         found["last_zero_crossing"] = crossings[-1] if crossings.size else found["last_zero_crossing"]
         # the energy of the modes is counted from the well on whose side mid-span is
         far = (heights[1, : nodes.size] > self.level) & (structure.stretch > 0.0)
-        q = inside[:n] - np.where(far, structure.shift[:, None], 0.0)
+        q = inside[:n] - np.where(far, self.second_well[:, None], 0.0)
         energies = (
             0.5
             * (inside[n : 2 * n] ** 2 + (eq.omega[:, None] * q) ** 2)
