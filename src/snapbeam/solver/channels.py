@@ -9,14 +9,13 @@ a force is a signal.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
@@ -37,7 +36,7 @@ from snapbeam.model.local_force import (
 from snapbeam.model.quantity import numbered, section_of, split_name
 from snapbeam.model.system import System
 from snapbeam.solver.further_contacts import LAW, OFFSET, REST, SINCE
-from snapbeam.util.validation import InputError
+from snapbeam.solver.user_laws import UserLaw, contact_law, local_force
 
 _Array = NDArray[np.float64]
 
@@ -55,6 +54,8 @@ LAWS: dict[type, tuple[int, tuple[str, ...]]] = {
 }
 """Number of each law in ``core/laws.hpp``, and the names of its numbers in their order there."""
 LINEAR_DAMPING, EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT = 10, 11, 12, 13, 14
+USER_LAWS = {"contact": 15, "lossy contact": 16, "force": 17, "lossy force": 18}
+"""Number of the law that calls a user's, by :attr:`snapbeam.solver.user_laws.UserLaw.kind`."""
 SIGNAL = (
     "mean",
     "amplitude",
@@ -67,7 +68,6 @@ SIGNAL = (
     "most_bend",
 )
 """Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep speed, first and last rate, time, duration."""
-LAW_NUMBERS = 3
 STEEP = tuple(LAWS[kind][0] for kind in (ElectrostaticForce, MagneticForce))
 """Laws whose force grows without bound towards an end of their range."""
 
@@ -92,7 +92,7 @@ class Channels:
     jumps: _Array
     """Times at which a derivative jumps, s; shape (runs, jumps)."""
     numbers: _Array
-    """Numbers of the laws, shape (runs, channels, LAW_NUMBERS)."""
+    """Numbers of the laws, shape (runs, channels, numbers of the law that has most)."""
     offset: _Array
     """Penetration in the first well with all signals at zero, shape (runs, channels)."""
     since: _Array
@@ -103,6 +103,18 @@ class Channels:
     """Row of each channel, then that of the displacement observed, shape (runs, channels + 1)."""
     rest: _Array
     """Displacement along these rows in the first well, shape (runs, channels + 1)."""
+    of_user: tuple[UserLaw, ...] = ()
+
+    def check(self) -> None:
+        """Raise the first error that a law of a user raised in the core."""
+        for law in self.of_user:
+            for function in law.functions:
+                function.check()
+
+    @property
+    def calls_python(self) -> bool:
+        """Whether a law holds the interpreter's lock, so that threads would wait for each other."""
+        return any(function.why_slow for law in self.of_user for function in law.functions)
 
 
 class _Builder:
@@ -124,18 +136,25 @@ class _Builder:
         self.signals: list[_Array] = []
         self.pieces: list[_Array] = []
         self.jumps: dict[str, _Array] = {}
+        self.of_user: list[UserLaw] = []
 
     def add(self, law: int, rows: _Array, which: Any, rest: Any, uses: dict[str, float], numbers: Any = (), offset: Any = 0.0, since: Any = -1.0) -> None:  # fmt: skip
         """Add a channel: its law, rows and which of them each run has, and the factors of its signals."""
-        of_law = np.zeros((self.runs, LAW_NUMBERS))
-        for k, value in enumerate(numbers):
-            of_law[:, k] = value
+        own = [np.broadcast_to(np.asarray(value, float), self.runs) for value in numbers]
         self.laws.append(law)
-        self.numbers.append(of_law)
+        self.numbers.append(np.stack(own, axis=1) if own else np.zeros((self.runs, 0)))
         self.place(rows, which, rest)
         self.uses.append(uses)
         self.offset.append(np.broadcast_to(np.asarray(offset, float), self.runs))
         self.since.append(np.broadcast_to(np.asarray(since, float), self.runs))
+
+    def law(self, law: Any, own: Callable[[], UserLaw]) -> tuple[int, tuple[float, ...], tuple[str, ...]]:
+        """Number of a law in the core, what is told of a user's, made by *own*, and the names of the law's numbers."""
+        if type(law) in LAWS:
+            number, names = LAWS[type(law)]
+            return number, (), names
+        self.of_user.append(own())
+        return USER_LAWS[self.of_user[-1].kind], self.of_user[-1].head, type(law).numbers_type()._fields
 
     def place(self, rows: _Array, which: Any, rest: Any) -> None:
         """Add rows, and which of them each run has."""
@@ -170,6 +189,8 @@ class _Builder:
 
     def built(self, contacts: int) -> Channels:
         """Everything as arrays."""
+        most = max((each.shape[1] for each in self.numbers), default=0)
+        padded = [np.pad(each, ((0, 0), (0, most - each.shape[1]))) for each in self.numbers]
         shape = (len(self.laws), self.runs)
         uses = np.array([[each.get(name, 0.0) for name in self.sections] for each in self.uses])
         signals = np.stack(self.signals, axis=1) if self.signals else np.zeros((self.runs, 0, len(SIGNAL)))
@@ -178,9 +199,10 @@ class _Builder:
             np.array(self.laws, np.int32), contacts, uses.reshape(len(self.laws), len(self.sections)), signals,
             np.array(self.kinds, np.int32), np.array(self.windows, np.int32),
             np.concatenate(self.pieces) if self.pieces else np.zeros((0, 7)), jumps,
-            np.stack(self.numbers, axis=1) if self.laws else np.zeros((self.runs, 0, LAW_NUMBERS)),
+            np.stack(padded, axis=1) if self.laws else np.zeros((self.runs, 0, 0)),
             np.array(self.offset).reshape(shape).T.copy(), np.array(self.since).reshape(shape).T.copy(),
             np.concatenate(self.rows), np.ascontiguousarray(np.array(self.row_of, np.int32).T), np.array(self.rest).T.copy(),
+            tuple(self.of_user),
         )  # fmt: skip
 
 
@@ -199,21 +221,22 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
     base = system.base_excitation
     up = 1.0 if base is None or base.direction == "up" else -1.0
     for number, contact in enumerate(system.contacts, 1):
-        law, names = _law(type(contact.law), f"{section_of('contact', number)}.law")
+        law, head, names = built.law(contact.law, lambda own=contact.law: contact_law(own))
         uses = {section_of("drive", number): 1.0}
         if base is not None and not base.striker_on_base:
             uses["base_excitation"] = -up if contact.striker.side == "below" else up
         if number == 1:
-            values = [columns[f"contact.{name}"] for name in names]
+            values = [*head, *(columns[f"contact.{name}"] for name in names)]
             built.add(law, ensemble.contact_rows, table["contact_row"], table["rest_contact"], uses, values, table["offset"], table["contact_time"])  # fmt: skip
             continue
         own = ensemble.others.numbers[:, number - 2]
         order = type(contact.law).numbers_type()._fields
-        values = [own[:, LAW + order.index(name)] for name in names]
+        values = [*head, *(own[:, LAW + order.index(name)] for name in names)]
         built.add(law, ensemble.others.rows, ensemble.others.places[:, number - 2], own[:, REST], uses, values, own[:, OFFSET], own[:, SINCE])  # fmt: skip
     for force, row in zip(system.local_forces, structure.local_forces, strict=True):
-        law, names = _law(type(force), f"force {type(force).__name__}")
-        built.add(law, row.row, 0, row.rest, {}, [getattr(force.numbers, name) for name in names])
+        largest = force.largest_displacement(system.model)
+        law, head, names = built.law(force, lambda own=force, far=largest: local_force(own, far))
+        built.add(law, row.row, 0, row.rest, {}, [*head, *(getattr(force.numbers, name) for name in names)])
     sections = [section for section, _ in system.moving if section.startswith("force")]
     for section, external in zip(sections, structure.force_rows, strict=True):
         built.add(EXTERNAL_FORCE, external, 0, 0.0, {section: 1.0})
@@ -230,17 +253,6 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
     observed = np.array([structure.row_of_beam(row) for row in ensemble.contact_rows])
     built.place(observed, table["contact_row"], table["rest_contact"])
     return built.built(len(system.contacts))
-
-
-def _law(kind: type, words: str) -> tuple[int, tuple[str, ...]]:
-    if kind not in LAWS:
-        names = ", ".join(
-            each.__name__ for each in LAWS if issubclass(each, ContactLaw) == issubclass(kind, ContactLaw)
-        )
-        raise InputError(
-            f"{words}: {kind.__name__} is not integrated by engine = 'native', which has {names}; use engine = 'cpu'"
-        )
-    return LAWS[kind]
 
 
 def _motions(system: System) -> list[tuple[str, Drive]]:
