@@ -176,7 +176,7 @@ struct Timed : ForceLaw<0> {  // the signal of the channel: a force, the acceler
 };
 
 // Laws of a user: functions of the host, called run by run.  Their addresses are the first numbers, bit for bit; null: none, as in a
-// lane without a run.  Then the range, the step of differences (0: 1e-5 of x), and how many numbers of the user's own follow.
+// lane without a run.  Then the range, the step of differences (0: 1e-5 of x, or no elastic part), and how many numbers follow.
 struct User {
     enum Number : int { ELASTIC, ENERGY, SLOPE, LOSSY, DAMPING, LOW, HIGH, SPAN, COUNT, OWN, MOST = 64 };
     typedef double (*Function)(double x, double y, const double *numbers);
@@ -214,7 +214,7 @@ struct User {
     static double coefficient(double x, double, const double *P) { return call(DAMPING, x, 0.0, P); }
     static double greatest_damping(double x, double y, const double *P) {  // for speeds up to |y|
         double most = bound(call(DAMPING, x, 0.0, P));
-        for (double part = 1.0; part > 0.01; part *= 0.25)
+        for (double part = 1.0; part > 0.05; part *= 0.25)
             most = max(most, max(bound(call(DAMPING, x, part * y, P)), bound(call(DAMPING, x, -part * y, P))));
         return most;
     }
@@ -242,9 +242,9 @@ struct UserLossyContact : UserContact {  // f = elastic + coefficient d'
     template <class T> static SNAPBEAM_FN T coefficient(T d, const T *P) { return User::each(pressed(d), T(0.0), P, User::coefficient); }
     template <class T> static SNAPBEAM_FN T force(T d, T y, const T *P) { return fma(coefficient(d, P), y, UserContact::force(d, y, P)); }
     template <class T> static SNAPBEAM_FN T damping(T d, T, const T *P) { return abs(coefficient(d, P)); }
-    template <class T> static SNAPBEAM_FN T pressing(T d, T y, const T *P) {  // over that at 1 m/s, which falls to zero with it
-        const T elastic = UserContact::force(d, y, P), lossy = coefficient(d, P), size = abs(elastic) + abs(lossy);
-        return select(size > T(0.0), fma(lossy, y, elastic) / size, T(1.0));
+    template <class T> static SNAPBEAM_FN T pressing(T d, T y, const T *P) {  // as a velocity, nearly linear
+        const T lossy = coefficient(d, P), size = abs(lossy);
+        return select(size > T(0.0), fma(lossy, y, UserContact::force(d, y, P)) / size, T(1.0));
     }
 };
 struct UserForce : ForceLaw<User::OWN> {
@@ -259,7 +259,9 @@ struct UserLossyForce : UserForce {
     static constexpr bool lossy = true;
     template <class T> static SNAPBEAM_FN T force(T u, T v, const T *P) { return User::each(u, v, P, User::whole); }
     template <class T> static SNAPBEAM_FN T damping(T u, T v, const T *P) { return User::each(u, v, P, User::greatest_damping); }
-    template <class T> static SNAPBEAM_FN T loss(T u, T v, T f, const T *P) { return (UserForce::force(u, v, P) - f) * v; }
+    template <class T> static SNAPBEAM_FN T loss(T u, T v, T f, const T *P) {
+        return any(P[User::SPAN] > T(0.0)) ? (UserForce::force(u, v, P) - f) * v : -(f * v);
+    }
 };
 
 // Largest bound of a law for x - reach to x + reach.

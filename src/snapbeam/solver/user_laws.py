@@ -65,7 +65,6 @@ def _compile(function: Any, numbers: Any, arguments: int, called: Any) -> tuple[
         return "Numba is not installed; install snapbeam[laws]", None
     fields = ", ".join(f"given[{k}]" for k in range(len(numbers._fields)))
     law = numba.njit(eval(f"lambda given: numbers({fields})", {"numbers": numbers}))
-    physics = numba.njit(function)
 
     def of_x(x, y, given):  # type: ignore[no-untyped-def]
         try:
@@ -81,8 +80,9 @@ def _compile(function: Any, numbers: Any, arguments: int, called: Any) -> tuple[
 
     real = numba.types.float64
     try:
+        physics = numba.njit(function)
         compiled = numba.cfunc(real(real, real, numba.types.CPointer(real)))(of_x if arguments == 1 else of_both)
-    except numba.core.errors.NumbaError as error:
+    except Exception as error:
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         return f"Numba cannot compile it ({' '.join(lines[:2])})", None
     return "", compiled
@@ -124,11 +124,12 @@ def local_force(force: LocalForce, largest: float) -> UserLaw:
     kind: Any = type(force)
     elastic = [(getattr(kind, name), 1) if force.is_conservative else None for name in ("force", "energy")]
     lossy = [(getattr(kind, name), 2) if kind.dissipative else None for name in ("damping_force", "damping_coefficient")]  # fmt: skip
+    core, span = ("lossy force" if kind.dissipative else "force"), 1e-4 * largest
     limits = force.displacement_range(force.numbers)
-    return _law_of(kind, "lossy force" if kind.dissipative else "force", [*elastic, None, *lossy], limits, 1e-4 * largest)  # fmt: skip
+    return _law_of(kind, core, [*elastic, None, *lossy], limits, span if force.is_conservative else 0.0, kind.is_limited())
 
 
-def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float) -> UserLaw:
+def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float, limited: bool = False) -> UserLaw:  # fmt: skip
     numbers = kind.numbers_type()
     count = len(numbers._fields)
     if count > MOST_NUMBERS:
@@ -137,9 +138,11 @@ def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, flo
         )
     made = [None if hook is None else _function(hook[0], numbers, hook[1]) for hook in hooks]
     functions = tuple(each for each in made if each is not None)
-    for each in functions:
-        if each.why_slow:
-            tell([Diagnostic("law.slow", f"{each.name}: the solver calls Python for every force, which is slow: {each.why_slow}")])  # fmt: skip
+    reasons = dict.fromkeys(each.why_slow for each in functions if each.why_slow)
+    tell(
+        Diagnostic("law.slow", f"{kind.__name__}: the solver calls Python for every force, which is slow: {each}")
+        for each in reasons
+    )
     low, high = np.clip(limits, -_FAR, _FAR).tolist()
     addresses = [0.0 if each is None else each.bits for each in made]
-    return UserLaw(core, functions, (*addresses, low, high, span, float(count)), kind.is_limited() if span else False)
+    return UserLaw(core, functions, (*addresses, low, high, span, float(count)), limited)
