@@ -238,7 +238,9 @@ def test_values_of_a_force_alone():
     """Energy by a rule of Gauss, slope by differences."""
     law, x = OwnHertz(STIFFNESS), np.geomspace(1e-9, 1e-5, 9)
     own = user_laws.contact_law(law)
-    fields = {name: np.empty(x.size) for name in ("force", "potential", "stiffness", "damping", "low", "high")}
+    fields = {
+        name: np.empty(x.size) for name in ("force", "potential", "stiffness", "damping", "low", "high")
+    }
     numbers = np.array([*own.head, *law.numbers()])
     _core.law_values(channels.USER_LAWS[own.kind], {"x": x, "y": x, "numbers": numbers, **fields})
     kind = sb.HertzContact

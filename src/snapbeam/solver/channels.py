@@ -9,13 +9,14 @@ a force is a signal.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
@@ -29,11 +30,13 @@ from snapbeam.model.external_force import ForceHistory
 from snapbeam.model.local_force import (
     CoulombFriction,
     ElectrostaticForce,
+    LocalForce,
     LocalSpring,
     MagneticForce,
     QuadraticDamping,
 )
 from snapbeam.model.quantity import numbered, section_of, split_name
+from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
 from snapbeam.solver.further_contacts import LAW, OFFSET, REST, SINCE
 from snapbeam.solver.user_laws import UserLaw, contact_law, local_force
@@ -148,13 +151,21 @@ class _Builder:
         self.offset.append(np.broadcast_to(np.asarray(offset, float), self.runs))
         self.since.append(np.broadcast_to(np.asarray(since, float), self.runs))
 
-    def law(self, law: Any, own: Callable[[], UserLaw]) -> tuple[int, tuple[float, ...], tuple[str, ...]]:
-        """Number of a law in the core, what is told of a user's, made by *own*, and the names of the law's numbers."""
-        if type(law) in LAWS:
-            number, names = LAWS[type(law)]
+    def law(
+        self, law: ContactLaw | LocalForce, model: ReducedModel
+    ) -> tuple[int, tuple[float, ...], tuple[str, ...]]:
+        """Number of a law in the core, what is told of a user's, and the names of the law's own numbers."""
+        kind = type(law)
+        if kind in LAWS:
+            number, names = LAWS[kind]
             return number, (), names
-        self.of_user.append(own())
-        return USER_LAWS[self.of_user[-1].kind], self.of_user[-1].head, type(law).numbers_type()._fields
+        own = (
+            contact_law(law)
+            if isinstance(law, ContactLaw)
+            else local_force(law, law.largest_displacement(model))
+        )
+        self.of_user.append(own)
+        return USER_LAWS[own.kind], own.head, kind.numbers_type()._fields
 
     def place(self, rows: _Array, which: Any, rest: Any) -> None:
         """Add rows, and which of them each run has."""
@@ -221,7 +232,7 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
     base = system.base_excitation
     up = 1.0 if base is None or base.direction == "up" else -1.0
     for number, contact in enumerate(system.contacts, 1):
-        law, head, names = built.law(contact.law, lambda own=contact.law: contact_law(own))
+        law, head, names = built.law(contact.law, system.model)
         uses = {section_of("drive", number): 1.0}
         if base is not None and not base.striker_on_base:
             uses["base_excitation"] = -up if contact.striker.side == "below" else up
@@ -234,8 +245,7 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         values = [*head, *(own[:, LAW + order.index(name)] for name in names)]
         built.add(law, ensemble.others.rows, ensemble.others.places[:, number - 2], own[:, REST], uses, values, own[:, OFFSET], own[:, SINCE])  # fmt: skip
     for force, row in zip(system.local_forces, structure.local_forces, strict=True):
-        largest = force.largest_displacement(system.model)
-        law, head, names = built.law(force, lambda own=force, far=largest: local_force(own, far))
+        law, head, names = built.law(force, system.model)
         built.add(law, row.row, 0, row.rest, {}, [*head, *(getattr(force.numbers, name) for name in names)])
     sections = [section for section, _ in system.moving if section.startswith("force")]
     for section, external in zip(sections, structure.force_rows, strict=True):

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from snapbeam import _core
-from snapbeam.solver.channels import AXIAL_LOAD, BASE, CIRCUIT, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP, USER_LAWS, Channels
+from snapbeam.solver.channels import (
+    AXIAL_LOAD,
+    BASE,
+    CIRCUIT,
+    EXTERNAL_FORCE,
+    LINEAR_DAMPING,
+    STEEP,
+    USER_LAWS,
+    Channels,
+)
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import (
     CIRCUIT_LATE_LOSS,
@@ -98,7 +107,7 @@ class _Arrays:
         sizes = np.bincount(label, minlength=count).astype(np.int32)
         n, modes = kept.size, structure.equilibrium.size
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
-        if np.isin(channels.laws, STEEP).any() or any(law.limited for law in channels.of_user):
+        if np.isin(channels.laws, STEEP).any() or any(each.limited for each in channels.of_user):
             halvings += _STEEP  # near a magnet or an electrode
         lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10, 14, USER_LAWS["lossy contact"], USER_LAWS["lossy force"])).any())
         fewest, per_decay = _PARTS[ensemble.order]

@@ -46,7 +46,9 @@ class _Function:
 
         self._called = _C(called)
         self.why_slow, self._compiled = _compile(function, numbers, arguments, self._called)
-        address = self._compiled.address if self._compiled else ctypes.cast(self._called, ctypes.c_void_p).value
+        address = (
+            self._compiled.address if self._compiled else ctypes.cast(self._called, ctypes.c_void_p).value
+        )
         self.bits: float = struct.unpack("d", struct.pack("Q", address))[0]
 
     def check(self) -> None:
@@ -66,13 +68,13 @@ def _compile(function: Any, numbers: Any, arguments: int, called: Any) -> tuple[
     fields = ", ".join(f"given[{k}]" for k in range(len(numbers._fields)))
     law = numba.njit(eval(f"lambda given: numbers({fields})", {"numbers": numbers}))
 
-    def of_x(x, y, given):  # type: ignore[no-untyped-def]
+    def of_x(x, y, given):
         try:
             return float(physics(law(given), x))
         except Exception:
             return called(x, y, given)
 
-    def of_both(x, y, given):  # type: ignore[no-untyped-def]
+    def of_both(x, y, given):
         try:
             return float(physics(law(given), x, y))
         except Exception:
@@ -81,7 +83,9 @@ def _compile(function: Any, numbers: Any, arguments: int, called: Any) -> tuple[
     real = numba.types.float64
     try:
         physics = numba.njit(function)
-        compiled = numba.cfunc(real(real, real, numba.types.CPointer(real)))(of_x if arguments == 1 else of_both)
+        compiled = numba.cfunc(real(real, real, numba.types.CPointer(real)))(
+            of_x if arguments == 1 else of_both
+        )
     except Exception as error:
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         return f"Numba cannot compile it ({' '.join(lines[:2])})", None
@@ -112,11 +116,13 @@ def contact_law(law: ContactLaw) -> UserLaw:
     """
     kind: Any = type(law)
     if kind.impulsive or kind.memory:
-        raise InputError(f"{kind.__name__}: a force that depends on the history is not integrated by engine = 'native'; use engine = 'cpu'")  # fmt: skip
+        raise InputError(f"{kind.__name__}: a law with a memory or of impulses is not integrated by engine = 'native'; use engine = 'cpu'")  # fmt: skip
     missing = kind.missing_hooks()
     hooks = [None if name in missing else (getattr(kind, name), 1) for name in ("force", "energy", "slope")]
     damping = (kind.damping_coefficient, 1) if kind.rate_dependent else None
-    return _law_of(kind, "lossy contact" if damping else "contact", [*hooks, None, damping], (0.0, math.inf), 0.0)
+    return _law_of(
+        kind, "lossy contact" if damping else "contact", [*hooks, None, damping], (0.0, math.inf), 0.0
+    )
 
 
 def local_force(force: LocalForce, largest: float) -> UserLaw:
@@ -126,7 +132,14 @@ def local_force(force: LocalForce, largest: float) -> UserLaw:
     lossy = [(getattr(kind, name), 2) if kind.dissipative else None for name in ("damping_force", "damping_coefficient")]  # fmt: skip
     core, span = ("lossy force" if kind.dissipative else "force"), 1e-4 * largest
     limits = force.displacement_range(force.numbers)
-    return _law_of(kind, core, [*elastic, None, *lossy], limits, span if force.is_conservative else 0.0, kind.is_limited())
+    return _law_of(
+        kind,
+        core,
+        [*elastic, None, *lossy],
+        limits,
+        span if force.is_conservative else 0.0,
+        kind.is_limited(),
+    )
 
 
 def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float, limited: bool = False) -> UserLaw:  # fmt: skip
@@ -140,7 +153,9 @@ def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, flo
     functions = tuple(each for each in made if each is not None)
     reasons = dict.fromkeys(each.why_slow for each in functions if each.why_slow)
     tell(
-        Diagnostic("law.slow", f"{kind.__name__}: the solver calls Python for every force, which is slow: {each}")
+        Diagnostic(
+            "law.slow", f"{kind.__name__}: the solver calls Python for every force, which is slow: {each}"
+        )
         for each in reasons
     )
     low, high = np.clip(limits, -_FAR, _FAR).tolist()
