@@ -23,9 +23,10 @@ from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
 from snapbeam.model.contact.layered_hertz import LayeredHertz
 from snapbeam.model.contact.power_law import PowerLaw
 from snapbeam.model.drive.base import Drive
-from snapbeam.model.drive.components import Pieces, Sweep, Tone
+from snapbeam.model.drive.components import Component, Pieces, Sweep, Tone, fitted, side_by_side
 from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.drive.sum import SumDrive
+from snapbeam.model.extension import overrides
 from snapbeam.model.external_force import ForceHistory
 from snapbeam.model.local_force import (
     CoulombFriction,
@@ -310,7 +311,7 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
     kind, number = numbered(section)
     above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
     bounds = _bounds(drive, own, system)
-    components = drive.components(own, system.scale)
+    components = _components(drive, own, system, begun + table["end"] * table["tick"])
     windows: dict[int, int] = {}
     for each in components:
         signal = np.zeros((runs, len(SIGNAL)))
@@ -342,6 +343,25 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
         built.add_signal(section, kind_of, signal, window)
     for name, times in _jumps(drive, own, system).items():
         built.jumps[f"{section} {name}"] = times - begun
+
+
+def _components(drive: Drive, own: Mapping[str, _Array], system: System, until: _Array) -> list[Component]:
+    """The components of a motion, up to a time (s); one of a user that has none is approximated."""
+    kind: Any = type(drive)
+    if drive.harmonic or isinstance(drive, SumDrive) or overrides(kind, Drive, "components"):
+        return drive.components(own, system.scale)
+    numbers, jumps = drive.numbers(own, system.scale), _jumps(drive, own, system)
+    names, memory = drive.numbers_type()._fields, drive.samples()
+    columns = [np.broadcast_to(numbers.get(name, 0.0), until.size) for name in names]
+    rows, which = np.unique(np.stack([*columns, *jumps.values(), until], axis=1), axis=0, return_inverse=True)
+    found = []
+    for row in rows.tolist():
+        of = drive.numbers_type()(*row[: len(names)])
+        turn = math.tau if drive.is_periodic else math.inf
+        longest = 1.5 / max(getattr(of, "fastest", of.omega), 1e-300)
+        motion = lambda t, of=of, turn=turn: kind.motion(of, memory, math.fmod(of.omega * t, turn))  # noqa: E731
+        found.append(fitted(kind.__name__, motion, row[-1], longest, row[len(names) : -1]))
+    return [side_by_side(found, which.reshape(-1))]
 
 
 def _jumps(drive: Drive, own: Mapping[str, _Array], system: System) -> dict[str, _Array]:
