@@ -188,7 +188,7 @@ def test_a_law_with_a_force_alone():
     assert Stiffening.energy(law, d) == pytest.approx(0.5 * 2e5 * d**2 + 0.25 * 1e15 * d**4, rel=1e-12)
     assert Stiffening.slope(law, d) == pytest.approx(2e5 + 3e15 * d**2, rel=1e-8)
     for engine in ("auto", "cpu", "native"):
-        with pytest.raises(InputError, match=r"no energy and no slope.*or use engine = 'python'"):
+        with pytest.raises(InputError, match=r"no energy and no slope.*or use engine = 'native'"):
             sb.simulate(system, how(engine))
 
 
