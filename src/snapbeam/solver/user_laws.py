@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import math
+import re
 import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -87,8 +88,11 @@ def _compile(function: Any, numbers: Any, arguments: int, called: Any) -> tuple[
             of_x if arguments == 1 else of_both
         )
     except Exception as error:
-        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-        return f"Numba cannot compile it ({' '.join(lines[:2])})", None
+        lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]
+        reasons = [line for line in lines if line and not line.startswith("Failed in")] or [
+            type(error).__name__
+        ]
+        return f"Numba cannot compile {function.__name__} ({reasons[0]})", None
     return "", compiled
 
 
