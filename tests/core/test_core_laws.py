@@ -7,7 +7,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import _core
-from snapbeam.solver.channels import LAW_NUMBERS, LAWS
+from snapbeam.solver.channels import LAWS
 
 MADE = (
     sb.HertzContact(3.3e8),
@@ -27,9 +27,7 @@ SPEEDS = (-0.4, -0.01, 0.0, 0.2)
 
 def values(law, numbers, x, y):
     found = {name: np.empty(x.size) for name in ("force", "potential", "stiffness", "damping", "low", "high")}
-    padded = np.zeros(LAW_NUMBERS)
-    padded[: len(numbers)] = numbers
-    _core.law_values(law, {"x": x, "y": y, "numbers": padded, **found})
+    _core.law_values(law, {"x": x, "y": y, "numbers": np.array(numbers, float), **found})
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,7 +12,11 @@ from core_systems import arrays, beam, stop
 import snapbeam as sb
 from snapbeam import _core
 from snapbeam.model import default_values
+from snapbeam.model.drive.base import DRIVES, Timed
+from snapbeam.model.drive.components import Tone, fitted, in_pieces
+from snapbeam.model.quantity import RUN, quantity
 from snapbeam.solver import native
+from snapbeam.util.validation import InputError
 
 TIMES = np.arange(4000) / 1e4
 RECORD = 30.0 * np.sin(700.0 * TIMES) + 10.0 * np.cos(330.0 * TIMES)
@@ -104,3 +109,88 @@ def test_a_run_in_pieces_is_the_run(modes, monkeypatch):
     again = sb.simulate(system, how).dataset
     for name in whole.data_vars:
         assert np.array_equal(whole[name].values, again[name].values, equal_nan=True), name
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnPulse(Timed):
+    """Half a period of a sine: the velocity jumps at its end."""
+
+    height: float = quantity("m", "height", low=0.0, scope=RUN)
+    name = "own_pulse"
+    number_names = ("omega", "fastest", "amplitude", "duration")
+    discontinuities = ("duration",)
+
+    def cycle(self, columns, scale):
+        return np.full(columns["height"].size, 2.0 * math.pi / scale.omega)
+
+    def shape_numbers(self, columns, scale):
+        duration = np.full(columns["height"].size, 1.3 * math.pi / scale.omega)
+        return {"fastest": math.pi / duration, "amplitude": columns["height"], "duration": duration}
+
+    def bounds(self, columns, scale):
+        return columns["height"], columns["height"] * scale.omega / 1.3
+
+    @staticmethod
+    def motion(drive, memory, argument):
+        t = argument / drive.omega
+        if t >= drive.duration:
+            return 0.0, 0.0
+        return drive.amplitude * math.sin(drive.fastest * t), drive.amplitude * drive.fastest * math.cos(drive.fastest * t)  # fmt: skip
+
+    @staticmethod
+    def acceleration(drive, memory, argument):
+        return 0.0
+
+
+del DRIVES["own_pulse"]
+
+
+def test_a_users_motion_without_components_is_approximated(monkeypatch):
+    """Runs as those of the same motion given as tone and window; heights differ between runs."""
+    monkeypatch.setitem(DRIVES, "own_pulse", OwnPulse)
+
+    def components(self, columns, scale):
+        numbers = self.shape_numbers(columns, scale)
+        window = in_pieces((np.zeros(1), {0: np.ones(1)}), (numbers["duration"], {}))
+        return [Tone(numbers["amplitude"], numbers["fastest"], window=window)]
+
+    striker = sb.Striker(drive=OwnPulse(height=1e-4))
+    system = sb.System(beam(3), contacts=[sb.Contact(default_values.CONTACT, striker)])
+    how, axes = (
+        sb.Integration(cycles=1, engine="native", accuracy="reference"),
+        {"drive.height": [5e-5, 1e-4, 4e-4]},
+    )
+    found = sb.sweep(system, axes, how)
+    monkeypatch.setattr(OwnPulse, "components", components)
+    wanted = sb.sweep(system, axes, how)
+    for name in ("peak_force", "max_displacement", "work", "impulse"):
+        if name in wanted:
+            np.testing.assert_allclose(found[name], wanted[name], rtol=1e-6)
+    assert (found.impacts > 0).all()
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [lambda t: (abs(t - 0.3331), math.copysign(1.0, t - 0.3331)), lambda t: (math.nan, 0.0)],
+    ids=["corner", "nan"],
+)
+def test_a_motion_that_is_not_smooth_is_refused(motion):
+    with pytest.raises(
+        InputError,
+        match=r"Own\.motion at .* name the times of its jumps in discontinuities, or define components",
+    ):
+        fitted("Own", motion, 1.0, 0.1, [])
+
+
+def test_pieces_of_a_motion_are_close_to_it():
+    def motion(t):
+        return (math.exp(-3.0 * t) * math.sin(40.0 * t), math.exp(-3.0 * t) * (40.0 * math.cos(40.0 * t) - 3.0 * math.sin(40.0 * t)))  # fmt: skip
+
+    made = fitted("Own", motion, 2.0, 0.05, [0.7])
+    t = np.linspace(0.0, 2.0, 3001)
+    piece = np.searchsorted(made.begins[0], t, side="right") - 1
+    x = t - made.begins[0][piece]
+    value = sum(made.coefficients[0][piece, k] * x**k for k in range(6))
+    rate = sum(k * made.coefficients[0][piece, k] * x ** (k - 1) for k in range(1, 6))
+    wanted = np.array([motion(each) for each in t])
+    assert np.abs(value - wanted[:, 0]).max() < 3e-9 and np.abs(rate - wanted[:, 1]).max() < 1e-6 * 40.0

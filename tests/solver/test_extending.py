@@ -24,6 +24,7 @@ from snapbeam.model.external_force import FORCES, ForceHistory
 from snapbeam.model.harvester import HARVESTERS, Harvester
 from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.parameters import lookup, parameters
+from snapbeam.solver.restrictions import is_native
 from snapbeam.solver.statistics import STATISTICS, Statistic, register_statistic, unregister_statistic
 from snapbeam.util.validation import InputError
 
@@ -31,6 +32,9 @@ PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 """The code of the page: a contact law, the function of a statistic, its row, a drive, a local force, scripts that use them."""
 MASS, SPEED = 2e-3, 0.05
+NATIVE = is_native("auto")
+"""The native core does not update registered statistics, and has no laws of a user with a memory."""
+REFUSED = pytest.mark.skipif(NATIVE, reason="refused by the native core")
 REGISTERED = (
     (LAWS, "linear"), (LAWS, "rubber"), (DRIVES, "smooth_pulse"), (FORCES, "fading_force"), (LOCAL_FORCES, "dry_friction"),
     (HARVESTERS, "plate"),
@@ -64,11 +68,13 @@ def own(tmp_path_factory):
     sys.path[:0] = [str(statistic), str(law), str(drive)]
     invalidate_caches()
     try:
-        import_module("my_statistics")
+        if not NATIVE:
+            import_module("my_statistics")
         yield import_module("own_law").LinearContact, statistic, law
     finally:
         sys.path[:] = [path for path in sys.path if path not in map(str, (statistic, law, drive))]
-        unregister_statistic("max_penetration")
+        if not NATIVE:
+            unregister_statistic("max_penetration")
         for table, name in REGISTERED:
             table.pop(name, None)
         assert package_hash() == before
@@ -91,7 +97,7 @@ def test_files_touched(own) -> None:
     assert len(list(statistic_folder.glob("*.py"))) == 2
     assert len(list(law_folder.glob("*.py"))) == 3
     assert LAWS["linear"] is law
-    assert "max_penetration" in STATISTICS
+    assert NATIVE or "max_penetration" in STATISTICS
     # the parameter of the law is in the table without a file more, next to another law's of the same name
     assert lookup("contact.linear_stiffness").quantity.unit == "N/m"
     assert "linear" in parameters()["contact.linear_stiffness"].kinds
@@ -108,6 +114,7 @@ def test_contact_steps_follow_from_the_energy_of_a_law(own) -> None:
     assert law(1e-9).impact_duration(MASS, SPEED) == 0.0
 
 
+@REFUSED
 @pytest.mark.slow
 def test_impact_on_a_surface_that_yields(own) -> None:
     """What is given back is the elastic energy at the yield force, f_y^2/(2 k); the rest is in the indentation."""
@@ -137,7 +144,8 @@ def test_impact_of_a_free_mass_on_a_spring(own) -> None:
     root = np.sqrt(MASS / springs)
     np.testing.assert_allclose(ds.contact_time_fraction * (1.0 / 80.0), math.pi * root, rtol=1e-3)
     np.testing.assert_allclose(ds.peak_force, SPEED * np.sqrt(springs * MASS), rtol=1e-3)
-    np.testing.assert_allclose(ds.max_penetration, SPEED * root, rtol=2e-2)
+    if not NATIVE:
+        np.testing.assert_allclose(ds.max_penetration, SPEED * root, rtol=2e-2)
     np.testing.assert_allclose(ds.impulse, 2.0 * MASS * SPEED, rtol=2e-3)
     np.testing.assert_allclose(ds.rms_velocity * 0.335e-3 * 2.0 * math.pi * 80.0, SPEED, rtol=2e-2)
 
@@ -155,7 +163,7 @@ def test_a_beam_struck_by_a_spring(own, tmp_path) -> None:
     assert (ds.status == sb.RunStatus.OK).all()
     # without damping nothing is dissipated, and the spring gives back what it takes
     assert (abs(ds.energy_dissipated) < 2e-3 * ds.gross_work).all()
-    assert (ds.max_penetration > 0.0).all()
+    assert NATIVE or (ds.max_penetration > 0.0).all()
     early = sb.sweep(system, axes, sb.Integration(cycles=8, early_termination=True))
     np.testing.assert_array_equal(early.response_class, ds.response_class)
     system.save(tmp_path / "own.toml")
@@ -170,6 +178,7 @@ def test_a_parameter_that_the_law_does_not_have_is_refused(own) -> None:
         law(0)
 
 
+@REFUSED
 @pytest.mark.slow
 def test_the_script_of_the_page(own, capsys) -> None:
     """It runs with the drive, the law and the statistic, and prints the output of the page."""

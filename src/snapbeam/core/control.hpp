@@ -171,6 +171,8 @@ template <class L> struct Group {
         const bool there = taken < batch->runs;
         set_lane(alive, l, there), set_lane(again, l, false), set_lane(landing, l, false);
         set_lane(z.h, l, 0.0), set_lane(ticks, l, 0.0), set_lane(key, l, -1.0);
+        for (int j = 0; j < z.channels && !there; ++j)  // nothing of a user is called for it
+            for (int k = 0; k < problem->law_numbers && of_user(z.channel[j].law); ++k) set_lane(z.channel[j].P[k], l, 0.0);
         if (!there) return false;
         const int i = batch->order[taken], modes = problem->modes;
         run[l] = i, output[l] = 0, next_jump[l] = -1;

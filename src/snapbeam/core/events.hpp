@@ -117,11 +117,14 @@ SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row *row, type
             for (int i = 0; i < n; ++i) sum = fma(abs(value(c.row[i])), amplitude[i], sum);
             const Real speed = L::total(sum);
             const Number x = c.x, reach = Number(Real(MARGIN) * speed * horizon);
-            const Real damping = with_law(c.law, [&](auto law) { return value(law.damping(x, Number(speed), c.P)); });
-            // stiffnesses have no maximum inside a range; where the range may be left, nothing is known
+            const Real damping = with_law(c.law, [&](auto law) {
+                const auto at = [&](Number u) { return law.damping(u, Number(speed), c.P); };
+                return value(law.rough ? most_within(law, x, reach, at) : at(x));
+            });
+            // where the range may be left, nothing is known
             const Real stiffness = with_law(c.law, [&](auto law) {
                 const Number left = x - reach, right = x + reach;
-                const Number known = max(law.stiffness(x, c.P), max(law.stiffness(left, c.P), law.stiffness(right, c.P)));
+                const Number known = most_within(law, x, reach, [&](Number u) { return law.stiffness(u, c.P); });
                 return value(select((left > law.low(c.P)) & (right < law.high(c.P)), known, Number(NEVER)));
             });
             most += speed * (stiffness * horizon + damping);

@@ -14,7 +14,7 @@
 //   loss(x, y, f, P)       power lost by the force f (of a force)
 //
 // affine: the force is linear in y;  contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force
-// is the channel's signal;  state: place among the numbers of a state of the law's own, or -1.
+// is the channel's signal;  state: place among the numbers of a state of the law's own, or -1;  rough: bounds may be largest anywhere.
 //
 // A circuit has a state z that changes with time, its x: z' = rate(z, y, P).  A contact with memory has one that stays as it is until
 // the contact turns back from beyond yield(P); then it grows to grown(x, P), and so does what x is measured from.  An impulsive
@@ -27,13 +27,18 @@ namespace SNAPBEAM_SET {
 enum LawNumber : int {
     HERTZ, POWER_LAW, LAYERED_HERTZ, HUNT_CROSSLEY, KELVIN_VOIGT,
     LOCAL_SPRING, ELECTROSTATIC, MAGNETIC, QUADRATIC_DAMPING, COULOMB_FRICTION, LINEAR_DAMPING,
-    EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT, ELASTIC_PLASTIC, RESTITUTION, LAWS
+    EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT, USER_CONTACT, USER_LOSSY_CONTACT, USER_FORCE, USER_LOSSY_FORCE, ELASTIC_PLASTIC,
+    RESTITUTION, LAWS
 };
+constexpr bool of_user(int law) { return law >= USER_CONTACT && law <= USER_LOSSY_FORCE; }
+// Nodes and weights of Gauss's rule of four points on [0, 1].
+constexpr double GAUSS_NODE[4] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262};
+constexpr double GAUSS_SHARE[4] = {0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692};
 
 template <int NUMBERS> struct ContactLaw {
     static constexpr int numbers = NUMBERS;
     static constexpr int state = -1;
-    static constexpr bool contact = true, lossy = false, timed = false, affine = true, memory = false, impulsive = false;
+    static constexpr bool contact = true, lossy = false, timed = false, affine = true, memory = false, impulsive = false, rough = false;
     template <class T> static SNAPBEAM_FN T yield(const T *) { return T(INFINITY); }
     template <class T> static SNAPBEAM_FN T grown(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
@@ -44,7 +49,7 @@ template <int NUMBERS> struct ContactLaw {
 template <int NUMBERS> struct ForceLaw {
     static constexpr int numbers = NUMBERS;
     static constexpr int state = -1;
-    static constexpr bool contact = false, lossy = false, timed = false, affine = false, memory = false, impulsive = false;
+    static constexpr bool contact = false, lossy = false, timed = false, affine = false, memory = false, impulsive = false, rough = false;
     template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T loss(T, T y, T f, const T *) { return -(f * y); }
     template <class T> static SNAPBEAM_FN T rate(T, T, const T *) { return T(0.0); }
@@ -199,6 +204,103 @@ struct Timed : ForceLaw<0> {  // the signal of the channel: a force, the acceler
     static constexpr bool timed = true;
 };
 
+// Laws of a user: functions of the host, called run by run.  Their addresses are the first numbers, bit for bit; null: none, as in a
+// lane without a run.  Then the range, the step of differences (0: 1e-5 of x, or no elastic part), and how many numbers follow.
+struct User {
+    enum Number : int { ELASTIC, ENERGY, SLOPE, LOSSY, DAMPING, LOW, HIGH, SPAN, COUNT, OWN, MOST = 64 };
+    typedef double (*Function)(double x, double y, const double *numbers);
+
+    static Function function(int which, const double *P) {
+        Function found;
+        __builtin_memcpy(&found, P + which, sizeof found);
+        return found;
+    }
+    // Where the law is not valid a function is not called.
+    static double call(int which, double x, double y, const double *P) {
+        const Function f = function(which, P);
+        if (!f) return 0.0;
+        return x > P[LOW] && x < P[HIGH] && y - y == 0.0 ? f(x, y, P + OWN) : NAN;
+    }
+    static double elastic(double x, double, const double *P) { return call(ELASTIC, x, 0.0, P); }
+    static double energy(double x, double, const double *P) {
+        if (function(ENERGY, P)) return call(ENERGY, x, 0.0, P);
+        double sum = 0.0;  // x s^2: of a contact, whose force may begin with a root
+        for (int part = 0; part < 6 && function(ELASTIC, P); ++part)
+            for (int i = 0; i < 4; ++i) {
+                const double s = (part + GAUSS_NODE[i]) / 6.0;
+                sum += GAUSS_SHARE[i] / 6.0 * 2.0 * s * elastic(x * s * s, 0.0, P);
+            }
+        return x * sum;
+    }
+    static double bound(double x) { return x == x ? abs(x) : INFINITY; }
+    static double slope(double x, double, const double *P) {
+        if (function(SLOPE, P)) return bound(call(SLOPE, x, 0.0, P));
+        if (!function(ELASTIC, P)) return 0.0;
+        const double h = P[SPAN] > 0.0 ? min(P[SPAN], 0.1 * min(x - P[LOW], P[HIGH] - x)) : 1e-5 * x;
+        return bound((elastic(x + h, 0.0, P) - elastic(x - h, 0.0, P)) / (2.0 * h));
+    }
+    static double whole(double x, double y, const double *P) { return elastic(x, y, P) + call(LOSSY, x, y, P); }
+    static double coefficient(double x, double, const double *P) { return call(DAMPING, x, 0.0, P); }
+    static double greatest_damping(double x, double y, const double *P) {  // for speeds up to |y|
+        double most = bound(call(DAMPING, x, 0.0, P));
+        for (double part = 1.0; part > 0.05; part *= 0.25)
+            most = max(most, max(bound(call(DAMPING, x, part * y, P)), bound(call(DAMPING, x, -part * y, P))));
+        return most;
+    }
+
+    template <class F> static __attribute__((noinline)) double each(double x, double y, const double *P, F f) { return f(x, y, P); }
+    template <int W, class F> static __attribute__((noinline)) Pack<W> each(const Pack<W> &x, const Pack<W> &y, const Pack<W> *P, F f) {
+        Pack<W> found;
+        for (int l = 0; l < W; ++l) {
+            double own[MOST];
+            for (int i = 0; i < OWN + int(lane(P[COUNT], l)); ++i) own[i] = lane(P[i], l);
+            found.set(l, f(lane(x, l), lane(y, l), own));
+        }
+        return found;
+    }
+};
+struct UserContact : ContactLaw<User::OWN> {
+    static constexpr bool rough = true;
+    template <class T> static SNAPBEAM_FN T pressed(T d) { return max(d, T(1e-30)); }
+    template <class T> static SNAPBEAM_FN T force(T d, T, const T *P) { return User::each(pressed(d), T(0.0), P, User::elastic); }
+    template <class T> static SNAPBEAM_FN T potential(T d, const T *P) { return User::each(pressed(d), T(0.0), P, User::energy); }
+    template <class T> static SNAPBEAM_FN T stiffness(T d, const T *P) { return User::each(pressed(d), T(0.0), P, User::slope); }
+};
+struct UserLossyContact : UserContact {  // f = elastic + coefficient d'
+    static constexpr bool lossy = true;
+    template <class T> static SNAPBEAM_FN T coefficient(T d, const T *P) { return User::each(pressed(d), T(0.0), P, User::coefficient); }
+    template <class T> static SNAPBEAM_FN T force(T d, T y, const T *P) { return fma(coefficient(d, P), y, UserContact::force(d, y, P)); }
+    template <class T> static SNAPBEAM_FN T damping(T d, T, const T *P) { return abs(coefficient(d, P)); }
+    template <class T> static SNAPBEAM_FN T pressing(T d, T y, const T *P) {  // as a velocity, nearly linear
+        const T lossy = coefficient(d, P), size = abs(lossy);
+        return select(size > T(0.0), fma(lossy, y, UserContact::force(d, y, P)) / size, T(1.0));
+    }
+};
+struct UserForce : ForceLaw<User::OWN> {
+    static constexpr bool rough = true;
+    template <class T> static SNAPBEAM_FN T force(T u, T, const T *P) { return User::each(u, T(0.0), P, User::elastic); }
+    template <class T> static SNAPBEAM_FN T potential(T u, const T *P) { return User::each(u, T(0.0), P, User::energy); }
+    template <class T> static SNAPBEAM_FN T stiffness(T u, const T *P) { return User::each(u, T(0.0), P, User::slope); }
+    template <class T> static SNAPBEAM_FN T low(const T *P) { return P[User::LOW]; }
+    template <class T> static SNAPBEAM_FN T high(const T *P) { return P[User::HIGH]; }
+};
+struct UserLossyForce : UserForce {
+    static constexpr bool lossy = true;
+    template <class T> static SNAPBEAM_FN T force(T u, T v, const T *P) { return User::each(u, v, P, User::whole); }
+    template <class T> static SNAPBEAM_FN T damping(T u, T v, const T *P) { return User::each(u, v, P, User::greatest_damping); }
+    template <class T> static SNAPBEAM_FN T loss(T u, T v, T f, const T *P) {
+        return any(P[User::SPAN] > T(0.0)) ? (UserForce::force(u, v, P) - f) * v : -(f * v);
+    }
+};
+
+// Largest bound of a law for x - reach to x + reach.
+template <class Law, class T, class F> SNAPBEAM_FN T most_within(Law, T x, T reach, F bound) {
+    T most = max(bound(x), max(bound(x - reach), bound(x + reach)));
+    if constexpr (Law::rough)
+        for (double part = 0.25; part < 1.0; part += 0.25) most = max(most, max(bound(x - T(part) * reach), bound(x + T(part) * reach)));
+    return most;
+}
+
 // The one place that knows every law by its number: calls function(law).
 template <class F> SNAPBEAM_FN auto with_law(int number, F function) {
     switch (number) {
@@ -215,6 +317,10 @@ template <class F> SNAPBEAM_FN auto with_law(int number, F function) {
     case ELASTIC_PLASTIC: return function(ElasticPlastic());
     case RESTITUTION: return function(Restitution());
     case CIRCUIT: return function(Circuit());
+    case USER_CONTACT: return function(UserContact());
+    case USER_LOSSY_CONTACT: return function(UserLossyContact());
+    case USER_FORCE: return function(UserForce());
+    case USER_LOSSY_FORCE: return function(UserLossyForce());
     case EXTERNAL_FORCE: case BASE: case AXIAL_LOAD: return function(Timed());
     default: return function(Hertz());
     }

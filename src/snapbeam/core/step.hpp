@@ -270,8 +270,7 @@ SNAPBEAM_FN void circuit_kick(const Channel<L> &c, typename L::Number w, typenam
     typedef typename L::Number Number;
     typedef typename L::Real Real;
     constexpr int TERMS = 18;  // where (lam + M^(1/2)) h <= 1
-    const double node[4] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262};
-    const double share[4] = {0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692};
+    const double *node = GAUSS_NODE, *share = GAUSS_SHARE;
     const Number zero = Number(0.0), lam = select(c.follows, zero, c.P[0]);
     const Real parts = max(nearest(value((lam + sqrt(M)) * abs(w)) + Real(0.5)), Real(1.0));
     const Number h = w / Number(parts), lam_h = lam * h, M_h = M * h * h;

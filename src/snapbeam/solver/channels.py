@@ -25,21 +25,25 @@ from snapbeam.model.contact.layered_hertz import LayeredHertz
 from snapbeam.model.contact.power_law import PowerLaw
 from snapbeam.model.contact.restitution import Restitution
 from snapbeam.model.drive.base import Drive
-from snapbeam.model.drive.components import Pieces, Sweep, Tone
+from snapbeam.model.drive.components import Component, Pieces, Sweep, Tone, fitted, side_by_side
 from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.drive.sum import SumDrive
+from snapbeam.model.extension import overrides
 from snapbeam.model.external_force import ForceHistory
 from snapbeam.model.local_force import (
     CoulombFriction,
     ElectrostaticForce,
+    LocalForce,
     LocalSpring,
     MagneticForce,
     QuadraticDamping,
 )
 from snapbeam.model.quantity import numbered, section_of, split_name
+from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
 from snapbeam.solver.further_contacts import LAW, OFFSET, REST, SINCE
 from snapbeam.solver.structure import Structure
+from snapbeam.solver.user_laws import UserLaw, contact_law, local_force
 from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
@@ -54,12 +58,14 @@ LAWS: dict[type, tuple[int, tuple[str, ...]]] = {
     ElectrostaticForce: (6, ("voltage", "area", "gap")),
     MagneticForce: (7, ("strength", "gap")),
     QuadraticDamping: (8, ("coefficient",)),
-    ElasticPlasticContact: (15, ("loading_stiffness", "unloading_stiffness", "indentation")),
-    Restitution: (16, ("coefficient",)),
+    ElasticPlasticContact: (19, ("loading_stiffness", "unloading_stiffness", "indentation")),
+    Restitution: (20, ("coefficient",)),
     CoulombFriction: (9, ("friction_force", "smoothing_velocity")),
 }
 """Number of each law in ``core/laws.hpp``, and the names of its numbers in their order there."""
 LINEAR_DAMPING, EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT = 10, 11, 12, 13, 14
+USER_LAWS = {"contact": 15, "lossy contact": 16, "force": 17, "lossy force": 18}
+"""Number of the law that calls a user's, by :attr:`snapbeam.solver.user_laws.UserLaw.kind`."""
 SIGNAL = (
     "mean",
     "amplitude",
@@ -72,7 +78,6 @@ SIGNAL = (
     "most_bend",
 )
 """Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep speed, first and last rate, time, duration."""
-LAW_NUMBERS = 3
 STEEP = tuple(LAWS[kind][0] for kind in (ElectrostaticForce, MagneticForce))
 """Laws whose force grows without bound towards an end of their range."""
 
@@ -97,7 +102,7 @@ class Channels:
     jumps: _Array
     """Times at which a derivative jumps, s; shape (runs, jumps)."""
     numbers: _Array
-    """Numbers of the laws, shape (runs, channels, LAW_NUMBERS)."""
+    """Numbers of the laws, shape (runs, channels, numbers of the law that has most)."""
     offset: _Array
     """Penetration in the first well with all signals at zero, shape (runs, channels)."""
     since: _Array
@@ -108,6 +113,18 @@ class Channels:
     """Row of each channel, then that of the displacement observed, shape (runs, channels + 1)."""
     rest: _Array
     """Displacement along these rows in the first well, shape (runs, channels + 1)."""
+    of_user: tuple[UserLaw, ...] = ()
+
+    def check(self) -> None:
+        """Raise the first error that a law of a user raised in the core."""
+        for law in self.of_user:
+            for function in law.functions:
+                function.check()
+
+    @property
+    def calls_python(self) -> bool:
+        """Whether a law holds the interpreter's lock, so that threads would wait for each other."""
+        return any(function.why_slow for law in self.of_user for function in law.functions)
 
 
 class _Builder:
@@ -129,18 +146,33 @@ class _Builder:
         self.signals: list[_Array] = []
         self.pieces: list[_Array] = []
         self.jumps: dict[str, _Array] = {}
+        self.of_user: list[UserLaw] = []
 
     def add(self, law: int, rows: _Array, which: Any, rest: Any, uses: dict[str, float], numbers: Any = (), offset: Any = 0.0, since: Any = -1.0) -> None:  # fmt: skip
         """Add a channel: its law, rows and which of them each run has, and the factors of its signals."""
-        of_law = np.zeros((self.runs, LAW_NUMBERS))
-        for k, value in enumerate(numbers):
-            of_law[:, k] = value
+        own = [np.broadcast_to(np.asarray(value, float), self.runs) for value in numbers]
         self.laws.append(law)
-        self.numbers.append(of_law)
+        self.numbers.append(np.stack(own, axis=1) if own else np.zeros((self.runs, 0)))
         self.place(rows, which, rest)
         self.uses.append(uses)
         self.offset.append(np.broadcast_to(np.asarray(offset, float), self.runs))
         self.since.append(np.broadcast_to(np.asarray(since, float), self.runs))
+
+    def law(
+        self, law: ContactLaw | LocalForce, model: ReducedModel
+    ) -> tuple[int, tuple[float, ...], tuple[str, ...]]:
+        """Number of a law in the core, what is told of a user's, and the names of the law's own numbers."""
+        kind = type(law)
+        if kind in LAWS:
+            number, names = LAWS[kind]
+            return number, (), names
+        own = (
+            contact_law(law)
+            if isinstance(law, ContactLaw)
+            else local_force(law, law.largest_displacement(model))
+        )
+        self.of_user.append(own)
+        return USER_LAWS[own.kind], own.head, kind.numbers_type()._fields
 
     def place(self, rows: _Array, which: Any, rest: Any) -> None:
         """Add rows, and which of them each run has."""
@@ -175,6 +207,8 @@ class _Builder:
 
     def built(self, contacts: int) -> Channels:
         """Everything as arrays."""
+        most = max((each.shape[1] for each in self.numbers), default=0)
+        padded = [np.pad(each, ((0, 0), (0, most - each.shape[1]))) for each in self.numbers]
         shape = (len(self.laws), self.runs)
         uses = np.array([[each.get(name, 0.0) for name in self.sections] for each in self.uses])
         signals = np.stack(self.signals, axis=1) if self.signals else np.zeros((self.runs, 0, len(SIGNAL)))
@@ -183,9 +217,10 @@ class _Builder:
             np.array(self.laws, np.int32), contacts, uses.reshape(len(self.laws), len(self.sections)), signals,
             np.array(self.kinds, np.int32), np.array(self.windows, np.int32),
             np.concatenate(self.pieces) if self.pieces else np.zeros((0, 7)), jumps,
-            np.stack(self.numbers, axis=1) if self.laws else np.zeros((self.runs, 0, LAW_NUMBERS)),
+            np.stack(padded, axis=1) if self.laws else np.zeros((self.runs, 0, 0)),
             np.array(self.offset).reshape(shape).T.copy(), np.array(self.since).reshape(shape).T.copy(),
             np.concatenate(self.rows), np.ascontiguousarray(np.array(self.row_of, np.int32).T), np.array(self.rest).T.copy(),
+            tuple(self.of_user),
         )  # fmt: skip
 
 
@@ -204,7 +239,7 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
     base = system.base_excitation
     up = 1.0 if base is None or base.direction == "up" else -1.0
     for number, contact in enumerate(system.contacts, 1):
-        law, names = _law(type(contact.law), f"{section_of('contact', number)}.law")
+        law, head, names = built.law(contact.law, system.model)
         uses = {section_of("drive", number): 1.0}
         if base is not None and not base.striker_on_base:
             uses["base_excitation"] = -up if contact.striker.side == "below" else up
@@ -212,20 +247,26 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         if contact.law.memory:
             left = ensemble.starts[table["start_row"], 0, structure.mode_of_indentation(number - 1)]
         if number == 1:
-            values = [left if name == contact.law.memory else columns[f"contact.{name}"] for name in names]
+            values = [
+                *head,
+                *(left if name == contact.law.memory else columns[f"contact.{name}"] for name in names),
+            ]
             if contact.law.impulsive:
                 values.append(_cancelled(structure, ensemble.contact_rows)[table["contact_row"]])
             built.add(law, ensemble.contact_rows, table["contact_row"], table["rest_contact"], uses, values, table["offset"], table["contact_time"])  # fmt: skip
             continue
         own = ensemble.others.numbers[:, number - 2]
         order = type(contact.law).numbers_type()._fields
-        values = [left if name == contact.law.memory else own[:, LAW + order.index(name)] for name in names]
+        values = [
+            *head,
+            *(left if name == contact.law.memory else own[:, LAW + order.index(name)] for name in names),
+        ]
         if contact.law.impulsive:
             values.append(_cancelled(structure, ensemble.others.rows)[ensemble.others.places[:, number - 2]])
         built.add(law, ensemble.others.rows, ensemble.others.places[:, number - 2], own[:, REST], uses, values, own[:, OFFSET], own[:, SINCE])  # fmt: skip
     for force, row in zip(system.local_forces, structure.local_forces, strict=True):
-        law, names = _law(type(force), f"force {type(force).__name__}")
-        built.add(law, row.row, 0, row.rest, {}, [getattr(force.numbers, name) for name in names])
+        law, head, names = built.law(force, system.model)
+        built.add(law, row.row, 0, row.rest, {}, [*head, *(getattr(force.numbers, name) for name in names)])
     sections = [section for section, _ in system.moving if section.startswith("force")]
     for section, external in zip(sections, structure.force_rows, strict=True):
         built.add(EXTERNAL_FORCE, external, 0, 0.0, {section: 1.0})
@@ -307,7 +348,7 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
     kind, number = numbered(section)
     above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
     bounds = _bounds(drive, own, system)
-    components = drive.components(own, system.scale)
+    components = _components(drive, own, system, begun + table["end"] * table["tick"])
     windows: dict[int, int] = {}
     for each in components:
         signal = np.zeros((runs, len(SIGNAL)))
@@ -339,6 +380,25 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
         built.add_signal(section, kind_of, signal, window)
     for name, times in _jumps(drive, own, system).items():
         built.jumps[f"{section} {name}"] = times - begun
+
+
+def _components(drive: Drive, own: Mapping[str, _Array], system: System, until: _Array) -> list[Component]:
+    """The components of a motion, up to a time (s); one of a user that has none is approximated."""
+    kind: Any = type(drive)
+    if drive.harmonic or isinstance(drive, SumDrive) or overrides(kind, Drive, "components"):
+        return drive.components(own, system.scale)
+    numbers, jumps = drive.numbers(own, system.scale), _jumps(drive, own, system)
+    names, memory = drive.numbers_type()._fields, drive.samples()
+    columns = [np.broadcast_to(numbers.get(name, 0.0), until.size) for name in names]
+    rows, which = np.unique(np.stack([*columns, *jumps.values(), until], axis=1), axis=0, return_inverse=True)
+    found = []
+    for row in rows.tolist():
+        of = drive.numbers_type()(*row[: len(names)])
+        turn = math.tau if drive.is_periodic else math.inf
+        longest = 1.5 / max(getattr(of, "fastest", of.omega), 1e-300)
+        motion = lambda t, of=of, turn=turn: kind.motion(of, memory, math.fmod(of.omega * t, turn))  # noqa: E731
+        found.append(fitted(kind.__name__, motion, row[-1], longest, row[len(names) : -1]))
+    return [side_by_side(found, which.reshape(-1))]
 
 
 def _jumps(drive: Drive, own: Mapping[str, _Array], system: System) -> dict[str, _Array]:

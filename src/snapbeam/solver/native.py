@@ -18,9 +18,9 @@ from snapbeam.solver.channels import (
     BASE,
     CIRCUIT,
     EXTERNAL_FORCE,
-    LAW_NUMBERS,
     LINEAR_DAMPING,
     STEEP,
+    USER_LAWS,
     Channels,
 )
 from snapbeam.solver.ensemble import Ensemble
@@ -110,9 +110,13 @@ class _Arrays:
         sizes = np.bincount(label, minlength=count).astype(np.int32)
         n, modes = kept.size, structure.equilibrium.size
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
-        if np.isin(channels.laws, STEEP).any():
+        if np.isin(channels.laws, STEEP).any() or any(each.limited for each in channels.of_user):
             halvings += _STEEP  # near a magnet or an electrode
-        lossy = bool(np.isin(channels.laws, (3, 4, 8, 9, 10, 14, 16)).any())
+        lossy = bool(
+            np.isin(
+                channels.laws, (3, 4, 8, 9, 10, 14, 20, USER_LAWS["lossy contact"], USER_LAWS["lossy force"])
+            ).any()
+        )
         fewest, per_decay = _PARTS[ensemble.order]
         wells = structure.unequal_wells
         has_two = structure.stretch > 0.0
@@ -144,7 +148,7 @@ class _Arrays:
             "signal_kinds": channels.kinds,
             "windows": channels.windows,
             "jumps": channels.jumps.shape[1],
-            "law_numbers": LAW_NUMBERS,
+            "law_numbers": channels.numbers.shape[2],
             "center": row(structure.center),
             "center_rest": float(structure.center_rest),
             "dividing_height": float(structure.dividing_height),
@@ -272,9 +276,10 @@ def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) 
         arrays.batch,
         layout,
         os.environ.get("SNAPBEAM_SET", ""),
-        threads or usable_cores(),
+        1 if arrays.channels.calls_python else threads or usable_cores(),
         progress,
     )
+    arrays.channels.check()
     if progress is not None:
         progress(arrays.ensemble.size, arrays.ensemble.size)
 
@@ -345,6 +350,7 @@ def record(
     layout = os.environ.get("SNAPBEAM_LAYOUT") or layout
     while True:
         _core.record(arrays.problem, arrays.batch, recorder, layout, os.environ.get("SNAPBEAM_SET", ""))
+        channels.check()
         marks = recorder["marks"]
         accumulators = arrays.accumulators()
         held, impacts = int(marks[1]), int(marks[2])

@@ -44,10 +44,10 @@ def check_integrable(system: System, engine: str = "auto") -> None:
     for number, each in enumerate(contacts, 1):
         section, law = section_of("contact", number), each.law
         missing = type(law).missing_hooks()
-        if missing and engine != "python":
+        if missing and used not in ("native", "python"):
             raise InputError(
                 f"{section}.law = {law!r}: has no {' and no '.join(missing)}, which engine = {engine!r} needs; write them as static "
-                "methods of (law, penetration): the integral of the force (J) and its derivative (N/m), or use engine = 'python'"
+                "methods of (law, penetration): the integral of the force (J) and its derivative (N/m), or use engine = 'native'"
             )
         if law.impulsive and used == "native" and system.model.modes > 1:
             tell(

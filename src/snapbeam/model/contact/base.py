@@ -219,4 +219,9 @@ class ContactLaw:
             high *= 2.0
             if high > 1.0:
                 return 0.0
+        if not math.isfinite(energy(numbers, high)):
+            raise InputError(
+                f"{law.__name__}.energy at a penetration of {high:g} m = {energy(numbers, high)}: must be a finite number of J; correct "
+                f"{'force' if 'energy' in law.missing_hooks() else 'energy'}, or give time_scale(self, mass, velocity)"
+            )
         return float(brentq(lambda depth: energy(numbers, depth) - arrives, 0.0, high, xtol=1e-15 * high))

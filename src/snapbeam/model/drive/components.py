@@ -10,10 +10,15 @@ begins with that axis, or with one of length 1 that all runs share.
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
 RISE = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
@@ -92,3 +97,77 @@ def hermite(values: _Array, rates: _Array, interval: float) -> _Array:
     found[:, 2] = (3.0 * rise / interval - 2.0 * a - b) / interval
     found[:, 3] = (a + b - 2.0 * rise / interval) / interval**2
     return found
+
+
+_PIECES = 20_000
+"""Pieces of a motion that is approximated, at most."""
+_CLOSE = 1e-9
+"""Error of such a motion over its maximum; that of its rate is a thousand times as large."""
+_NODES = np.array([0.0, 0.5, 1.0])
+_THROUGH = np.linalg.inv(np.vstack([_NODES[:, None] ** np.arange(6), np.arange(6) * _NODES[:, None] ** np.maximum(np.arange(6) - 1, 0)]))  # fmt: skip
+"""Coefficients of a quintic from its values and rates at the nodes."""
+
+
+def fitted(
+    name: str,
+    motion: Callable[[float], tuple[float, float]],
+    until: float,
+    longest: float,
+    jumps: Sequence[float],
+) -> Pieces:
+    """Quintics through values and rates of a *motion*, of time (s), up to *until*; shorter where they miss it by more than 1e-9.
+
+    Raises
+    ------
+    InputError
+        If the motion is not finite, or is not smooth between its *jumps*.
+    """
+    tiny = 1e-13 * until
+    ends = [0.0, *sorted(t for t in set(jumps) if tiny < t < until - tiny), until]
+    parts: list[tuple[float, float, float, float]] = []
+    for low, high in itertools.pairwise(ends):
+        edges = np.linspace(low, high, 1 + min(max(64, math.ceil((high - low) / longest)), _PIECES)).tolist()
+        parts += [(a, b, low + tiny, high - tiny) for a, b in itertools.pairwise(edges)]
+    at = np.array([motion(min(max(a, low), high)) for a, _, low, high in parts])
+    most = np.maximum(np.abs(at).max(axis=0), 1e-300)
+    begins: list[float] = []
+    coefficients: list[_Array] = []
+    parts.reverse()
+    while parts:
+        a, b, low, high = parts.pop()
+        h = b - a
+
+        def seen(share: float, a: float = a, h: float = h, low: float = low, high: float = high) -> _Array:
+            return np.array(motion(min(max(a + share * h, low), high))) * (1.0, h)
+
+        nodes = np.array([seen(share) for share in _NODES])
+        found = _THROUGH @ np.concatenate((nodes[:, 0], nodes[:, 1]))
+        most = np.maximum(most, np.abs(nodes * (1.0, 1.0 / h)).max(axis=0))
+        slopes = np.arange(1, 6) * found[1:]
+        wrong = max(
+            np.abs((np.polyval(found[::-1], share), np.polyval(slopes[::-1], share)) - seen(share))
+            @ (1.0, 1e-3 * most[0] / (most[1] * h))
+            for share in (0.2, 0.4, 0.75)
+        )
+        if wrong <= _CLOSE * most[0]:
+            begins.append(a)
+            coefficients.append(found / h ** np.arange(6))
+        elif h > 1e-9 * until and len(begins) + len(parts) < _PIECES:
+            middle = 0.5 * (a + b)
+            parts += [(middle, b, low, high), (a, middle, low, high)]
+        else:
+            raise InputError(
+                f"{name}.motion at {a:g} s: is not finite or not smooth, or has more than {_PIECES} parts, so that engine = 'native' "
+                "cannot approximate it; name the times of its jumps in discontinuities, or define components"
+            )
+    return Pieces(np.array(begins)[None], np.array(coefficients)[None])
+
+
+def side_by_side(pieces: Sequence[Pieces], which: NDArray[np.int64]) -> Pieces:
+    """Pieces of many runs, *which* of them each has, as one table."""
+    most = max(each.begins.shape[1] for each in pieces)
+    begins = [
+        np.pad(each.begins[0], (0, most - each.begins.shape[1]), constant_values=1e300) for each in pieces
+    ]
+    rows = [np.pad(each.coefficients[0], ((0, most - each.begins.shape[1]), (0, 0))) for each in pieces]
+    return Pieces(np.array(begins)[which], np.array(rows)[which])
