@@ -157,7 +157,8 @@ def made(law, *forces, modes=3):
 
 @pytest.fixture
 def without_numba(monkeypatch):
-    """Functions of C by ctypes alone."""
+    """Functions of C by ctypes alone; the parts of the package that need Numba are imported before."""
+    sb.simulate(made(HERTZ, sb.LocalSpring(**SPRING)), NATIVE)
     monkeypatch.setattr(user_laws, "_function", user_laws._Function)
     monkeypatch.setitem(sys.modules, "numba", None)
 

@@ -187,7 +187,9 @@ def test_a_law_with_a_force_alone():
     law, d = system.contact_law.numbers(), 3e-6
     assert Stiffening.energy(law, d) == pytest.approx(0.5 * 2e5 * d**2 + 0.25 * 1e15 * d**4, rel=1e-12)
     assert Stiffening.slope(law, d) == pytest.approx(2e5 + 3e15 * d**2, rel=1e-8)
-    with pytest.warns(sb.DiagnosticWarning, match="Numba cannot compile force"):  # its functions are beyond Numba
+    with pytest.warns(
+        sb.DiagnosticWarning, match="Numba cannot compile force"
+    ):  # its functions are beyond Numba
         native = sb.simulate(system, how("native", cycles=2))
     ends = [each.dataset.modal_amplitude.values[-1] for each in (native, run)]
     assert ends[0] == pytest.approx(ends[1], rel=1e-9)
