@@ -192,6 +192,9 @@ def test_a_users_law_is_the_packages(name, layout, monkeypatch):
 def test_without_numba_python_is_called(name, layout, monkeypatch, without_numba):
     monkeypatch.setenv("SNAPBEAM_LAYOUT", layout)
     monkeypatch.setattr("snapbeam.util.diagnostics._told", set())
+    sb.simulate(
+        made(*SAME[name][0]), NATIVE
+    )  # imports what it needs: not within the warnings that are caught
     with pytest.warns(DiagnosticWarning, match=r"calls Python for every force.*install snapbeam\[laws\]"):
         check_same(name)
 
