@@ -160,10 +160,10 @@ def without_numba(monkeypatch):
     """Functions of C by ctypes alone."""
     found = builtins.__import__
 
-    def without(name, at=None, *more):
-        if name == "numba" and at is not None and at.get("__name__") == user_laws.__name__:
+    def without(name, globals=None, *more, **named):
+        if name == "numba" and globals is not None and globals.get("__name__") == user_laws.__name__:
             raise ImportError(name)
-        return found(name, at, *more)
+        return found(name, globals, *more, **named)
 
     monkeypatch.setattr(user_laws, "_function", user_laws._Function)
     monkeypatch.setattr(builtins, "__import__", without)
