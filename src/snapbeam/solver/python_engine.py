@@ -170,7 +170,7 @@ class Equations:
 
     def pressure(self, j: int, d: float, rate: float, numbers: Any) -> float:
         """F_j(d) + c_j(d) d', which a contact does not let fall below zero."""
-        law, d = type(self.contacts[j].law), max(d, 0.0)
+        law, d = type(self.contacts[j].law), max(d, 1e-30)  # laws are given for d > 0
         return float(
             law.force(numbers, d)
             + (law.damping_coefficient(numbers, d) * rate if law.rate_dependent else 0.0)
