@@ -371,22 +371,7 @@ template <class L> struct Totals {
         Marks acts = ok;
         if (c.contact) {
             acts = ok & acting(c);
-            if (c.impulsive) {  // the force that holds it together
-                assign(acts, c.hardest, max(c.hardest, max(c.first_f, c.f))), assign(acts, c.deepest, c.hardest);
-            } else {
-            const Cubic<Number> depth(c.d0, c.r0, c.d1, c.r1, z.h);
-            assign(acts, c.deepest, max(c.deepest, max(max(c.d0, c.d1), zero)));
-            const auto turns = acts & (c.r0 > zero) & (c.r1 < zero);
-            if (any(turns)) assign(turns, c.deepest, max(c.deepest, summit(z, c)));
-            if (c.lossy && any(acts)) {  // the parabola through the force at both ends and in the middle
-                const Number half = Number(0.5), d = max(depth.at(half), zero), rate = depth.slope(half) / max(z.h, Number(1e-300));
-                const Number f0 = force_at(c, max(c.d0, zero), c.r0), f1 = force_at(c, max(c.d1, zero), c.r1), fm = force_at(c, d, rate);
-                const Number bend = f0 + f1 - Number(2.0) * fm, tilt = f1 - f0;
-                const auto top = (bend < zero) & (abs(tilt) < Number(-2.0) * bend);
-                const Number peak = max(max(f0, f1), select(top, fm - tilt * tilt / (Number(8.0) * bend), fm));
-                assign(acts, c.hardest, max(c.hardest, peak));
-            }
-            }
+            deepen(z, c, acts);
             c.own_impulse += select(acts, c.impulse, zero);
         }
         c.sums[WORK] += select(acts, c.work, zero), c.sums[GROSS_WORK] += select(acts, abs(c.work), zero), c.sums[LOST] += select(acts, c.lost, zero);
@@ -408,13 +393,31 @@ template <class L> struct Totals {
         assign(acts, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], most));
     }
 
+    // Largest penetration and force of a contact so far.
+    SNAPBEAM_FN void deepen(const Runs<L> &z, Channel<L> &c, Marks acts) {
+        const Number zero = Number(0.0);
+        if (c.impulsive) {  // the force that holds it together
+            assign(acts, c.hardest, max(c.hardest, max(c.first_f, c.f))), assign(acts, c.deepest, c.hardest);
+            return;
+        }
+        const Cubic<Number> depth(c.d0, c.r0, c.d1, c.r1, z.h);
+        assign(acts, c.deepest, max(c.deepest, max(max(c.d0, c.d1), zero)));
+        const auto turns = acts & (c.r0 > zero) & (c.r1 < zero);
+        if (any(turns)) assign(turns, c.deepest, max(c.deepest, summit(z, c)));
+        if (!c.lossy || !any(acts)) return;
+        // the parabola through the force at both ends and in the middle
+        const Number half = Number(0.5), d = max(depth.at(half), zero), rate = depth.slope(half) / max(z.h, Number(1e-300));
+        const Number f0 = force_at(c, max(c.d0, zero), c.r0), f1 = force_at(c, max(c.d1, zero), c.r1), fm = force_at(c, d, rate);
+        const Number bend = f0 + f1 - Number(2.0) * fm, tilt = f1 - f0;
+        const auto top = (bend < zero) & (abs(tilt) < Number(-2.0) * bend);
+        const Number peak = max(max(f0, f1), select(top, fm - tilt * tilt / (Number(8.0) * bend), fm));
+        assign(acts, c.hardest, max(c.hardest, peak));
+    }
+
     // Largest penetration in a step in which it turns: where the rate, a cubic by its values and slopes, is zero.
     Number summit(const Runs<L> &z, const Channel<L> &c) {
-        Number a0 = Number(-bend_at(z, c.row, false)), a1 = Number(-bend_at(z, c.row, true));
-        for (int i = 0; i < c.uses; ++i) {
-            const Signal<L> &one = z.signal[c.signal[i]];
-            a0 = fma(Number(c.factor[i]), one.acceleration_at_begin(), a0), a1 = fma(Number(c.factor[i]), one.acceleration(), a1);
-        }
+        Number a0 = Number(-bend_at(z, c.row, false)), a1 = signal_bend(z, c) - Number(bend_at(z, c.row, true));
+        for (int i = 0; i < c.uses; ++i) a0 = fma(Number(c.factor[i]), z.signal[c.signal[i]].acceleration_at_begin(), a0);
         const Cubic<Number> fall(-c.r0, -a0, -c.r1, -a1, z.h);
         const Number at = root(fall, Number(1.0));
         const Number mean = fma(at, fma(at, fma(at, Number(0.25) * fall.c3, Number(1.0 / 3.0) * fall.c2), Number(0.5) * fall.c1), fall.c0);
