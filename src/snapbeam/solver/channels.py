@@ -123,7 +123,7 @@ class Channels:
 
     @property
     def calls_python(self) -> bool:
-        """Whether a law holds the interpreter's lock, so that threads would wait for each other."""
+        """True if a law holds the interpreter's lock, so that threads would wait for each other."""
         return any(function.why_slow for law in self.of_user for function in law.functions)
 
 

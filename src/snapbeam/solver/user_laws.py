@@ -65,9 +65,14 @@ def _compile(function: Any, numbers: Any, arguments: int, called: Any) -> tuple[
     try:
         import numba
     except ImportError:
-        return "Numba is not installed; install snapbeam[laws]", None
-    fields = ", ".join(f"given[{k}]" for k in range(len(numbers._fields)))
-    law = numba.njit(eval(f"lambda given: numbers({fields})", {"numbers": numbers}))
+        return "Numba is not installed; install numba", None
+    from numba.np.unsafe.ndarray import to_fixed_tuple
+
+    count = len(numbers._fields)
+
+    @numba.njit
+    def law(given):
+        return numbers(*to_fixed_tuple(numba.carray(given, count), count))
 
     def of_x(x, y, given):
         try:
@@ -101,7 +106,7 @@ _function = functools.cache(_Function)  # an address stays valid
 
 @dataclass(frozen=True)
 class UserLaw:
-    """What the core is told of a user's law, before the law's own numbers."""
+    """A law of a user as the core gets it, before the law's own numbers."""
 
     kind: str
     """Which of the core's laws calls it."""
