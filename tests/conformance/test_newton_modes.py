@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 import snapbeam as sb
 from snapbeam.model import default_values
+from snapbeam.solver import native
 from snapbeam.solver.assemble import make_ensemble
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*the mass that an impulse at a point meets")
@@ -142,3 +143,15 @@ def test_a_contact_that_is_held_together_balances(modes, e):
         assert data.penetration_normalised.max() < 1e-9
         found.append(data["modal_amplitude"].values / system.scale.length)
     assert np.abs(found[0] - found[1]).max() < 1e-5
+
+
+def test_a_record_in_pieces_has_every_impact_once(monkeypatch):
+    """The impact at the beginning of a run in touch belongs to its first piece."""
+    system = shaken(1, (0.8, 1.21, 0.05, 0.45))
+    whole, pieces = [], []
+    for found, samples in ((whole, native._SAMPLES), (pieces, 300)):
+        monkeypatch.setattr(native, "_SAMPLES", samples)
+        run = sb.simulate(system, sb.Integration(cycles=20, engine="native"))
+        found += [run.impacts.onset.values, run.impacts.impulse.values]
+    assert whole[0].size > 10
+    np.testing.assert_array_equal(pieces, whole)

@@ -236,10 +236,11 @@ template <class L> struct Group {
         const double lam = lane(value(c.P[0]), l);
         for (int k = 0; k < z.channels; ++k) set_lane(c.along_M[k], l, 0.0);
         for (int m = 0; m < problem->modes; ++m) {
+            // an overdamped mode that decays as fast as the circuit carries none along: it never follows
             const double square = problem->omega[m] * problem->omega[m], D = lam * lam - 2.0 * problem->sigma[m] * lam + square, t = D > 0.0 ? row[m] / D : 0.0;
             set_element<L>(c.along_q, s->place[m], l, t * square), set_element<L>(c.along_p, s->place[m], l, t * lam);
             for (int k = 0; k < z.channels; ++k)
-                set_lane(c.along_M[k], l, lane(value(c.along_M[k]), l) + t * lam * batch->rows[long(row_of[k]) * problem->modes + m]);
+                set_lane(c.along_M[k], l, !(D > 0.0) ? INFINITY : lane(value(c.along_M[k]), l) + t * lam * batch->rows[long(row_of[k]) * problem->modes + m]);
         }
     }
 
@@ -288,13 +289,14 @@ template <class L> struct Group {
         }
         assign(which, energy, totals.energy(z, true));
         if (!continued) totals.start(z, which, energy);
+        const bool saved = batch->recorder && batch->recorder->marks[4];
         for (int j = 0; j < z.channels; ++j) {  // in touch and closing
             Channel<L> &c = z.channel[j];
-            if (!c.impulsive) continue;
+            if (!c.impulsive || (saved && !continued)) continue;
             const Marks hits = which & (!c.closed) & (!(value(c.d0) < Real(0.0))) & (value(c.r0) > Real(0.0));
             if (any(hits)) hit(*this, j, hits), jumped_velocity(*this, hits);
         }
-        if (!continued && batch->recorder && batch->recorder->marks[4]) {  // goes on from a state that was saved
+        if (!continued && saved) {  // goes on from a state that was saved
             const double *from = batch->recorder->saved;
             visit([&](auto &x) { __builtin_memcpy(&x, from, sizeof(x)), from += sizeof(x) / sizeof(double); });
         }

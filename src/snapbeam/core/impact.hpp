@@ -48,9 +48,9 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
     for (int i = 0; i < n; ++i) z.p[i] = fma(typename L::Cell(bounce), c.row[i], z.p[i]);
     const Number pressed = pressed_by(z, c, z.q, z.p, z.k);
     const Number height = Number(0.5) * away * away / max(pressed, Number(1e-300)), lasts = Number(2.0) * away / max(pressed * (Number(1.0) - c.P[0]), Number(1e-300));
-    const Real fastest = Real(6.283185307179586 * SOON / runs.s->fastest);
+    const Real soon = Real(6.283185307179586 * SOON / runs.s->fastest);
     auto stays = on & (value(pressed) > Real(0.0)) & (value(c.P[0]) < Real(1.0));
-    stays = stays & ((value(height) <= Real(NO_HEIGHT) * runs.lowest) | ((value(height) <= runs.lowest) & (value(lasts) <= fastest)));
+    stays = stays & ((value(height) <= Real(NO_HEIGHT) * runs.lowest) | ((value(height) <= runs.lowest) & (value(lasts) <= soon)));
     const auto lands = stays & (!(value(c.P[0]) > Real(0.0)));  // without a rebound impact and held contact are one
     const Number stop = select(stays, -away / M, zero), impulse = bounce + stop;
     for (int i = 0; i < n; ++i) z.p[i] = fma(typename L::Cell(stop), c.row[i], z.p[i]);
