@@ -386,6 +386,10 @@ static void law_values(int law, nb::dict arrays) {
 NB_MODULE(_core, m) {
     m.doc() = "The native core: integration of damped modes and scalar channels.";
     m.attr("STATISTICS") = int(snapbeam::STATISTICS), m.attr("OF_CHANNEL") = int(snapbeam::OF_CHANNEL), m.attr("RUN_NUMBERS") = int(snapbeam::RUN_NUMBERS);
+    std::vector<int> lossy;
+    for (int law = 0; law < plain::LAWS; ++law)
+        if (plain::with_law(law, [](auto each) { return bool(each.lossy); })) lossy.push_back(law);
+    m.attr("LOSSY") = nb::cast(lossy);
     m.def("integrate", &integrate, nb::arg("problem"), nb::arg("batch"), nb::arg("layout"), nb::arg("set"), nb::arg("threads"), nb::arg("progress").none());
     m.def("record", &record, nb::arg("problem"), nb::arg("batch"), nb::arg("recorder"), nb::arg("layout"), nb::arg("set"));
     m.def("law_values", &law_values, nb::arg("law"), nb::arg("arrays"));

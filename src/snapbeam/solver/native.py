@@ -20,7 +20,6 @@ from snapbeam.solver.channels import (
     EXTERNAL_FORCE,
     LINEAR_DAMPING,
     STEEP,
-    USER_LAWS,
     Channels,
 )
 from snapbeam.solver.ensemble import Ensemble
@@ -112,11 +111,7 @@ class _Arrays:
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
         if np.isin(channels.laws, STEEP).any() or any(each.limited for each in channels.of_user):
             halvings += _STEEP  # near a magnet or an electrode
-        lossy = bool(
-            np.isin(
-                channels.laws, (3, 4, 8, 9, 10, 14, 20, USER_LAWS["lossy contact"], USER_LAWS["lossy force"])
-            ).any()
-        )
+        lossy = bool(np.isin(channels.laws, _core.LOSSY).any())
         fewest, per_decay = _PARTS[ensemble.order]
         wells = structure.unequal_wells
         has_two = structure.stretch > 0.0
