@@ -109,7 +109,7 @@ class UserLaw:
     """A law of a user as the core gets it, before the law's own numbers."""
 
     kind: str
-    """Which of the core's laws calls it."""
+    """Law of the core that calls it."""
     functions: tuple[_Function, ...]
     head: tuple[float, ...]
     limited: bool = False
