@@ -26,7 +26,7 @@ from snapbeam.dynamics.periodic_orbits import (
     orbit_at,
     orbit_tolerance,
 )
-from snapbeam.util.diagnostics import counting, tell, to_json
+from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, choice, integer, shown, within
 
@@ -219,7 +219,6 @@ class Branch:
                 "parameter": short,
                 "period": first.period,
                 "termination_reason": self.termination_reason,
-                "diagnostics": to_json(first.diagnostics),
             },
         )
         if isinstance(first.flow, Stroboscope):
@@ -361,11 +360,9 @@ def _distance(multipliers: NDArray[np.complex128], kind: str) -> float:
     return float(np.abs(multipliers - (-1.0 if kind == "flip" else 1.0)).min())
 
 
-def _derivative_error(flow: Flow, orbit: PeriodicOrbit) -> float:
+def _derivative_error(flow: Flow) -> float:
     """Relative error of the return map's derivative."""
-    if not isinstance(flow, Stroboscope):
-        return _ROUNDING
-    return max([_FINE, *(float(told.numbers["relative_error"]) for told in orbit.diagnostics)])
+    return _FINE if isinstance(flow, Stroboscope) else _ROUNDING
 
 
 def _moved(corrector: Corrector, spots: tuple[Spot, Spot, Spot], part: float, off: float) -> float:
@@ -505,7 +502,6 @@ def continuation(
         within(words, value, _SHORTEST, _LONGEST, closed="both")
         for words, value in (("step", step), ("max_step", max_step))
     )
-    tell(orbit.diagnostics)
     corrector = Corrector(Family(orbit.flow, name), orbit.period, high - low, orbit_tolerance(tolerance))
     y = np.append(orbit.coordinates, begun / corrector.span)
     came, slope = corrector.derivatives(y)

@@ -28,11 +28,9 @@ from snapbeam.simulation.advance import advance, differences, tangent_obstacle
 from snapbeam.simulation.request import cycle_of
 from snapbeam.simulation.states import states_of
 from snapbeam.solver.assemble import cycles_of, make_ensemble, phases_of, plans_of, run_columns
-from snapbeam.solver.registry import engine_of
-from snapbeam.solver.restrictions import has_tangent_flow
+from snapbeam.solver.engines import engine_of
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_start
-from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, flag, integer, nonnegative, shown
@@ -428,11 +426,6 @@ class Stroboscope:
         return tangent_obstacle(self.system) is None
 
     @property
-    def _has_tangent_flow(self) -> bool:
-        """True if the engine integrates the tangents of this system; they are differences otherwise."""
-        return self.smooth and has_tangent_flow(self.integration.engine)
-
-    @property
     def refined(self) -> Stroboscope:
         """The flow at accuracy level "reference"."""
         return Stroboscope(self.system, self.integration.replace(accuracy="reference", step=None), self.phase)
@@ -442,20 +435,6 @@ class Stroboscope:
         """The flow with steps of half the length."""
         step = plans_of(self.system, self.integration, run_columns(self.system, {}))[0].step
         return Stroboscope(self.system, self.integration.replace(step=0.5 * step), self.phase)
-
-    @property
-    def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """Diagnostics of the derivatives of this flow."""
-        if not self._has_tangent_flow or self.integration.accuracy == "reference":
-            return ()
-        return (
-            Diagnostic(
-                "dynamics.coarse_tangent",
-                "accuracy = 'standard': derivatives, and so multipliers and the special points of a branch, are off by up to "
-                "2 %, since the steps in contact are long; take accuracy = 'reference' (--accuracy reference)",
-                {"relative_error": 0.02},
-            ),
-        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -638,7 +617,7 @@ class Stroboscope:
         points: Mapping[str, _Array] | None = None,
     ) -> AdvancedStates:
         """Advance as :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
-        if tangents is not None and not self._has_tangent_flow:
+        if tangents is not None:
             return self._advance_with_differences(states, periods, tangents, every, points)
         begun = states.hidden if isinstance(states, AdvancedStates) else self._begun(states)
         count, size = begun.batch[0], 2 * 8 * (self.modes + 16)
@@ -648,7 +627,6 @@ class Stroboscope:
             self._advance_part(
                 begun[part] if len(parts) > 1 else begun,
                 periods,
-                None if tangents is None else tangents[part],
                 every,
                 None if points is None else {name: values[part] for name, values in points.items()},
             )
@@ -711,7 +689,6 @@ class Stroboscope:
         self,
         begun: State,
         periods: int,
-        tangents: _Array | None,
         every: bool,
         points: Mapping[str, _Array] | None,
     ) -> AdvancedStates:
@@ -729,18 +706,7 @@ class Stroboscope:
             start=begun.flat(),
             periods=periods * self.cycles_per_period,
         )
-        engine = engine_of(ensemble)
-        model = self.system.model
-        moved = None
-        if tangents is None:
-            output_states = engine.integrate_with_output_states(ensemble, self.integration.threads)
-        else:
-            back = model.linear_modes.T @ model.mass
-            given = (tangents * self.scales).reshape(*tangents.shape[:2], 2, self.modes)
-            output_states, changed = engine.integrate_tangents(
-                ensemble, given @ back.T, self.integration.threads
-            )
-            moved = (changed @ model.linear_modes.T).reshape(tangents.shape) / self.scales
+        output_states = engine_of(ensemble).integrate_with_output_states(ensemble, self.integration.threads)
         failed = ~np.isin(output_states.accumulators_of_runs["status"], _REACHED)
         if lost is not None:
             failed |= lost
@@ -753,7 +719,7 @@ class Stroboscope:
             whole = self._rows(
                 ensemble, output_states.q[:, each], output_states.p[:, each], output_states.well_sign[:, each]
             )
-        for array in (last, whole, moved):
+        for array in (last, whole):
             if array is not None:
                 array[failed] = np.nan
         status = np.where(
@@ -781,7 +747,7 @@ class Stroboscope:
         return AdvancedStates(
             last,
             whole,
-            moved,
+            None,
             statistics_of(ensemble, output_states.accumulators_of_runs),
             after(-1),
             tuple(after(index) for index in ends) if every else None,

@@ -17,7 +17,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.simulation.save import code_flags
 from snapbeam.solver.assemble import cycles_of, make_ensemble, run_columns
-from snapbeam.solver.registry import resolve
+from snapbeam.solver.engines import engine_of
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.sweeps.compute import CheckpointOptions, compute_table
 from snapbeam.sweeps.points import Columns, PointList
@@ -301,14 +301,11 @@ class LifetimeWork(PointWork):
             columns = {name: values for name, values in own.items() if not name.startswith("initial_state.")}
             ensemble = make_ensemble(system, integration, columns, start=begun)
             ensemble.runs["decide_crossings"] = -1
-            engine = resolve(
-                integration.engine, modes=system.model.modes, law=ensemble.law, drive=ensemble.drive
-            )[1]
 
             def inside(finished: int, _: int, before: int = done) -> object:
                 return report(before + finished)
 
-            accumulators_of_runs = engine.run_ensemble(ensemble, threads, inside)
+            accumulators_of_runs = engine_of(ensemble).run_ensemble(ensemble, threads, inside)
             for name, values in statistics_of(ensemble, accumulators_of_runs).items():
                 found.setdefault(name, np.zeros(size, dtype=values.dtype))[which] = values
             done += which.size

@@ -18,7 +18,6 @@ from snapbeam.simulation.advance import differences
 from snapbeam.simulation.run import Run
 from snapbeam.simulation.simulate import simulate
 from snapbeam.util.cores import usable_cores
-from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.display import plotter
 from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import (
@@ -506,11 +505,6 @@ class PeriodicOrbit:
         return passage_of(self._stroboscope, self.coordinates, self.period)
 
     @property
-    def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """Diagnostics of the multipliers."""
-        return getattr(self.flow, "diagnostics", ())
-
-    @property
     def _stroboscope(self) -> Stroboscope:
         if not isinstance(self.flow, Stroboscope):
             raise InputTypeError("orbit: its flow is not a System")
@@ -567,7 +561,6 @@ class PeriodicOrbit:
                 "period": self.period,
                 "residual": self.residual,
                 "stable": int(self.is_stable),
-                "diagnostics": to_json(self.diagnostics),
             },
         )
 
@@ -668,7 +661,6 @@ def periodic_orbit(
         x = flow.advance(x[None], before).states[0]
         if not np.isfinite(x).all():
             raise OrbitNotFoundError("the run from the guess failed; see its status with sb.advance")
-    tell(getattr(flow, "diagnostics", ()))
     if not all(isinstance(orbit, PeriodicOrbit) for orbit in deflate):
         raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
     most = integer("iterations", iterations, 1, 10_000)
@@ -677,7 +669,8 @@ def periodic_orbit(
         orbit = shoot(flow, x, periods, allowed, most, deflate=_points(deflate, flow))
     except OrbitNotFoundError as error:
         if phase is not None or _seen_between_contacts(flow, x, periods) is None:
-            if not getattr(flow, "diagnostics", ()):
+            coarse = isinstance(flow, Stroboscope) and flow.integration.accuracy != "reference"
+            if not coarse:
                 raise
             raise OrbitNotFoundError(f"{error}, or use accuracy = 'reference'") from None
     if phase is None:

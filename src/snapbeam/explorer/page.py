@@ -61,7 +61,7 @@ def answer(
     try:
         held = card.expected(point)
         chances = chances_of(source.layers, held)
-        same, words = maps.compared(held, run.summary, str(source.attrs.get("engine", "cpu")))
+        same, words = maps.compared(held, run.summary, str(source.attrs.get("engine", "native")))
     except InputError as error:  # the run stands, although its map cannot be read any more
         same, words = False, str(error)
     if times is not None:

@@ -10,7 +10,7 @@ from snapbeam.model.quantity import check_fields, quantities, quantity
 from snapbeam.util.validation import InputError
 
 ACCURACIES = ("standard", "reference")
-ENGINES = ("auto", "cpu", "cuda", "native", "python")
+ENGINES = ("auto", "native", "python")
 CYCLES = 200
 """Default number of cycles of a run."""
 
@@ -31,15 +31,13 @@ class Integration:
     tolerance : float, optional
         Requested maximum error of the displacement of the contact point and of mid-span, over b, from 1e-10 to
         0.1, up to the predictability horizon. Excludes *step* and *accuracy*.
-    engine : {"auto", "cpu", "cuda", "native", "python"}
-        Solver; ``"auto"`` selects the fastest available one of the first two.  ``"native"`` is the native core, which compiles
-        nothing when it is used; it has contacts without memory, local and external forces, base and axial load, with sines
-        and constants, and refuses the rest.  ``"python"`` is the specification in Python, for every part and for laws of one's own
+    engine : {"auto", "native", "python"}
+        Solver; ``"auto"`` is the native core, ``"native"``.  ``"python"`` is the specification in Python, for laws of one's own
         in plain Python: thousands of times slower, it chooses its steps itself, and takes no *step*, *tolerance* or *early_termination*.
     early_termination : bool
         End a run once its response class is certain: the class is the same, statistics other than it stop there.
     threads : int, optional
-        Threads of the CPU engine; all usable cores by default.  No number depends on it.
+        Threads of the native core; all usable cores by default.  No number depends on it.
     high_frequency_ratio : float
         Multiple of omega_1 above which the energy of a mode counts as high, for ``high_frequency_energy_fraction``.
     max_steps : int, optional
@@ -94,7 +92,7 @@ class Integration:
                 if value is not None:
                     raise InputError(
                         f"{name} = {value!r} with engine = 'python': which controls its own steps and runs to the end; leave "
-                        f"{name} out, or use engine = 'cpu'"
+                        f"{name} out, or use engine = 'native'"
                     )
 
     def replace(self, **changes: Any) -> Integration:

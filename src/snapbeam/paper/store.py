@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.solver.fingerprint import solver_fingerprint
 from snapbeam.util.files import check_writable
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.netcdf import write_netcdf
@@ -21,14 +20,12 @@ if TYPE_CHECKING:
 def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Path:
     """Write datasets, by name, with 32-bit floats; coordinates keep their 64 bits.
 
-    Every dataset contains its provenance attributes; the file contains the solver fingerprint.
+    Every dataset contains its provenance attributes.
     """
     from snapbeam.util.datasets import xr
 
     target = check_writable(path, "output", (".nc",))
-    groups: dict[str | None, xr.Dataset] = {
-        None: xr.Dataset(attrs={"paper_size": size, "solver_fingerprint": solver_fingerprint()})
-    }
+    groups: dict[str | None, xr.Dataset] = {None: xr.Dataset(attrs={"paper_size": size})}
     encoding: dict[str | None, dict[str, dict[str, object]]] = {}
     for name, dataset in results.items():
         compact = dataset.copy()

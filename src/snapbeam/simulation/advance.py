@@ -15,9 +15,8 @@ from snapbeam.model.system import System
 from snapbeam.simulation.request import require_motion
 from snapbeam.simulation.states import states_of
 from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.engines import engine_of
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.registry import engine_of
-from snapbeam.solver.restrictions import has_tangent_flow
 from snapbeam.solver.statistics import OutputStates, statistics_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import RunStatus
@@ -58,12 +57,11 @@ def advance(
         Periods of the excitation, greater than 0: of the first striker that moves, or else of the base or the axial load;
         without an excitation, periods of the first mode.
     tangent : array_like of shape (..., k, 2, N), optional
-        Small changes of amplitudes (m^0.5) and velocities (m^0.5/s): k of them for each state, or the same k for all.  The
-        tangent flow of the same steps advances them if the forces depend on displacements alone and are continuous and the engine
-        has one (not ``"native"`` and ``"python"``), and central differences of order six between neighbouring states otherwise.  Strikers with mass, indentations and circuits
+        Small changes of amplitudes (m^0.5) and velocities (m^0.5/s): k of them for each state, or the same k for all.  They
+        are advanced by central differences of order six between neighbouring states.  Strikers with mass, indentations and circuits
         begin unchanged, and their own changes are not returned.
     integration : Integration, optional
-        Solver settings.  The CPU advances the states for *periods*, without early termination.
+        Solver settings.  The states are advanced for *periods*, without early termination.
     save_every_period : bool
         Whether to return the state after each period, along a new first dimension, instead of the last one.  The
         ``statistics`` are those of all periods, except the status, which is that of each state.
@@ -116,22 +114,13 @@ def advance(
             f"tolerance = {integration.tolerance:g}: applies to simulate; give step, or accuracy = 'reference'"
         )
     ensemble = make_ensemble(system, integration.replace(early_termination=False), start=flat, periods=span)
-    engine = engine_of(ensemble)
     vectors, doubt = None, {}
-    if tangent is None:
-        ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
-    else:
-        given = _checked_tangent(tangent, flat)
-        if tangent_obstacle(system) is None and has_tangent_flow(integration.engine):
-            back = system.model.linear_modes.T @ system.model.mass
-            ends, moved = engine.integrate_tangents(ensemble, given @ back.T, integration.threads, report)
-            moved = moved @ system.model.linear_modes.T
-        else:
-            ends = engine.integrate_with_output_states(ensemble, integration.threads, report)
-            # neighbours strike where the tip of this run is
-            fixed = replace(flat, striker_position=_states(ensemble, ends, False)[0].striker_position)
-            moved, error = _by_differences(system, fixed, span, given, integration)
-            doubt["tangent_error"] = error.max(axis=1)
+    ends = engine_of(ensemble).integrate_with_output_states(ensemble, integration.threads, report)
+    if tangent is not None:
+        # neighbours strike where the tip of this run is
+        fixed = replace(flat, striker_position=_states(ensemble, ends, False)[0].striker_position)
+        moved, error = _by_differences(system, fixed, span, _checked_tangent(tangent, flat), integration)
+        doubt["tangent_error"] = error.max(axis=1)
         moved[~np.isin(ends.accumulators_of_runs["status"], _REACHED)] = np.nan
         vectors = moved.reshape((*state.batch, *moved.shape[1:]))
     found = _states(ensemble, ends, save_every_period)

@@ -16,11 +16,8 @@ from numpy.typing import NDArray
 from snapbeam.model.quantity import numbered
 from snapbeam.model.system import System
 from snapbeam.solver.assemble import motions_of, tip_of
-from snapbeam.solver.contact_force import felt_force
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.further_contacts import OFFSET, REST, SIGN
-from snapbeam.solver.statistics import Recorded
-from snapbeam.solver.terms import WORKS
+from snapbeam.solver.statistics import SAMPLED, Recorded
 from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, require_texts, shown
 
 if TYPE_CHECKING:
@@ -215,53 +212,27 @@ def check_trajectory(
 # Displacement, penetration and force of each of several strikers.
 
 
-def strikers_of(
-    ensemble: Ensemble, system: System, recorded: Recorded, values: _Array, first: _Array
-) -> dict[str, _Array]:
-    """Return series of shape (samples, strikers), and the energy stored in all contacts.
+def strikers_of(ensemble: Ensemble, system: System, recorded: Recorded, first: _Array) -> dict[str, _Array]:
+    """Return series of shape (samples, strikers).
 
-    *first* is the displacement of the first tip, over b.  The engine records the first contact; the others follow from
-    the displacement of the beam and their motions.
+    *first* is the displacement of the first tip, over b; those of the others follow from their motions.
     """
     others, length = ensemble.others, system.scale.length
-    assert others is not None and system.striker is not None
-    count, samples = len(system.contacts), recorded.times.size
-    force, depth, tip = (np.zeros((samples, count)) for _ in range(3))
-    energy = values[:, _COLUMN["contact"]].copy()
-    sign = ensemble.structure.sign
-    force[:, 0], depth[:, 0], tip[:, 0] = (
-        values[:, _COLUMN["force"]],
-        values[:, _COLUMN["penetration"]] / length,
-        first,
-    )
-    for j, each in enumerate(system.contacts[1:]):
-        numbers, row = others.numbers[0, j], others.rows[others.places[0, j]]
-        motion, velocity = tip_of(ensemble, system, j + 2, recorded.times)
-        follows = _follows(ensemble, system, recorded)
-        motion, velocity = motion + numbers[SIGN] * follows[0], velocity + numbers[SIGN] * follows[1]
-        left = _indentation(ensemble, recorded, j + 1)
-        pressed = numbers[OFFSET] + motion - recorded.q @ row - left
-        rates = velocity - recorded.p @ row
-        motion = motion - recorded.q @ (
-            row - ensemble.structure.row_of_beam(row)
-        )  # of a striker with mass its own
-        contact: Any = each.law
-        laws = [contact.numbers(each) for each in left.tolist()]
-        touching = np.maximum(pressed, 0.0)
-        force[:, j + 1] = [
-            felt_force(*at) for at in zip(laws, touching.tolist(), rates.tolist(), strict=True)
-        ]
-        # in the records of the CPU engine is the energy of the first contact alone
-        if ensemble.channels is None and not ensemble.systems:
-            pressing = zip(laws, touching.tolist(), strict=True)
-            energy += [contact.energy(law, d) if d > 0.0 else 0.0 for law, d in pressing]
-        depth[:, j + 1] = pressed / length
-        tip[:, j + 1] = sign * numbers[SIGN] * (numbers[REST] + numbers[OFFSET] + motion) / length
+    assert others is not None
+    tip = np.zeros((recorded.times.size, len(system.contacts)))
+    tip[:, 0] = first
+    follows = _follows(ensemble, system, recorded)
+    for j, sign in enumerate(others.signs):
+        row = others.rows[others.places[0, j]]
+        motion = tip_of(ensemble, system, j + 2, recorded.times) + sign * follows
+        motion -= recorded.q @ (row - ensemble.structure.row_of_beam(row))  # of a striker with mass its own
+        tip[:, j + 1] = (
+            ensemble.structure.sign * sign * (others.rest[0, j] + others.offset[0, j] + motion) / length
+        )
     return {
-        "striker_forces": force,
-        "striker_penetrations": depth,
+        "striker_forces": recorded.contacts[:, :, 1],
+        "striker_penetrations": recorded.contacts[:, :, 0] / length,
         "striker_displacements": tip,
-        "energy_contact": energy,
     }
 
 
@@ -271,23 +242,18 @@ def _indentation(ensemble: Ensemble, recorded: Recorded, contact: int) -> _Array
     return np.zeros(recorded.q.shape[0]) if mode is None else recorded.q[:, mode]
 
 
-def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> tuple[_Array, _Array]:
-    """Return displacement and velocity of fixed tips relative to a moving base, in the direction of the first striker."""
+def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> _Array:
+    """Return the displacement of fixed tips relative to a moving base, in the direction of the first striker."""
     if system.base_excitation is None or system.base_excitation.striker_on_base:
-        return np.zeros(recorded.times.size), np.zeros(recorded.times.size)
-    moved, velocity = motions_of(ensemble, system, recorded.times)["base_excitation"]
-    return -ensemble.structure.sign * moved, -ensemble.structure.sign * velocity
+        return np.zeros(recorded.times.size)
+    moved = motions_of(ensemble, system, recorded.times)["base_excitation"][0]
+    return -ensemble.structure.sign * moved
 
 
 # Datasets of a run from the pieces that an engine recorded.
 
 
-_COLUMN = {
-    name: number
-    for number, name in enumerate(
-        ("penetration", "force", "energy", "contact", "work", "dissipated", "lost", *WORKS)
-    )
-}
+_COLUMN = {name: number for number, name in enumerate(SAMPLED)}
 """Columns of the recorded values."""
 _CIRCUITS = len(_COLUMN)
 """The first column of the energies lost in circuits."""
@@ -302,8 +268,8 @@ IMPACT_COLUMNS = (
 
 def joined(pieces: list[Recorded]) -> Recorded:
     """Join pieces of a run, with the samples in the order of time."""
-    times, q, p, values, impacts = (
-        np.concatenate(parts) for parts in zip(*(piece[:5] for piece in pieces), strict=True)
+    times, q, p, contacts, values, impacts = (
+        np.concatenate(parts) for parts in zip(*(piece[:6] for piece in pieces), strict=True)
     )
     order = np.argsort(times, kind="stable")
     order = order[np.append(True, np.diff(times[order]) > 0.0)] if order.size else order
@@ -311,6 +277,7 @@ def joined(pieces: list[Recorded]) -> Recorded:
         times[order],
         q[order],
         p[order],
+        contacts[order],
         values[order],
         impacts,
         pieces[-1].accumulators_of_runs,
@@ -355,12 +322,12 @@ def run_dataset(
     }
     struck = bool(system.contacts)
     if struck:
-        penetration = values[:, _COLUMN["penetration"]] / scale
+        penetration = recorded.contacts[:, 0, 0] / scale
         variables |= {
             "striker_displacement": displacement
             + structure.sign * (penetration + _indentation(ensemble, recorded, 0) / scale),
             "penetration_normalised": penetration,
-            "contact_force": values[:, _COLUMN["force"]],
+            "contact_force": recorded.contacts[:, 0, 1],
         }
     variables |= {
         "modal_amplitude": alpha,
@@ -377,15 +344,13 @@ def run_dataset(
     variables["energy_dissipated"] = values[:, _COLUMN["dissipated"]]
     variables |= _around(ensemble, system, recorded, values)
     if ensemble.others is not None:
-        of_each = strikers_of(ensemble, system, recorded, values, variables["striker_displacement"])
-        variables["energy_contact"] = of_each.pop("energy_contact")
-        variables |= of_each
+        variables |= strikers_of(ensemble, system, recorded, variables["striker_displacement"])
     if ensemble.circuits:
         variables |= _harvested(ensemble, recorded, values)
     if any(each.law.is_dissipative for each in system.contacts):
         variables["energy_lost_contact"] = values[:, _COLUMN["lost"]]
     at = recorded.times
-    valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))
+    valid = np.asarray(np.isfinite(values).all(axis=1) & np.isfinite(alpha).all(axis=1))
     if times is not None and at.size < times.size:
         missing = times.size - at.size
         at, valid = times, np.concatenate((valid, np.zeros(missing, dtype=bool)))

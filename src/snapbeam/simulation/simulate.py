@@ -24,11 +24,10 @@ from snapbeam.simulation.states import states_of
 from snapbeam.simulation.summary import RunSummary
 from snapbeam.simulation.tolerance import ErrorEstimate, steps_for
 from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
+from snapbeam.solver.engines import engine_of
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.registry import engine_of
-from snapbeam.solver.statistics import Recorded, lost_in_circuits, rounding_energy, statistics_of
+from snapbeam.solver.statistics import WORKS, Recorded, lost_in_circuits, rounding_energy, statistics_of
 from snapbeam.solver.step_size import SUBDIVISION, Plan, long_run
-from snapbeam.solver.terms import WORKS
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, counting, sharing, tell
 from snapbeam.util.interrupts import raise_held
@@ -242,7 +241,7 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
     striker = system.striker
     attrs: dict[str, Any] = {
         "cycles": round(lasted, 9),
-        "engine": integration.engine if integration.engine in ("native", "python") else "cpu",
+        "engine": "native" if integration.engine == "auto" else integration.engine,
     }
     if striker is not None and striker.drive.harmonic:
         attrs |= {
@@ -331,10 +330,7 @@ def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
 
 def reached_by(recorded: Recorded, until: float) -> Recorded:
     """Return the samples up to the time that a run reached."""
-    kept = recorded.times <= until
-    return recorded._replace(
-        times=recorded.times[kept], q=recorded.q[kept], p=recorded.p[kept], values=recorded.values[kept]
-    )
+    return recorded.at(recorded.times <= until)
 
 
 def end_state(ensemble: Ensemble, recorded: Recorded, summary: RunSummary) -> State | None:

@@ -23,7 +23,7 @@ from snapbeam.simulation.simulate import (
     run_attributes,
 )
 from snapbeam.simulation.summary import RunSummary
-from snapbeam.solver.registry import engine_of
+from snapbeam.solver.engines import engine_of
 from snapbeam.solver.statistics import Recorded, statistics_of
 from snapbeam.util.diagnostics import Diagnostic, Severity, sharing, tell
 from snapbeam.util.files import NoRoomError, check_writable, missing_room
@@ -149,7 +149,7 @@ class _Writer:
     def room(self, piece: Recorded) -> int:
         """Bytes on the disk that suffice to write a piece, and the end of the file after it."""
         parts = [piece] if self.waiting is None else [self.waiting, piece]
-        samples = sum(array.nbytes for part in parts for array in (part.times, part.q, part.p, part.values))
+        samples = sum(array.nbytes for part in parts for array in part[:5])
         impacts = sum(rows.nbytes for rows in (*self.impacts, piece.impacts))
         return 4 * (samples + impacts) + _END  # derived variables, and chunks that are written twice
 
@@ -159,10 +159,10 @@ class _Writer:
         piece = piece._replace(impacts=piece.impacts[:0])
         together = joined([piece] if self.waiting is None else [self.waiting, piece])
         ready = max(0, together.times.size - _KEPT_BACK)
-        self.waiting = _part(together, slice(ready, None))
+        self.waiting = together.at(slice(ready, None))
         for begin in range(0, ready, _CHUNK):
             raise_held()
-            self.append(_part(together, slice(begin, min(ready, begin + _CHUNK))))
+            self.append(together.at(slice(begin, min(ready, begin + _CHUNK))))
 
     def finish(self) -> RunSummary:
         """Write the remaining samples, the impacts, the summary and the attributes."""
@@ -204,12 +204,6 @@ class _Writer:
             for name, variable in _over_time(dataset):
                 self.file.variables[name][begin:end] = variable.values
         self.written = end
-
-
-def _part(samples: Recorded, which: slice) -> Recorded:
-    return samples._replace(
-        times=samples.times[which], q=samples.q[which], p=samples.p[which], values=samples.values[which]
-    )
 
 
 def _over_time(dataset: xr.Dataset) -> Iterator[tuple[str, xr.Variable]]:

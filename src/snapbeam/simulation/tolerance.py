@@ -20,8 +20,8 @@ from snapbeam.model.system import System
 from snapbeam.simulation.dataset import joined
 from snapbeam.simulation.request import checked_request, cycle_of
 from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
+from snapbeam.solver.engines import engine_of
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.registry import engine_of
 from snapbeam.solver.step_size import Plan
 from snapbeam.util.provenance import made_by
 from snapbeam.util.validation import InputError, choice, positive
@@ -214,31 +214,14 @@ def _instants(system: System, ensemble: Ensemble) -> _Array:
 
 def _perturbed(ensemble: Ensemble, system: System, size: float) -> Ensemble:
     """Return the run with its drives, or its initial state if nothing drives it, changed by a relative *size*."""
-    factor, numbers = 1.0 + size, ensemble.drive_numbers.copy()
-    names = ensemble.drive.number_names
-    scaled = [names.index(name) for name in ensemble.drive.amplitudes if name in names]
-    numbers[:, scaled] *= factor
-    # other samples are no values of the motion, such as the frequencies of noise
-    recorded = [np.full(drive.samples().size, drive.recorded) for _, drive in system.moving]
-    samples = np.where(
-        np.concatenate([np.empty(0, dtype=bool), *recorded]), ensemble.samples * factor, ensemble.samples
-    )
-    driven = bool(numbers[:, scaled].any() or (samples != ensemble.samples).any())
-    if not driven and (ensemble.runs["tip_speed"] != 0.0).any():
+    factor, channels = 1.0 + size, ensemble.channels
+    if channels is None:
         raise InputError(
-            f"drive = {ensemble.drive.name!r}: must name the numbers that its motion is proportional to in its "
-            "amplitudes; otherwise the perturbation growth is unknown"
+            "engine = 'python': does not change a drive by a perturbation, for its growth or for a tolerance; use engine = 'native'"
         )
-    if driven and ensemble.systems:
-        raise InputError(
-            "engine = 'python': does not change a drive by a perturbation, for its growth or for a tolerance; use engine = 'native' "
-            "or 'cpu'"
-        )
-    starts = ensemble.starts if driven else ensemble.starts * factor
-    channels = ensemble.channels
-    if channels is not None:
-        channels = replace(channels, uses=channels.uses * factor)
-    return replace(ensemble, drive_numbers=numbers, starts=starts, samples=samples, channels=channels)
+    if not channels.moves:
+        return replace(ensemble, starts=ensemble.starts * factor)
+    return replace(ensemble, channels=replace(channels, uses=channels.uses * factor))
 
 
 def _watch(system: System, ensemble: Ensemble, times: _Array) -> _Array:

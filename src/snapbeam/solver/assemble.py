@@ -25,11 +25,9 @@ from snapbeam.model.system import System
 from snapbeam.solver.channels import channels_of
 from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
 from snapbeam.solver.excitation import tip_motion
-from snapbeam.solver.further_contacts import LAW, NUMBERS, OFFSET, REST, SIGN, SINCE, SPEED
-from snapbeam.solver.restrictions import check_integrable, is_native
+from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
-from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError, shown
 
 _Array = NDArray[np.float64]
@@ -51,12 +49,14 @@ def others_of(
     if not further:
         return None
     count = len(further)
-    numbers, places = np.zeros((runs, count, NUMBERS)), np.zeros((runs, count), dtype=np.int64)
+    offset, at_rest = np.zeros((2, runs, count))
+    places, signs = np.zeros((runs, count), dtype=np.int64), []
     rows: list[_Array] = []
     for j, each in enumerate(further):
         number, striker = j + 2, each.striker
         assert system.striker is not None
         sign = 1.0 if striker.side == system.striker.side else -1.0
+        signs.append(sign)
         section, moving = section_of("contact", number), section_of("drive", number)
         location = columns[f"{section}.location"]
         different, which = np.unique(location, return_inverse=True)
@@ -64,17 +64,15 @@ def others_of(
         places[:, j] = len(rows) + which
         own_rows = np.array([structure.row(shape, j + 1, sign) for shape in shapes])
         rows += list(own_rows)
-        numbers[:, j, REST] = sign * structure.sign * structure.rests(shapes)[which]
+        at_rest[:, j] = sign * structure.sign * structure.rests(shapes)[which]
         begun = _begun(striker.drive, columns, moving, system, runs)
         gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
         rest = _reach_at_rest(system, structure, which, own_rows)
-        numbers[:, j, OFFSET] = rest + np.where(np.isnan(gap), -begun, -gap)
-        numbers[:, j, SIGN] = sign
-        numbers[:, j, SPEED] = _speed(striker.drive, columns, moving, system, runs)
-        numbers[:, j, SINCE] = since[:, number - 1]
-        own = _law_numbers(each.law, section, columns, runs)
-        numbers[:, j, LAW : LAW + own.shape[1]] = own
-    return FurtherContactTable(tuple(type(each.law) for each in further), numbers, places, np.array(rows))
+        offset[:, j] = rest + np.where(np.isnan(gap), -begun, -gap)
+    return FurtherContactTable(
+        tuple(type(each.law) for each in further), tuple(signs), offset, at_rest,
+        np.broadcast_to(since[:, 1:], (runs, count)), places, np.array(rows),
+    )  # fmt: skip
 
 
 def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
@@ -91,15 +89,6 @@ def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
     )
 
 
-def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
-    """Maximum speed of the tip in the frame of the ends, m/s."""
-    speed = drive.bounds(_own(columns, section, runs), system.scale)[1]
-    base = system.base_excitation
-    if base is not None and not base.striker_on_base:
-        speed = speed + base.motion.bounds(_own(columns, "base_excitation", runs), system.scale)[1]
-    return speed
-
-
 # What moves in every run of an ensemble, and as which drive kernels integrate it.
 
 
@@ -112,7 +101,6 @@ class Driven(NamedTuple):
     """Period of one cycle, s."""
     highest: _Array
     """From the mid-position, m."""
-    speed: _Array
     samples: _Array
 
 
@@ -160,22 +148,18 @@ def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
     scale, striker = system.scale, system.striker
     if striker is None:
         numbers = np.tile([1.0 * scale.omega, 0.0], (runs, 1))
-        return Driven(
-            Sine, numbers, cycles_of(system, columns), np.full(runs, -np.inf), np.zeros(runs), np.empty(0)
-        )
+        return Driven(Sine, numbers, cycles_of(system, columns), np.full(runs, -np.inf), np.empty(0))
     drive = striker.drive
     own = _own(columns, "drive", runs)
     found = drive.numbers(own, scale)
-    highest, speed = drive.bounds(own, scale)
+    highest = drive.bounds(own, scale)[0]
     samples = _samples(system, "drive", drive)
     if (
         striker.side == "above" and drive.recorded
     ):  # made in space; other motions are positive as the striker pushes
         highest = drive.mirrored_bounds(own, scale)
     table = np.stack([found[name] for name in drive.number_names], axis=1)
-    return Driven(
-        drive.integrated_as or type(drive), table, cycles_of(system, columns), highest, speed, samples
-    )
+    return Driven(drive.integrated_as or type(drive), table, cycles_of(system, columns), highest, samples)
 
 
 def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
@@ -189,7 +173,7 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
     names |= {section: f"force{i}" for i, section in enumerate(forces)}
     kinds: dict[str, type[Drive]] = {}
     found: dict[str, _Array] = {}
-    speed, fastest = np.zeros(runs), np.zeros(runs)
+    fastest = np.zeros(runs)
     tables: list[_Array] = []
     for section, drive in system.moving:
         part, own = names[section], _own(columns, section, runs)
@@ -204,21 +188,18 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
         fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
         if section == "base_excitation" or section in forces:
             found[f"{part}_hardest"] = drive.peak_acceleration(own, scale)
-        if section == "drive":
-            speed = speed + drive.bounds(own, scale)[1]
     if system.base_excitation is not None:
         own, base = _own(columns, "base_excitation", runs), system.base_excitation
         sign = 1.0 if base.direction == "up" else -1.0
         side = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
         follow = 0.0 if base.striker_on_base or system.striker is None else -side * sign
         found["base_sign"], found["base_follow"] = np.full(runs, sign), np.full(runs, follow)
-        speed = speed + abs(follow) * base.motion.bounds(own, scale)[1]
     kind, cycle = joined(kinds), cycles_of(system, columns)
     only = next(iter(kinds)) if kind.alone else ""
     found["omega"] = found[f"{only}_omega"] if only else 2.0 * math.pi / (HORIZON * cycle)
     found["fastest"] = fastest
     table = np.stack([found[name] for name in kind.number_names], axis=1)
-    return Driven(kind, table, cycle, np.full(runs, np.inf), speed, np.concatenate(tables))
+    return Driven(kind, table, cycle, np.full(runs, np.inf), np.concatenate(tables))
 
 
 def _samples(system: System, section: str, drive: Drive) -> _Array:
@@ -260,15 +241,14 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
     return found
 
 
-def tip_of(ensemble: Ensemble, system: System, number: int, times: _Array) -> tuple[_Array, _Array]:
-    """Displacement from its mid-position (m) and velocity (m/s) of a striker of several, the first being 1.
+def tip_of(ensemble: Ensemble, system: System, number: int, times: _Array) -> _Array:
+    """Displacement from its mid-position (m) of a striker of several, the first being 1.
 
     Seen from its own side, in the frame of the ends but without what a base does to it.  *ensemble* is that of the one
     run, which may begin in the middle of its drives.
     """
     drive = system.contacts[number - 1].striker.drive
-    pairs = _motion_at(ensemble, system, section_of("drive", number), drive, times)
-    return pairs[:, 0], pairs[:, 1]
+    return _motion_at(ensemble, system, section_of("drive", number), drive, times)[:, 0]
 
 
 def _motion_at(ensemble: Ensemble, system: System, section: str, drive: Drive, times: _Array) -> _Array:
@@ -310,8 +290,6 @@ _TAPPED = {"standard": 0.35, "reference": 0.1}
 """Longest step over the reciprocal of the angular frequency or rate of what is in the kicks beside tension and contacts."""
 _GENERAL = 0.4
 """Step with the general composition of order 6 over that with the one for forces of position alone, for an equal error."""
-_DECAY = 3.0
-"""Decay of the state of a circuit in a step, lam h, at most."""
 
 
 def make_ensemble(
@@ -372,7 +350,6 @@ def make_ensemble(
     starts = _starts(structure, table, state, since, units)
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
     table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, driven)
-    table["tip_speed"] = driven.speed
     highest = table["rest_contact"] + table["offset"] + driven.highest
     if structure.bodies or driven.kind.parts or len(system.contacts) > 1 or system.local_forces:
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
@@ -388,7 +365,6 @@ def make_ensemble(
         law=law,
         drive=driven.kind,
         runs=table,
-        law_numbers=_law_numbers(system.contact_law, "contact", columns, runs),
         drive_numbers=driven.numbers,
         samples=driven.samples,
         location=places.location,
@@ -401,11 +377,9 @@ def make_ensemble(
         circuits=_circuits(system, columns, runs),
         others=others_of(system, structure, columns, runs, since),
     )
-    if is_native(integration.engine):
-        ensemble = dataclasses.replace(ensemble, channels=channels_of(system, ensemble, columns))
     if integration.engine == "python":
-        ensemble = dataclasses.replace(ensemble, systems=_systems(system, points or {}, runs))
-    return ensemble
+        return dataclasses.replace(ensemble, systems=_systems(system, points or {}, runs))
+    return dataclasses.replace(ensemble, channels=channels_of(system, ensemble, columns))
 
 
 def _systems(system: System, points: Mapping[str, _Array], runs: int) -> tuple[System, ...]:
@@ -482,14 +456,6 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
     return columns
 
 
-_NOTABLE = 10.0
-"""Shortening of the steps by circuits that is worth a diagnostic."""
-_FAST_CIRCUIT = (
-    "harvester: the circuit makes steps up to {0:g} times shorter than the beam needs, so that runs take up to {0:g} "
-    "times as long; its time constant is short or its coupling strong"
-)
-
-
 def plans_of(system: System, integration: Integration, columns: Mapping[str, _Array]) -> list[Plan]:
     """The steps of each run: they follow from the structure and from the run's own contact.
 
@@ -502,27 +468,13 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     ]
     if further:
         plans = [_serving(each) for each in zip(plans, *further, strict=True)]
-    if (
-        integration.step is None
-        and plans[0].order == 6
-        and _depends_on_velocity(system, is_native(integration.engine))
-    ):
+    if integration.step is None and plans[0].order == 6 and _depends_on_velocity(system):
         plans = [each.scaled(_GENERAL) for each in plans]
     if integration.step is None and any(_is_around(section) for section, _ in system.moving):
         fastest = fastest_of(system, columns, len(plans))
         plans = [
             each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate))) if rate > 0.0 else each
             for each, rate in zip(plans, fastest.tolist(), strict=True)
-        ]
-    if integration.step is None and system.harvesters and not is_native(integration.engine):
-        allowed = _longest_with_circuits(system, columns, len(plans), integration.accuracy)
-        longer = max(each.step / own for each, own in zip(plans, allowed.tolist(), strict=True))
-        if longer > _NOTABLE:
-            tell(
-                [Diagnostic("fast-circuit", _FAST_CIRCUIT.format(float(f"{longer:.1g}")), {"longer": longer})]
-            )
-        plans = [
-            each._replace(step=min(each.step, own)) for each, own in zip(plans, allowed.tolist(), strict=True)
         ]
     if integration.step is None and system.local_forces:
         longest = _longest_with_local_forces(system, integration.accuracy)
@@ -542,12 +494,12 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     ]
 
 
-def _depends_on_velocity(system: System, native: bool) -> bool:
+def _depends_on_velocity(system: System) -> bool:
     """True if a force depends on velocities, so that the kicks need the general composition of order 6."""
     return (
         any(each.law.rate_dependent for each in system.contacts)
         or any(each.dissipative for each in system.local_forces)
-        or any(native or each.inertia == 0.0 for each in system.harvesters)
+        or bool(system.harvesters)
     )
 
 
@@ -564,25 +516,6 @@ def _longest_with_local_forces(system: System, accuracy: str) -> float:
         squared += mobility * force.greatest_stiffness(largest)
         decay += mobility * force.greatest_damping(largest, fastest) if force.dissipative else 0.0
     return _TAPPED[accuracy] / max(math.sqrt(squared), decay, 1e-300)
-
-
-def _longest_with_circuits(system: System, columns: Mapping[str, _Array], runs: int, accuracy: str) -> _Array:
-    """Longest step with harvesters, s, of each run.
-
-    The stiffness t.t of circuits with inertia, and the damping rate t.t of those without, are in the kicks.  Flows backwards in
-    time let a state of a circuit grow by exp(lam t).
-    """
-    model, squared, decay = _struck(system), np.zeros(runs), np.zeros(runs)
-    rates = np.zeros(runs)
-    for harvester, circuit in zip(system.harvesters, _circuits(system, columns, runs), strict=True):
-        row = model.linear_modes.T @ harvester.row(model)
-        if harvester.inertia > 0.0:
-            squared += float(row @ row) / harvester.inertia
-            rates = np.maximum(rates, circuit.rate)
-        else:
-            decay += float(row @ row) * circuit.rate
-    exchange = np.maximum(np.maximum(np.sqrt(squared), decay), 1e-300)
-    return np.minimum(2.0 * _TAPPED[accuracy] / exchange, _DECAY / np.maximum(rates, 1e-300))
 
 
 def _struck(system: System) -> ReducedModel:
@@ -618,12 +551,10 @@ def _plans_of(
     contact = contact or system.contact_law
     known = () if contact is None else quantities(type(contact))
     of_contact = {name: columns[at] for name in known if (at := f"{section}.{name}") in columns}
-    step, accuracy, native = integration.step, integration.accuracy, is_native(integration.engine)
+    step, accuracy = integration.step, integration.accuracy
     runs = next(iter(columns.values())).size if columns else 1
     if contact is None or not of_contact:
-        return [
-            choose_base_step(_struck(system), contact, step=step, accuracy=accuracy, native=native)
-        ] * runs
+        return [choose_base_step(_struck(system), contact, step=step, accuracy=accuracy)] * runs
     table = np.stack(list(of_contact.values()), axis=1)
     different, which = np.unique(table, axis=0, return_inverse=True)
     plans = [
@@ -632,7 +563,6 @@ def _plans_of(
             dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))),  # type: ignore[type-var]
             step=step,
             accuracy=accuracy,
-            native=native,
         )
         for row in different
     ]
@@ -742,17 +672,6 @@ def _circuits(system: System, columns: Mapping[str, _Array], runs: int) -> tuple
         volts = harvester.volts(resistance) * (1.0 / math.sqrt(inertia) if inertia > 0.0 else 1.0)
         found.append(CircuitCoupling(rate, harvester.share(resistance), volts, harvester.unit))
     return tuple(found)
-
-
-def _law_numbers(law: ContactLaw | None, section: str, columns: Mapping[str, _Array], runs: int) -> _Array:
-    """Numbers of a law of each run; kernels read a residual indentation from the state."""
-    nothing = np.zeros(runs)
-    if law is None:
-        return np.zeros((runs, len(HertzContact.numbers_type()._fields)))
-    names = law.numbers_type()._fields
-    return np.stack(
-        [columns[f"{section}.{name}"] if name != law.memory else nothing for name in names], axis=1
-    )
 
 
 def _decisions(

@@ -41,10 +41,8 @@ from snapbeam.model.local_force import (
 from snapbeam.model.quantity import numbered, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
-from snapbeam.solver.further_contacts import LAW, OFFSET, REST, SINCE
 from snapbeam.solver.structure import Structure
 from snapbeam.solver.user_laws import UserLaw, contact_law, local_force
-from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
 
@@ -114,6 +112,15 @@ class Channels:
     rest: _Array
     """Displacement along these rows in the first well, shape (runs, channels + 1)."""
     of_user: tuple[UserLaw, ...] = ()
+
+    @property
+    def moves(self) -> bool:
+        """True if a signal changes with time."""
+        return bool(
+            np.any(self.signals[:, :, 1] * (self.kinds != 1))
+            or np.any(self.pieces[:, 1:])
+            or np.any(self.kinds == 2)
+        )
 
     def check(self) -> None:
         """Raise the first error that a law of a user raised in the core."""
@@ -238,7 +245,9 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         _add_motion(built, system, ensemble, columns, section, drive)
     base = system.base_excitation
     up = 1.0 if base is None or base.direction == "up" else -1.0
+    others = ensemble.others
     for number, contact in enumerate(system.contacts, 1):
+        section = section_of("contact", number)
         law, head, names = built.law(contact.law, system.model)
         uses = {section_of("drive", number): 1.0}
         if base is not None and not base.striker_on_base:
@@ -246,24 +255,19 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         left = None
         if contact.law.memory:
             left = ensemble.starts[table["start_row"], 0, structure.mode_of_indentation(number - 1)]
-        if number == 1:
-            values = [
-                *head,
-                *(left if name == contact.law.memory else columns[f"contact.{name}"] for name in names),
-            ]
-            if contact.law.impulsive:
-                values.append(_cancelled(structure, ensemble.contact_rows)[table["contact_row"]])
-            built.add(law, ensemble.contact_rows, table["contact_row"], table["rest_contact"], uses, values, table["offset"], table["contact_time"])  # fmt: skip
-            continue
-        own = ensemble.others.numbers[:, number - 2]
-        order = type(contact.law).numbers_type()._fields
         values = [
             *head,
-            *(left if name == contact.law.memory else own[:, LAW + order.index(name)] for name in names),
+            *(left if name == contact.law.memory else columns[f"{section}.{name}"] for name in names),
         ]
+        if number == 1:
+            rows, which, rest = ensemble.contact_rows, table["contact_row"], table["rest_contact"]
+            offset, since = table["offset"], table["contact_time"]
+        else:
+            rows, which, rest = others.rows, others.places[:, number - 2], others.rest[:, number - 2]
+            offset, since = others.offset[:, number - 2], others.since[:, number - 2]
         if contact.law.impulsive:
-            values.append(_cancelled(structure, ensemble.others.rows)[ensemble.others.places[:, number - 2]])
-        built.add(law, ensemble.others.rows, ensemble.others.places[:, number - 2], own[:, REST], uses, values, own[:, OFFSET], own[:, SINCE])  # fmt: skip
+            values.append(_cancelled(structure, rows)[which])
+        built.add(law, rows, which, rest, uses, values, offset, since)
     for force, row in zip(system.local_forces, structure.local_forces, strict=True):
         law, head, names = built.law(force, system.model)
         built.add(law, row.row, 0, row.rest, {}, [*head, *(getattr(force.numbers, name) for name in names)])
@@ -290,17 +294,6 @@ def _cancelled(structure: Structure, rows: _Array) -> _Array:
     return np.asarray(
         np.sum((rows * structure.omega) ** 2, axis=1) / np.maximum(np.sum(rows**2, axis=1) ** 2, 1e-300)
     )
-
-
-def _law(kind: type, words: str) -> tuple[int, tuple[str, ...]]:
-    if kind not in LAWS:
-        names = ", ".join(
-            each.__name__ for each in LAWS if issubclass(each, ContactLaw) == issubclass(kind, ContactLaw)
-        )
-        raise InputError(
-            f"{words}: {kind.__name__} is not integrated by engine = 'native', which has {names}; use engine = 'cpu'"
-        )
-    return LAWS[kind]
 
 
 def _motions(system: System) -> list[tuple[str, Drive]]:

@@ -14,7 +14,6 @@ from snapbeam.solver.structure import Structure
 
 _REALS = (
     "offset",  # penetration of the tip at mid-stroke into the beam at rest
-    "tip_speed",  # maximum speed of the tip, ever
     "phase",  # argument of the drive at the start, rad
     "rest_contact",  # displacement of the contact point and of the centre in the well that q is counted from
     "rest_center",
@@ -66,8 +65,14 @@ class FurtherContactTable:
     """The strikers beside the first one of every run."""
 
     laws: tuple[type[ContactLaw], ...]
-    numbers: _Array
-    """Position and contact parameters, shape (runs, strikers, 32), in the order of the solver's blocks."""
+    signs: tuple[float, ...]
+    """+1 of one that pushes as the first does."""
+    offset: _Array
+    """Penetration of each tip at mid-stroke into the beam at rest, shape (runs, strikers)."""
+    rest: _Array
+    """Displacement of the contact points in the first well, shape (runs, strikers)."""
+    since: _Array
+    """s since the contact began; negative: apart; NaN: the penetration decides; shape (runs, strikers)."""
     places: _Integers
     """Which row each has, shape (runs, strikers)."""
     rows: _Array
@@ -86,8 +91,6 @@ class Ensemble:
     drive: type[Drive]
     runs: NDArray[Any]
     """Records of :data:`~snapbeam.solver.ensemble.RUN`, shape (runs,)."""
-    law_numbers: _Array
-    """Numbers of the law of each run, shape (runs, numbers)."""
     drive_numbers: _Array
     """Numbers of the drive likewise."""
     samples: _Array
@@ -109,7 +112,7 @@ class Ensemble:
     """Circuits of the harvesters."""
     others: FurtherContactTable | None = None
     channels: Any = None
-    """:class:`~snapbeam.solver.channels.Channels` for the native core."""
+    """:class:`~snapbeam.solver.channels.Channels` for the native core; None with the Python engine."""
     systems: tuple[Any, ...] = ()
     """The :class:`~snapbeam.System` of each run, for the Python engine."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 from collections.abc import Callable, Iterator
@@ -31,15 +30,14 @@ from snapbeam.solver.statistics import (
     OTHER_IMPULSE,
     OTHER_PEAK,
     OTHER_WORK,
+    SAMPLED,
     Last,
     OutputStates,
     Recorded,
     empty_accumulators,
 )
 from snapbeam.solver.step_size import TRIED, barrier_of
-from snapbeam.solver.terms import WORKS
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
 Progress = Callable[[int, int], object]
@@ -308,11 +306,6 @@ def integrate_with_output_states(
     )
 
 
-def integrate_tangents(*_: Any, **__: Any) -> Any:
-    """Refuse: tangents are integrated by the CPU engine."""
-    raise InputError("engine = 'native': does not integrate tangents; use engine = 'cpu'")
-
-
 def record(
     ensemble: Ensemble, times: _Array, in_contact: bool, progress: Callable[[float], object] | None = None
 ) -> Iterator[Recorded]:
@@ -366,20 +359,23 @@ def _recorded(
     own = values[:, OF_SAMPLE:].reshape(held, channels.laws.size, CHANNEL_SAMPLE)
     q, p = arrays.modes_of(rows, own[:, :, 5])
     contacts, others = own[:, : channels.contacts], own[:, channels.contacts :]
-    found = np.zeros((held, 7 + len(WORKS) + arrays.circuits.size))
-    if channels.contacts:
-        found[:, 0], found[:, 1] = contacts[:, 0, 0], contacts[:, 0, 1]
-    else:
-        found[:, 0] = -1e30
-    found[:, 2] = values[:, 1]
-    found[:, 3], found[:, 4] = contacts[:, :, 2].sum(axis=1), contacts[:, :, 3].sum(axis=1)
-    found[:, 6] = contacts[:, :, 4].sum(axis=1)
-    found[:, 5] = values[:, 2] + found[:, 6]
-    found[:, 7 + len(WORKS) :] = own[:, arrays.circuits, 4]
+    found = np.zeros((held, len(SAMPLED) + arrays.circuits.size))
+    lost = contacts[:, :, 4].sum(axis=1)
+    found[:, :5] = np.stack(
+        (
+            values[:, 1],
+            contacts[:, :, 2].sum(axis=1),
+            contacts[:, :, 3].sum(axis=1),
+            values[:, 2] + lost,
+            lost,
+        ),
+        axis=1,
+    )
+    found[:, len(SAMPLED) :] = own[:, arrays.circuits, 4]
     for j, law in enumerate(channels.laws[channels.contacts :].tolist()):
         if law in (CIRCUIT, LINEAR_DAMPING):
             continue
-        found[:, 7 + list(WORKS).index(_work_of(law))] += others[:, j, 3] - others[:, j, 4]
+        found[:, SAMPLED.index(_work_of(law))] += others[:, j, 3] - others[:, j, 4]
     table = recorder["impacts"][:impacts]
     table = (
         np.concatenate((table[:, 1:], table[:, :1] + 1.0), axis=1)
@@ -387,7 +383,7 @@ def _recorded(
         else table[:, 1:].copy()
     )
     state = _last(arrays, recorder, accumulators)
-    return Recorded(values[:, 0].copy(), q, p, found, table, accumulators, state)
+    return Recorded(values[:, 0].copy(), q, p, contacts[:, :, :2].copy(), found, table, accumulators, state)
 
 
 def _last(arrays: _Arrays, recorder: Any, accumulators: NDArray[Any]) -> Last:
@@ -397,8 +393,3 @@ def _last(arrays: _Arrays, recorder: Any, accumulators: NDArray[Any]) -> Last:
     q, p = arrays.modes_of(final[0, 0], final[0, 0, 2 * n + 1 + count :])
     ticks = final[0, 0, 2 * n + 1 : 2 * n + 1 + contacts] if arrays.channels.contacts else np.full(1, -1.0)
     return Last(q, p, int(final[0, 0, 2 * n]), np.where(ticks > 0.0, ticks / arrays.finer, ticks))
-
-
-def with_channels(ensemble: Ensemble, channels: Channels) -> Ensemble:
-    """The ensemble with its channels."""
-    return dataclasses.replace(ensemble, channels=channels)

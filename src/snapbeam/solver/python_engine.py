@@ -28,14 +28,11 @@ from scipy.integrate import solve_ivp
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.sum import SumDrive
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.further_contacts import OFFSET, SINCE
 from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records, nodes_of
-from snapbeam.solver.statistics import OutputStates, Recorded
+from snapbeam.solver.statistics import WORKS, OutputStates, Recorded
 from snapbeam.solver.step_size import seconds_of
-from snapbeam.solver.terms import WORKS
 from snapbeam.util.diagnostics import Diagnostic, Severity, tell
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
 _Motion = Callable[[float], tuple[float, float, float]]
@@ -50,7 +47,7 @@ _MOST_RESTING = 100
 """Pieces without duration, one after the other, that a run may have."""
 _SECONDS, _TURN = 1.5e-3, 0.6
 """Seconds of a step on one core, and what the fastest mode turns in it at most, rad; both estimates."""
-_SLOW = "engine = 'python' is made to be read: here about {:.0f} times slower than engine = 'cpu', some {:.1g} s a run"
+_SLOW = "engine = 'python' is made to be read: here about {:.0f} times slower than engine = 'native', some {:.1g} s a run"
 
 
 def motion_of(
@@ -142,8 +139,9 @@ class Equations:
                 table["contact_time"],
             )
             if j:
-                row, numbers = others.rows[others.places[run, j - 1]], others.numbers[run, j - 1]  # type: ignore[union-attr]
-                offset, since = numbers[OFFSET], numbers[SINCE]
+                assert others is not None
+                row = others.rows[others.places[run, j - 1]]
+                offset, since = others.offset[run, j - 1], others.since[run, j - 1]
             motion = moves(each.striker.drive, side if each.striker.drive.recorded else 1.0)
             follows = 0.0 if base is None or base.striker_on_base else -side * self.up
             self.contacts.append(
@@ -423,8 +421,3 @@ def integrate_with_output_states(
     return OutputStates(
         np.concatenate(found), q, p, np.ones((ensemble.size, outputs), dtype=np.int64), lasting
     )
-
-
-def integrate_tangents(*arguments: Any, **options: Any) -> Any:
-    """Refuse tangents."""
-    raise InputError("tangent: is not integrated by engine = 'python'; use engine = 'cpu'")

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.statistics import CIRCUIT_PEAK, Last, Recorded, empty_accumulators
-from snapbeam.solver.terms import WORKS
+from snapbeam.solver.statistics import CIRCUIT_PEAK, SAMPLED, WORKS, Last, Recorded, empty_accumulators
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
@@ -126,14 +125,14 @@ class Records:
         if self.in_contact and touching:
             asked = np.union1d(asked, part.t[1:])
         for t, s in zip(asked.tolist(), part.sol(asked).T if asked.size else (), strict=True):
-            first = (eq.contact(0, t, s)[0], self.force(0, t, s)) if eq.contacts else (-1e30, 0.0)
+            pressed = [(eq.contact(j, t, s)[0], self.force(j, t, s)) for j in range(len(eq.contacts))]
             sums, works = (
                 s[2 * n : 2 * n + len(SUMS)],
                 s[self.impulse(0) + 1 : self.impulse(len(eq.contacts)) : 2].sum(),
             )
             stored = sum(eq.stored(j, t, s) for j in touching)
-            values = (*first, eq.energy(s), stored, works, sums[0] + sums[1], sums[0], *sums[3:])
-            self.samples.append((t, s[:n], s[n : 2 * n], (*values, *s[s.size - len(eq.circuits) :])))
+            values = (eq.energy(s), stored, works, sums[0] + sums[1], sums[0], *sums[3:])
+            self.samples.append((t, s[:n], s[n : 2 * n], pressed, (*values, *s[s.size - len(eq.circuits) :])))
 
     def lasting(self) -> list[float]:
         """Ticks since the contact of each striker began, -1: apart."""
@@ -169,12 +168,12 @@ class Records:
 
     def recorded(self) -> Recorded:
         """Records of the run."""
-        n, width = self.eq.n, 7 + len(WORKS) + len(self.eq.circuits)
-        columns = zip(*self.samples, strict=True) if self.samples else ((), (), (), ())
-        at, q, p, values = (
-            np.array(each, dtype=float).reshape(-1, size)
-            for each, size in zip(columns, (1, n, n, width), strict=True)
+        n, count, width = self.eq.n, len(self.eq.state), len(SAMPLED) + len(self.eq.circuits)
+        columns = zip(*self.samples, strict=True) if self.samples else ((), (), (), (), ())
+        at, q, p, contacts, values = (
+            np.array(each, dtype=float).reshape(len(self.samples), *shape)
+            for each, shape in zip(columns, ((), (n,), (n,), (count, 2), (width,)), strict=True)
         )
         impacts = np.array(self.impacts).reshape(-1, 5)[:, : 5 if len(self.eq.state) > 1 else 4]
         last = Last(self.s[:n], self.s[n : 2 * n], 1, np.array(self.lasting()))
-        return Recorded(at[:, 0], q, p, values, impacts, self.found, last)
+        return Recorded(at, q, p, contacts, values, impacts, self.found, last)

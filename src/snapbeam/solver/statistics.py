@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from snapbeam.model.early_termination import crossing_energy, decidable_energy, passed_heights
 from snapbeam.model.extension import takes
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.terms import WORKS
 from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
 from snapbeam.util.validation import InputError, NamedTable, instance, require_texts, shown
 
@@ -34,6 +33,14 @@ _Array = NDArray[np.float64]
 
 
 Values = NDArray[Any]
+
+WORKS = {
+    "base_work": "work done by the base, in its frame",
+    "force_work": "work done by external forces",
+    "load_work": "work done by the change of the axial load",
+    "local_force_work": "work done by the damping part of a local force",
+}
+"""Accumulators of the works of what is no contact, and what they are."""
 
 
 class CompletedStep(NamedTuple):
@@ -49,6 +56,10 @@ class CompletedStep(NamedTuple):
     midspan_velocity: tuple[float, float]
     penetration: tuple[float, float]
     touching: bool
+
+
+SAMPLED = ("energy", "contact", "work", "dissipated", "lost", *WORKS)
+"""Columns of the values of a sample; the energies lost in circuits follow."""
 
 
 # What every kernel keeps: name, kind, value at the start.
@@ -725,10 +736,17 @@ class Recorded(NamedTuple):
     q: _Array
     """Linear modes about the first well, shape (samples, N)."""
     p: _Array
+    contacts: _Array
+    """Penetration and force of every contact, shape (samples, strikers, 2)."""
     values: _Array
-    """Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact; (samples, 7)."""
+    """Beam energy, contact energy, work, dissipation, loss in contact, :data:`WORKS`, losses of circuits; shape (samples, columns)."""
     impacts: _Array
     """Onset, duration, peak force and impulse of each impact that ended, shape (impacts, 4)."""
     accumulators_of_runs: NDArray[Any]
     """The run's record of accumulators as it is at the end of the piece, shape (1,)."""
     last: Last
+
+    def at(self, which: Any) -> Recorded:
+        """Some of the samples."""
+        kept = {name: getattr(self, name)[which] for name in ("times", "q", "p", "contacts", "values")}
+        return self._replace(**kept)

@@ -323,7 +323,7 @@ class Plan(NamedTuple):
     max_halvings: int
     """Halvings of the flight step that make the shortest contact step."""
     contact: float = math.inf
-    """Longest contact step of the native core, s."""
+    """Longest contact step, s."""
 
     def scaled(self, factor: float) -> Plan:
         """Steps that are all so many times as long."""
@@ -336,7 +336,6 @@ def choose_base_step(
     *,
     step: float | None = None,
     accuracy: str = "standard",
-    native: bool = False,
 ) -> Plan:
     """The steps of a run: short enough in flight, as measured on the model itself, and for an impact.
 
@@ -350,8 +349,6 @@ def choose_base_step(
     accuracy : {"standard", "reference"}
         ``"standard"``: order 4, and errors of about a thousandth of the buckling level where a run is well conditioned.
         ``"reference"``: order 6, and errors a hundred thousand times smaller.
-    native : bool
-        Steps of the native core: at the standard level ten times the error in flight, where no tension makes them resonate.
     """
     choice("accuracy", accuracy, ACCURACIES)
     order = _ORDER[accuracy]
@@ -362,7 +359,7 @@ def choose_base_step(
         mass = model.lightest_contact_mass
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * _first_frequency(model)
         duration = contact.time_scale(mass, speed)
-    longer = native and order == 4 and not (contact is not None and contact.impulsive)
+    longer = order == 4 and not (contact is not None and contact.impulsive)
     limit = limits[accuracy] * (_LONGER if longer else 1.0)
     flight = flight_step(model, order, limit, duration if duration > 0.0 else math.inf, resonances=longer)
     if accuracy == "reference" and fastest * flight > _FREE_TURN:
@@ -380,7 +377,7 @@ def choose_base_step(
     if step is not None:
         impact *= positive("step", step, "s") / flight
         flight = step
-    # steps of the native core in contact are chosen apart from those in flight
+    # steps in contact are chosen apart from those in flight
     halvings = _NATIVE_HALVINGS if longer else _HALVINGS[order]
     return Plan(order, flight, min_contact_halvings, min_contact_halvings + halvings, impact)
 

@@ -125,7 +125,10 @@ def contact_law(law: ContactLaw) -> UserLaw:
     """
     kind: Any = type(law)
     if kind.impulsive or kind.memory:
-        raise InputError(f"{kind.__name__}: a law with a memory or of impulses is not integrated by engine = 'native'; use engine = 'cpu'")  # fmt: skip
+        way = "a law without impulses" if kind.impulsive else "engine = 'python'"
+        raise InputError(
+            f"{kind.__name__}: a law of one's own with a memory or of impulses is not integrated by engine = 'native'; use {way}"
+        )
     missing = kind.missing_hooks()
     hooks = [None if name in missing else (getattr(kind, name), 1) for name in ("force", "energy", "slope")]
     damping = (kind.damping_coefficient, 1) if kind.rate_dependent else None
@@ -156,7 +159,7 @@ def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, flo
     count = len(numbers._fields)
     if count > MOST_NUMBERS:
         raise InputError(
-            f"{kind.__name__}: has {count} constants, more than {MOST_NUMBERS}; use engine = 'cpu'"
+            f"{kind.__name__}: has {count} constants, more than {MOST_NUMBERS}; use fewer, or engine = 'python'"
         )
     made = [None if hook is None else _function(hook[0], numbers, hook[1]) for hook in hooks]
     functions = tuple(each for each in made if each is not None)

@@ -22,7 +22,7 @@ from snapbeam.simulation.request import require_motion
 from snapbeam.simulation.save import code_flags
 from snapbeam.simulation.simulate import attributes_of
 from snapbeam.solver.assemble import cycles_of, make_ensemble, plans_of, run_columns
-from snapbeam.solver.registry import resolve
+from snapbeam.solver.engines import engine_of
 from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.statistics import STATISTICS, statistics_of
 from snapbeam.solver.step_size import SUBDIVISION, Plan, long_sweep, require_resolved, seconds_of
@@ -176,17 +176,7 @@ class SweepSetup:
                     if progress is not None:
                         progress(before + inside, total)
 
-                engine = resolve(
-                    integration.engine,
-                    modes=system.model.modes,
-                    law=ensemble.law,
-                    drive=ensemble.drive,
-                    striker_with_mass=bool(ensemble.structure.bodies),
-                    unequal_wells=ensemble.structure.model.transverse_force is not None,
-                    environment=bool(system.surroundings),
-                    several_strikers=len(system.contacts) > 1,
-                )[1]
-                books = engine.run_ensemble(ensemble, threads, report)
+                books = engine_of(ensemble).run_ensemble(ensemble, threads, report)
                 for name, values in statistics_of(ensemble, books).items():
                     found.setdefault(name, np.zeros(total, dtype=values.dtype))[which[part]] = values
                 done += part.size
@@ -431,20 +421,8 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
     points = points_of(axes, system)
     require_parameters(system, points)
     check_integrable(system, integration.engine)
-    law = type(system.contact_law) if system.contact_law is not None else None
-    resolved = resolve(
-        integration.engine,
-        runs=points.size,
-        cycles=integration.cycles_or_default,
-        modes=system.model.modes,
-        law=law,
-        striker_with_mass=any(each.striker.mass is not None for each in system.contacts),
-        unequal_wells=system.model.transverse_force is not None,
-        environment=bool(system.surroundings),
-        several_strikers=len(system.contacts) > 1,
-        **({} if system.striker is None else {"drive": type(system.striker.drive)}),
-    )[0]
-    setup = SweepSetup(system, integration.replace(engine=resolved), points)
+    engine = "native" if integration.engine == "auto" else integration.engine
+    setup = SweepSetup(system, integration.replace(engine=engine), points)
     require_every_structure(setup)
     tell(diagnostics_of(system, points))
     return setup
@@ -455,8 +433,6 @@ def announce_long_sweep(setup: SweepSetup, repeats: int = 1, *, by_cluster: bool
 
     The estimate is that of a run (:func:`~snapbeam.solver.step_size.seconds_of`), averaged over the limits of the axes.
     """
-    if setup.integration.engine == "cuda":
-        return
     columns = setup.points.take(np.array(_ends(setup.points)))
     steps: list[float] = []
     seconds: list[float] = []

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import platform
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass, field, fields
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -17,7 +19,6 @@ from snapbeam._version import __version__
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.simulation.save import code_flags
-from snapbeam.solver.compilation import fingerprint
 from snapbeam.solver.statistics import Statistic, rows_for
 from snapbeam.sweeps.points import Columns, Points
 from snapbeam.sweeps.replicates import Replicates, perturbed_start
@@ -255,13 +256,12 @@ class StageRunner(Protocol):
         ...
 
 
-def chunk_size(points: int, engine: str) -> int:
+def chunk_size(points: int) -> int:
     """Return the points per task: about 200 tasks for a sweep, each large enough for all cores.
 
     The results do not depend on it.
     """
-    low, high = (64, 4096) if engine == "cpu" else (4096, 65536)
-    return int(np.clip(-(-points // 200), low, high))
+    return int(np.clip(-(-points // 200), 64, 4096))
 
 
 class _Rows:
@@ -320,10 +320,15 @@ def _code(system: System) -> str:
     parts: list[object] = [part for each in system.contacts for part in (each.law, each.striker.drive)]
     parts += [*system.forces, *system.harvesters]
     foreign = tuple(type(part) for part in parts if not type(part).__module__.startswith("snapbeam."))
-    mark = fingerprint(foreign) if foreign else ""
-    if not mark:
-        return code_hash() if not foreign else f"{code_hash()}+?"
-    return f"{code_hash()}+{hashlib.sha256(mark.encode()).hexdigest()[:8]}"
+    if not foreign:
+        return code_hash()
+    digest = hashlib.sha256()
+    for kind in foreign:
+        try:
+            digest.update(Path(inspect.getfile(kind)).read_bytes())
+        except (TypeError, OSError):  # of a class typed at a prompt
+            return f"{code_hash()}+?"
+    return f"{code_hash()}+{digest.hexdigest()[:8]}"
 
 
 def _libraries() -> str:

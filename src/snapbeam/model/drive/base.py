@@ -188,9 +188,7 @@ class Drive:
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """Tones, pieces and sweeps of which the motion is the sum; of a sine the tone of its numbers."""
         if not self.harmonic:
-            raise InputError(
-                f"{type(self).__name__}: is not integrated by engine = 'native'; use engine = 'cpu'"
-            )
+            raise NotImplementedError
         found = self.numbers(columns, scale)
         return [Tone(found["amplitude"], found["omega"], columns.get("phase", 0.0), found.get("mean", 0.0))]
 

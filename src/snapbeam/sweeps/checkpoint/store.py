@@ -466,7 +466,7 @@ class Checkpoint:
                     self.layers = layers_of(self.work, held["grown"], held["points_per_task"])
             return int(held["points_per_task"])
         setup = self.work.setup
-        chunk = chunk_size(setup.points.size, setup.integration.engine) if chunk is None else chunk
+        chunk = chunk_size(setup.points.size) if chunk is None else chunk
         held = FORMAT | {
             "parameters": wanted,
             "parameter_hash": parameter_hash(wanted),

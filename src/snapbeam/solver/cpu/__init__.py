@@ -1,1 +1,0 @@
-"""Mode-lane and run-lane layouts for the processor."""

@@ -1,1 +1,0 @@
-"""Run-lane layout: eight runs in one register."""

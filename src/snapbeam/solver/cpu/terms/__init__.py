@@ -1,1 +1,0 @@
-"""Forces and couplings beside tension and the first contact."""

@@ -1,1 +1,0 @@
-"""CUDA layout: one block of threads per run."""
