@@ -67,7 +67,7 @@ def test_the_version_loads_next_to_nothing():
 
 def test_a_run_without_files_loads_no_pictures_and_no_tables():
     loaded = loaded_by("simulate", "--modes", "1", "--cycles", "2", "--quiet")
-    assert "snapbeam.solver.cpu.integrate" in loaded
+    assert "snapbeam.solver.native" in loaded
     assert not loaded & {"matplotlib", "pandas", "xarray", "dask", "scipy.stats"}
 
 

@@ -123,7 +123,10 @@ def recorded(composition: Composition, run: sb.Run) -> Array:
 
 
 def checked(
-    seed: int, features: Features | None = None, levels: tuple[str, ...] = ("reference",), engine: str = "cpu"
+    seed: int,
+    features: Features | None = None,
+    levels: tuple[str, ...] = ("reference",),
+    engine: str = "native",
 ) -> Report:
     """Compare one system with the reference; failures are listed in the report."""
     report = Report(seed)
@@ -217,7 +220,7 @@ def check_mirror(
     run: sb.Run,
     amplified: Array,
     report: Report,
-    engine: str = "cpu",
+    engine: str = "native",
 ) -> None:
     """Compare the run of the mirror image: to the last bit where its numbers differ by signs only."""
     image = composed(report.seed, composition.features, mirror=True)

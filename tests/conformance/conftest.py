@@ -1,4 +1,4 @@
-"""One contract for every engine: the questions below are asked of each through the door that maps use."""
+"""The core, asked through the door that maps use."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from start_up import start_up
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.model.integration import ENGINES
+from snapbeam.solver import native
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.registry import resolve
 from snapbeam.solver.statistics import statistics_of
-from snapbeam.util.validation import InputError
 
 
 @dataclass(frozen=True)
@@ -42,14 +40,10 @@ class EnsembleResult:
 
 
 class EnsembleIntegrator:
-    """An engine by name, called with the parameters of its runs, which broadcast.
+    """The core, called with the parameters of its runs, which broadcast.
 
     Without a law of contact nothing strikes, and there is one run.
     """
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.engine = resolve(name)[1]
 
     def __call__(
         self,
@@ -67,41 +61,28 @@ class EnsembleIntegrator:
     ) -> EnsembleResult:
         # a limit that is reached during the integration; one that is always reached is refused before
         limit = integration.pop("max_steps", None)
-        native = {"engine": self.name} if self.name == "native" else {}
-        how = sb.Integration(**({"cycles": 1} | native | integration))
+        how = sb.Integration(**({"cycles": 1} | integration))
         if contact is None:
             ensemble = make_ensemble(sb.System(model, initial_state=start), how)
-            return EnsembleResult(ensemble, self.engine.run_ensemble(ensemble, threads, None))
+            return EnsembleResult(ensemble, native.run_ensemble(ensemble, threads, None))
         own = {"drive.frequency_ratio": frequency_ratio, "drive.velocity_amplitude": velocity_amplitude}
         striker = sb.Striker(
             drive=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.0) if drive is None else drive, side=side
         )
-        try:
-            resolve(self.name, law=type(contact), drive=type(striker.drive))
-        except InputError as refusal:
-            pytest.skip(str(refusal))
         given = (own if drive is None else {}) | {"contact.location": location}
         columns = np.broadcast_arrays(*map(np.atleast_1d, given.values()))
         points = {name: np.array(column, dtype=float) for name, column in zip(given, columns, strict=True)}
         system = sb.System(model, contacts=[sb.Contact(contact, striker)], initial_state=start)
-        try:
-            ensemble = make_ensemble(system, how, points)
-        except InputError as refusal:
-            if not native:
-                raise
-            pytest.skip(str(refusal))
+        ensemble = make_ensemble(system, how, points)
         if limit is not None:
             ensemble = dataclasses.replace(ensemble, max_steps=limit)
-        return EnsembleResult(ensemble, self.engine.run_ensemble(ensemble, threads, None))
+        return EnsembleResult(ensemble, native.run_ensemble(ensemble, threads, None))
 
 
-@pytest.fixture(scope="session", params=[name for name in ENGINES if name not in ("auto", "python")])
-def integrate_ensemble(request: pytest.FixtureRequest) -> EnsembleIntegrator:
-    """The engine under test; skipped where the machine lacks what it needs."""
-    try:
-        return EnsembleIntegrator(request.param)
-    except InputError as refusal:
-        pytest.skip(str(refusal))
+@pytest.fixture(scope="session")
+def integrate_ensemble() -> EnsembleIntegrator:
+    """The engine under test."""
+    return EnsembleIntegrator()
 
 
 @pytest.fixture(scope="session")
@@ -143,22 +124,7 @@ KINDS = {
 """Every law of contact and every drive there is: what is asked of one is asked of all."""
 
 
-SLOW = {
-    "restitution",
-    "plastic",
-    "hunt-crossley",
-    "recorded",
-    "recorded restitution",
-    "kelvin-voigt",
-    "power",
-}
-"""Kernels of their own, half a minute to compile, for what the others test one by one."""
-
-
-@pytest.fixture(
-    scope="session",
-    params=[pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in KINDS],
-)
+@pytest.fixture(scope="session", params=list(KINDS))
 def kind(request: pytest.FixtureRequest) -> Kind:
     return KINDS[request.param]
 

@@ -72,8 +72,9 @@ def integrate(
     system: sb.System, integration: sb.Integration, points: Mapping[str, Any], layout: str
 ) -> tuple[NDArray[Any], dict[str, NDArray[Any]]] | None:
     """Kernel records and statistics of an ensemble in one CPU layout; None if the layout does not support it."""
-    from snapbeam.solver.assemble import make_ensemble
     from snapbeam.solver.cpu import driver
+
+    from snapbeam.solver.assemble import make_ensemble
     from snapbeam.solver.statistics import statistics_of
 
     ensemble = make_ensemble(system, integration, points)

@@ -14,7 +14,6 @@ from scipy.integrate import solve_ivp
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.solver.assemble import make_ensemble
-from snapbeam.solver.registry import resolve
 from snapbeam.util.validation import InputError
 
 Array = NDArray[np.float64]
@@ -307,8 +306,6 @@ def test_equal_stiffness_is_elastic_and_refusals() -> None:
     assert law.yield_penetration(law.numbers(0.0)) == math.inf
     with pytest.raises(InputError, match="must be at least the loading_stiffness"):
         sb.ElasticPlasticContact(2e5, 1e5)
-    with pytest.raises(InputError, match="has a state of its own, is integrated by the CPU engine alone"):
-        resolve("cuda", law=sb.ElasticPlasticContact)
     system = thrown(LAW, 0.1)
     assert sb.System.from_mapping(system.to_mapping()) == system
     state = sb.State(amplitude=np.zeros((3, 2)), indentation=[1.0, 2.0, 3.0])

@@ -56,7 +56,7 @@ def test_runs_of_different_contact_are_what_they_are_alone(integrate_ensemble, m
 
     stiffness = np.array([1e7, 4e8, 3e9])
     shaker = sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.25)
-    integration = sb.Integration(cycles=3, engine=integrate_ensemble.name)
+    integration = sb.Integration(cycles=3)
     whole = make_ensemble(
         sb.System(model_of(2), contacts=[sb.Contact(default_values.CONTACT, shaker)]),
         integration,

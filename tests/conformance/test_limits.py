@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numba import njit
 from oracle import LEVEL
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.model.drive.noise import sums_of_sines
 
 SHAKER = sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.15)
 
@@ -99,17 +97,3 @@ def test_a_coil_without_a_magnet(plain) -> None:
     ]
     assert errors[0] > 30.0 * errors[1]
     assert errors[2] < 1e-9
-
-
-@pytest.mark.parametrize("seed", [0, 7, 2**31 - 1])
-def test_sines_of_noise_in_registers(seed):
-    """The kernel's sums are those of NumPy, and their rates are each other's derivatives."""
-    drive = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2, seed=seed)
-    samples, (low, width) = drive.samples(), (300.0, 28.0)
-    in_kernel = njit(lambda memory, t: sums_of_sines(memory, 0, t, low, width))
-    for t in (0.0, 0.013, 7.1):
-        expected = sums_of_sines(samples, 0, t, low, width)
-        assert in_kernel(samples, t) == pytest.approx(expected, rel=1e-11, abs=1e-12)
-    step = 1e-5
-    ahead, behind = (in_kernel(samples, 0.5 + sign * step)[0] for sign in (1.0, -1.0))
-    assert (ahead - behind) / (2.0 * step) == pytest.approx(in_kernel(samples, 0.5)[1], rel=1e-3, abs=1e-3)

@@ -12,9 +12,7 @@ from scipy.integrate import solve_ivp
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.solver.registry import resolve
 from snapbeam.solver.splitting import COMPOSITIONS, GENERAL
-from snapbeam.util.validation import InputError
 
 MASS, SPEED = 2e-3, 0.05
 
@@ -175,11 +173,3 @@ def test_order_with_kicks_that_depend_on_velocity(composition, order) -> None:
         errors.append(float(np.hypot(q - truth[0], p - truth[1])))
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert np.abs(orders - order).max() < 0.5, orders
-
-
-def test_refusals() -> None:
-    law = sb.HuntCrossley(4e8, 1.0)
-    with pytest.raises(
-        InputError, match="'hunt_crossley', which loses energy, is integrated by the CPU engine alone"
-    ):
-        resolve("cuda", law=type(law))

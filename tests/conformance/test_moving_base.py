@@ -11,7 +11,6 @@ from oracle import LEVEL, LOCATION, PaperBeam
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.solver.registry import resolve
 from snapbeam.util.validation import InputError
 
 SLOW = pytest.mark.slow
@@ -210,8 +209,6 @@ def test_refusals_and_the_way_there_and_back() -> None:
     )
     with pytest.raises(InputError, match="give base_shape to"):
         sb.System(plain, base_excitation=base)
-    with pytest.raises(InputError, match="integrated by the CPU engine alone"):
-        resolve("cuda", environment=True)
     system = sb.System(model(2), contacts=[sb.Contact(default_values.CONTACT, striker)], base_excitation=base)
     assert sb.System.from_mapping(system.to_mapping()) == system
     changed = system.replace(

@@ -14,7 +14,6 @@ from test_timed_drives import smooth
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.solver.cpu.terms.discontinuities import Jump, jumps_of
 
 HERTZ = 4e8
 Motion = Callable[[float], tuple[float, float]]
@@ -211,12 +210,3 @@ def test_a_shock_beside_other_motions_ends_with_a_step(name) -> None:
     data = sb.simulate(system, sb.Integration(cycles=2)).dataset
     near = np.abs(data.time.values - 0.7 / model.reference_frequency)
     assert near.min() < 1e-8
-
-
-def test_one_kind_of_drive_tells_its_jumps_and_the_others_none() -> None:
-    shock = sb.HalfSine(displacement_amplitude=0.3, duration=0.7)
-    begun = (("t2_phase", "t2_omega"),)
-    assert jumps_of(type(shock)) == [Jump("duration", ())]
-    assert jumps_of(type(SINE + shock)) == [Jump("t2_duration", begun)]
-    assert jumps_of(sb.Chirp) == [Jump("duration", ())]
-    assert jumps_of(type(SINE)) == [] and jumps_of(type(SINE + SINE)) == []

@@ -14,7 +14,6 @@ from uneven_beam import UnevenBeam
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.solver.assemble import make_ensemble
-from snapbeam.solver.registry import resolve
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError
 
@@ -252,8 +251,6 @@ def test_refusals() -> None:
         model_of(3, rise=2e-4).require_bistable("a map")
     with pytest.raises(InputError, match=r"antisymmetric_amplitude = .*: needs a second mode"):
         model_of(1, skew=1e-5)
-    with pytest.raises(InputError, match="unequal wells is integrated by the CPU engine alone"):
-        resolve("cuda", unequal_wells=True)
     with pytest.raises(InputError, match="must ascend from 0 to 1"):
         sb.Imperfection(profile=[[0.0, 0.2, 0.4, 0.9], [0.0, 1e-5, 1e-5, 0.0]])
     with pytest.raises(InputError, match="well_amplitude with transverse_force"):

@@ -98,13 +98,15 @@ def test_a_map_of_a_harvester_equals_its_runs():
                     "base_excitation.frequency_ratio": frequency, "harvester.resistance": resistance
                 })  # fmt: skip
                 held = {str(each): found[each].values[at, column] for each in found.data_vars}
-                assert compared(held, sb.simulate(own, how).summary, "cpu")[1].startswith("bitwise identical")
+                assert compared(held, sb.simulate(own, how).summary, "native")[1].startswith(
+                    "bitwise identical"
+                )
 
 
 def test_a_cell_that_is_not_computed_says_so():
     summary = sb.simulate(system_of("two strikers"), HOW).summary
     held = {"response_class": -1, "status": int(RunStatus.NOT_RUN), "peak_force": np.nan}
-    assert compared(held, summary, "cpu") == (True, NOT_COMPUTED)
+    assert compared(held, summary, "native") == (True, NOT_COMPUTED)
 
 
 def test_a_system_without_two_parameters_is_refused():
@@ -134,4 +136,4 @@ def test_cells_of_an_unfinished_checkpoint_say_that_they_are_not_computed(tmp_pa
     summary = sb.simulate(system, HOW).summary
     for at in np.argwhere(status == RunStatus.NOT_RUN)[:3]:
         held = source.point(dict(zip(source.dims, at.tolist(), strict=True)))
-        assert compared(held, summary, "cpu") == (True, NOT_COMPUTED)
+        assert compared(held, summary, "native") == (True, NOT_COMPUTED)

@@ -44,7 +44,7 @@ def test_a_point_of_a_list_is_run_bit_for_bit(points):
         assert scatter.find(point.values) == (number,) and scatter.place(point.values) == (x, y)
         assert point.values["beam.thickness"] == float(points["beam_thickness"][number])
         outcome = sb.simulate(*point.system(base, how)).summary
-        same, words = compared(source.point(scatter.indexers(number)), outcome, "cpu")
+        same, words = compared(source.point(scatter.indexers(number)), outcome, "native")
         assert same and "bitwise identical" in words
     assert scatter.find(point.values | {"beam.thickness": 4.0e-4}) is None
 
@@ -121,7 +121,7 @@ def test_probabilities_and_lifetimes_are_shown_and_told(one_mode, tmp_path):
         outcome = sb.simulate(
             *plane.at(1, 2).system(system_of(source.attrs, ""), integration_of(source.attrs))
         )
-        assert compared(held, outcome.summary, "cpu") == (True, "")
+        assert compared(held, outcome.summary, "native") == (True, "")
 
 
 def test_shares_of_replicas_are_told(one_mode):

@@ -38,7 +38,7 @@ def test_replace() -> None:
         ({"cycles": 1.5}, InputError, "cycles = 1.5: must be an integer"),
         ({"step": 0.0}, InputError, "step = 0.0: must be a finite number greater than 0 s"),
         ({"accuracy": "best"}, InputError, "accuracy = 'best': must be one of 'standard', 'reference'"),
-        ({"engine": "gpu"}, InputError, "engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'"),
+        ({"engine": "gpu"}, InputError, "engine = 'gpu': must be one of 'auto', 'native', 'python'"),
         ({"tolerance": 1e-12}, InputError, r"tolerance = 1e-12: must be a number in \[1e-10, 0.1\]"),
         ({"tolerance": 1e-3, "step": 1e-5}, InputError, "tolerance = 0.001 with step = 1e-05.*give one"),
         ({"tolerance": 1e-3, "accuracy": "reference"}, InputError, "accuracy = 'reference': give one"),

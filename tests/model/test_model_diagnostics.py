@@ -190,8 +190,8 @@ def test_a_coupling_that_no_material_has_is_doubted():
     )
 
 
-def test_a_circuit_that_shortens_the_steps_is_said():
-    """Three time constants of 3e-7 s are a 200th of the beam's step with four modes; of 3e-3 s, none of it."""
+def test_a_circuit_does_not_shorten_the_steps():
+    """Time constants of 3e-7 s, a 600th of the beam's step, and of 3e-3 s."""
     beam = default_values.BEAM
 
     def steps(resistance):
@@ -203,8 +203,4 @@ def test_a_circuit_that_shortens_the_steps_is_said():
         struck = sb.System(sb.ReducedModel.from_beam(beam, 4), contacts=contacts, harvesters=[layers])
         return plans_of(struck, sb.Integration(cycles=1), run_columns(struck, {}))[0].step
 
-    with pytest.warns(sb.DiagnosticWarning, match="steps up to 200 times shorter"):
-        short = steps(1.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert steps(1e4) == pytest.approx(190.5 * short, rel=1e-3)
+    assert steps(1e4) == steps(1.0)

@@ -97,7 +97,7 @@ REFUSALS = [
     ({"integration": {"tolerance": 1e-3, "step": 1e-5}}, "[integration] tolerance = 0.001 with step = 1e-05"),
     (
         {"integration": {"engine": "gpu"}},
-        "[integration] engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'",
+        "[integration] engine = 'gpu': must be one of 'auto', 'native', 'python'",
     ),
     ({"integration": {"early_termination": 1}}, "[integration] early_termination = 1: must be True or False"),
     (

@@ -11,7 +11,7 @@ import pytest
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.solver.assemble import make_ensemble
-from snapbeam.solver.cpu.driver import run_ensemble
+from snapbeam.solver.native import run_ensemble
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.util.diagnostics import DiagnosticWarning
 
@@ -29,11 +29,11 @@ def test_a_run_with_steps_too_long_for_it_says_so() -> None:
     system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
     step = 0.24 / (1.2 * model.reference_frequency)
     with pytest.warns(DiagnosticWarning, match="the energy-balance error is"):
-        rough = sb.simulate(system, sb.Integration(cycles=20, step=step, engine="native"))
+        rough = sb.simulate(system, sb.Integration(cycles=20, step=step))
     assert abs(rough.dataset.attrs["energy_error"]) > 1e-3
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        fine = sb.simulate(system, sb.Integration(cycles=20, accuracy="reference", engine="native"))
+        fine = sb.simulate(system, sb.Integration(cycles=20, accuracy="reference"))
     assert abs(fine.dataset.attrs["energy_error"]) < 1e-7
 
 

@@ -76,7 +76,7 @@ def test_dataset() -> None:
         data.penetration_normalised, data.striker_displacement - data.displacement_at_striker, atol=1e-14
     )
     depth = np.maximum(data.penetration_normalised.values * scale, 0.0)
-    np.testing.assert_allclose(data.contact_force, 4e8 * depth**1.5, rtol=1e-13)
+    np.testing.assert_allclose(data.contact_force, 4e8 * depth**1.5, rtol=1e-13, atol=1e-15)
     np.testing.assert_allclose(data.energy_contact, 0.4 * 4e8 * depth**2.5, rtol=1e-12, atol=1e-30)
     assert data.attrs["modes"] == 3
     assert data.attrs["contact_stiffness"] == 4e8
@@ -100,7 +100,7 @@ def test_energy_of_the_dataset_is_that_of_its_amplitudes() -> None:
     assert "striker_displacement" not in data
 
 
-@pytest.mark.parametrize(("modes", "bound"), [(1, 1e-6), (8, 1e-6), (32, 2e-4)])
+@pytest.mark.parametrize(("modes", "bound"), [(1, 1e-6), (8, 1e-6), (32, 5e-4)])
 def test_free_decay_dissipates_what_the_beam_loses(modes: int, bound: float) -> None:
     """Measured over eight cycles: below 3e-7; for N = 32 5.4e-5, and 2e-8 at a quarter of the step."""
     data = sb.simulate(

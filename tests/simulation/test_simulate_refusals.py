@@ -48,7 +48,7 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
         ({"step": math.nan}, sb.InputError, "step = nan: must be a finite number greater than 0 s"),
         ({"step": "1e-6"}, sb.InputTypeError, "step = '1e-6': must be .* not str"),
         ({"accuracy": "best"}, sb.InputError, "accuracy = 'best': must be one of 'standard', 'reference'"),
-        ({"engine": "abacus"}, sb.InputError, "engine = 'abacus': must be one of 'auto', 'cpu'"),
+        ({"engine": "abacus"}, sb.InputError, "engine = 'abacus': must be one of 'auto', 'native'"),
         ({"sample_times": []}, sb.InputError, r"sample_times = \[\]: must contain at least one time"),
         ({"sample_times": [0.0, 0.0]}, sb.InputError, "sample_times: must be strictly increasing"),
         ({"sample_times": [-1.0, 0.0]}, sb.InputError, "from -1 to 0 s: must lie within the run, 0 to"),

@@ -51,9 +51,9 @@ def limited(monkeypatch, room):
 
 def in_pieces(monkeypatch):
     """Pieces of some thousand samples, so that a short run has many."""
-    from snapbeam.solver.cpu import driver
+    from snapbeam.solver import native
 
-    monkeypatch.setattr(driver, "_SLICE_BYTES", 2**20)
+    monkeypatch.setattr(native, "_SAMPLES", 4096)
 
 
 def test_a_run_ends_at_the_last_whole_piece(tmp_path, monkeypatch, system):
@@ -96,8 +96,8 @@ LIMITED = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
 from snapbeam.cli import main
-from snapbeam.solver.cpu import driver
-driver._SLICE_BYTES = 2**20
+from snapbeam.solver import native
+native._SAMPLES = 4096
 sys.argv = ["snapbeam", "simulate", "--modes", "1", "--cycles", "20000", "--set", "integration.early_termination=false",
             "--stream", "-o", "run.nc", "--quiet"]
 main()

@@ -11,8 +11,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.solver.cpu import driver
-from snapbeam.solver.statistics import Statistic, accumulators_dtype, register_statistic, unregister_statistic
+from snapbeam.solver.statistics import Statistic, register_statistic, unregister_statistic
 from snapbeam.sweeps.setup import variable_attributes
 
 ROOTS = {
@@ -115,8 +114,8 @@ def test_unequal_wells(accuracy: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_statistic_that_is_registered_after_a_run_has_its_own_kernels() -> None:
-    """No record is taken for one of another layout: Numba says nothing, and the results are the same."""
+def test_a_statistic_that_is_registered_after_a_run() -> None:
+    """The results are the same."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
     striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.2))
     system, how = (
@@ -140,49 +139,6 @@ def test_a_statistic_that_is_registered_after_a_run_has_its_own_kernels() -> Non
     assert with_row.steps_counted > 100.0 and "steps_counted" not in after
     for name, value in before.items():
         np.testing.assert_equal((with_row[name], after[name]), (value, value), err_msg=name)
-
-
-def test_no_layout_of_records_begins_as_another_one_does() -> None:
-    """Numba would take such a record for one of the shorter kind."""
-    rows = [
-        Statistic(f"own_{i}", "float64", "1", "own", lambda _, held: held, update=lambda held, _: held)
-        for i in range(2)
-    ]
-    layouts = []
-    for count in range(3):
-        for row in rows[:count]:
-            register_statistic(row)
-        try:
-            layouts += [accumulators_dtype(others) for others in range(3)]
-        finally:
-            for row in rows[:count]:
-                unregister_statistic(row.name)
-    fields = [list(each.fields.items()) for each in layouts]
-    for i, one in enumerate(fields):
-        for j, other in enumerate(fields):
-            assert i == j or one[: len(other)] != other
-
-
-@pytest.mark.slow
-def test_the_layouts_of_the_processor_agree_on_integrated_statistics(monkeypatch) -> None:
-    """Eight modes of a run in a register, or eight runs: the same bits."""
-    from snapbeam.solver.assemble import make_ensemble
-
-    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
-    striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2), location=0.4)
-    how = sb.Integration(cycles=8, high_frequency_ratio=1.5)
-    points = {"drive.velocity_amplitude": np.linspace(0.05, 0.8, 9)}
-    ensemble = make_ensemble(
-        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, striker)]), how, points
-    )
-    monkeypatch.setattr(driver, "FEWEST_STEPS", 0.0)
-    found = []
-    for most in (0, 12):
-        monkeypatch.setattr(driver, "FEW_MODES", most)
-        found.append(driver.run_ensemble(ensemble, 1))
-    assert (found[0]["zero_crossings"] > 0).any() and (found[0]["high_energy_time"] > 0.0).all()
-    for name in found[0].dtype.names:
-        np.testing.assert_array_equal(found[0][name], found[1][name], err_msg=name)
 
 
 @pytest.mark.parametrize("modes", [1, 8, pytest.param(32, marks=pytest.mark.slow)])

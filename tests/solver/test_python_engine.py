@@ -124,7 +124,7 @@ def test_several_contacts_of_which_one_loses_energy():
     assert abs(own.dataset.attrs["energy_error"]) < 1e-8
 
 
-@pytest.mark.parametrize("engine", ["python", "native", "cpu"])
+@pytest.mark.parametrize("engine", ["python", "native"])
 def test_energies_of_several_contacts_are_balanced_at_every_sample(engine):
     """Beam, all contacts and losses together change by the work of the striker alone; a contact counts once."""
     data = sb.simulate(several(), how(engine), sample_times=np.linspace(0.0, 0.009, 2000)).dataset
@@ -134,8 +134,7 @@ def test_energies_of_several_contacts_are_balanced_at_every_sample(engine):
     assert float(abs(gained - gained[0]).max()) < 1e-7 * data.attrs["gross_work"]
 
 
-@pytest.mark.parametrize("engine", ["python", "native"])
-def test_a_statistic_that_needs_every_step_is_refused_by_name(engine):
+def test_a_statistic_that_needs_every_step_is_refused_by_name():
     row = sb.Statistic(
         "deepest", "float64", "m", "penetration", lambda r, held: held, update=lambda held, step: held
     )
@@ -146,11 +145,10 @@ def test_a_statistic_that_needs_every_step_is_refused_by_name(engine):
             sb.simulate,
             lambda *given: sb.sweep(given[0], {"drive.velocity_amplitude": [0.1]}, given[1]),
         ):
-            with pytest.raises(InputError, match=f"statistic 'deepest'.*'{engine}'.*engine = 'cpu'"):
-                call(system, how(engine))
+            with pytest.raises(InputError, match=r"statistic 'deepest'.*'python'.*engine = 'native'"):
+                call(system, how())
     finally:
         sb.unregister_statistic("deepest")
-    assert sb.simulate(system, how(engine)).summary.impacts > 0
 
 
 def test_energy_of_everything_at_once_is_balanced():
@@ -204,9 +202,6 @@ def test_a_law_with_a_force_alone():
         native = sb.simulate(system, how("native", cycles=2))
     ends = [each.dataset.modal_amplitude.values[-1] for each in (native, run)]
     assert ends[0] == pytest.approx(ends[1], rel=1e-9)
-    for engine in ("auto", "cpu"):
-        with pytest.raises(InputError, match=r"no energy and no slope.*or use engine = 'native'"):
-            sb.simulate(system, how(engine))
 
 
 def test_an_impact_that_leaves_a_residual_indentation():
@@ -248,7 +243,7 @@ def test_a_sweep():
 def test_it_says_how_slow_it_is(monkeypatch):
     monkeypatch.setattr(diagnostics, "_told", set())
     system = sb.System(beam(1), contacts=[striking(location=0.437)])
-    with pytest.warns(sb.DiagnosticWarning, match=r"times slower than engine = 'cpu', some .* s a run"):
+    with pytest.warns(sb.DiagnosticWarning, match=r"times slower than engine = 'native', some .* s a run"):
         sb.simulate(system, how(cycles=3))
 
 
@@ -259,7 +254,9 @@ def test_settings_that_it_does_not_have_are_refused_by_name(given):
 
 
 def test_impacts_without_a_duration_and_perturbed_drives_are_refused():
-    with pytest.raises(InputError, match=r"contact.law = Restitution.*engine = 'python'; use engine = 'cpu'"):
+    with pytest.raises(
+        InputError, match=r"contact.law = Restitution.*engine = 'python'; use engine = 'native'"
+    ):
         sb.simulate(sb.System(beam(1), contacts=[striking(sb.Restitution(0.6))]), how())
     with pytest.raises(
         InputError, match=r"engine = 'python': does not change a drive.*use engine = 'native'"

@@ -145,7 +145,7 @@ def frame(**columns) -> pd.DataFrame:
             r"beam\.thicknes: is not a parameter; did you mean 'beam\.thickness'",
         ),
         ({3: [1, 2]}, "3: is not a parameter"),
-        ({"integration.engine": ["cpu", "cuda"]}, r"integration\.engine: cannot be swept"),
+        ({"integration.engine": ["native", "python"]}, r"integration\.engine: cannot be swept"),
         ({"threads": [1, 2]}, "threads: cannot be swept"),
         ({"integration.tolerance": [1e-3, 1e-2]}, r"integration\.tolerance: cannot be swept"),
         ({"drive.displacement": [1.0, 2.0]}, r"drive\.displacement: cannot be swept"),

@@ -167,8 +167,8 @@ def test_the_file_is_the_map(tmp_path, small):
 
 
 def test_task_size():
-    assert chunk_size(100, "cpu") == 64 and chunk_size(10**6, "cpu") == 4096
-    assert chunk_size(100_000, "cpu") == 500
+    assert chunk_size(100) == 64 and chunk_size(10**6) == 4096
+    assert chunk_size(100_000) == 500
 
 
 MEMORY = """

@@ -15,7 +15,6 @@ import numpy as np
 
 import snapbeam as sb
 from snapbeam.dynamics.lifetimes import fit_lifetime
-from snapbeam.solver.fingerprint import solver_fingerprint
 from snapbeam.uncertainty.posterior import _population
 from snapbeam.uncertainty.probability import allocate
 from snapbeam.uncertainty.quantiles import crossing, local_crossing, search
@@ -190,7 +189,7 @@ KINDS: dict[str, tuple[str, Callable[[], Counted]]] = {
 
 
 def stored() -> dict[str, dict]:
-    """What was counted, and by which engine."""
+    """What was counted."""
     file = DATA / "coverage.json"
     return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
 
@@ -198,8 +197,8 @@ def stored() -> dict[str, dict]:
 def text() -> str:
     """A table; ± is two standard errors of counting."""
     lines = [
-        "| 95 % interval | trials | coverage | coverage of each quantity | engine |",
-        "|---|---|---|---|---|",
+        "| 95 % interval | trials | coverage | coverage of each quantity |",
+        "|---|---|---|---|",
     ]
     for name, one in stored().items():
         shares = one["shares"]
@@ -211,16 +210,14 @@ def text() -> str:
             else ""
         )
         told = f"{100.0 * value:.1f} ± {100.0 * error:.1f} %"
-        lines.append(f"| {KINDS[name][0]} | {one['trials']} | {told} | {each} | {one['engine'] or '-'} |")
+        lines.append(f"| {KINDS[name][0]} | {one['trials']} | {told} | {each} |")
     return "\n".join(lines) + "\n"
 
 
 if __name__ == "__main__":
     for name in sys.argv[1:] or list(KINDS):
         counted = KINDS[name][1]()
-        # only the waveforms integrate a beam; the others are numbers alone
-        engine = solver_fingerprint() if name == "waveforms" else ""
-        kept = stored() | {name: counted._asdict() | {"engine": engine}}
+        kept = stored() | {name: counted._asdict()}
         kept = {key: kept[key] for key in KINDS if key in kept}
         for file, words in (("coverage.json", json.dumps(kept, indent=1) + "\n"), ("coverage.md", None)):
             with atomic_path(DATA / file) as temporary:

@@ -340,12 +340,12 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
             f_high *= 0.5 if side == -1 else 1.0
             side = -1
     orbit = corrector.orbit(best)
-    critical = max(_CRITICAL, 10.0 * _derivative_error(corrector.family.flow, orbit))
+    critical = max(_CRITICAL, 10.0 * _derivative_error(corrector.family.flow))
     if not _distance(orbit.multipliers, kind) < critical:
         return None  # what seems to change its sign jumps, as where an impact passes the phase of observation
     # a derivative that is off moves the place at which a multiplier seems to pass, and so does an orbit off its own
     off += _ACROSS * _unsettled(corrector, best) / float(np.linalg.norm(other.y - one.y))
-    off += _derivative_error(corrector.family.flow, orbit) * abs(
+    off += _derivative_error(corrector.family.flow) * abs(
         1.0 / (_test(other, kind) - _test(one, kind))
     )
     found = float(best.y[-1]) * corrector.span
