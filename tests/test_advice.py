@@ -58,27 +58,12 @@ INSTEAD = {"hertz": HERTZ, "'hunt_crossley' with restitution and speed": LOSSY}
 """Laws that messages on Newton's law advise, by their words."""
 ADVICE: list[tuple[Callable[[], Any], str, list[Callable[[], Any]]]] = [
     (
-        lambda: integrable((NEWTON, SHAKER), modes=3),
-        "use that, or one mode and a striker without mass, or type = 'hertz', or 'hunt_crossley' with restitution and speed",
+        lambda: check_integrable(system((NEWTON, SHAKER)), "python"),
+        "use engine = 'native', or type = 'hertz', or 'hunt_crossley' with restitution and speed",
         [
-            lambda: integrable((NEWTON, SHAKER)),
-            *(lambda law=law: integrable((law, SHAKER), modes=3) for law in INSTEAD.values()),
-            lambda: of_file(modes=3, type="hertz"),
-            lambda: of_file(modes=3, type="hunt_crossley", restitution=0.6, speed=0.07),
+            lambda: check_integrable(system((NEWTON, SHAKER)), "native"),
+            *(lambda law=law: check_integrable(system((law, SHAKER)), "python") for law in INSTEAD.values()),
         ],
-    ),
-    (
-        lambda: integrable((NEWTON, body(2.0))),
-        "use that, or one mode and a striker without mass, or type = 'hertz', or 'hunt_crossley' with restitution and speed",
-        [
-            lambda: integrable((NEWTON, STOP)),
-            *(lambda law=law: integrable((law, body(2.0))) for law in INSTEAD.values()),
-        ],
-    ),
-    (
-        lambda: integrable((NEWTON, SHAKER), (NEWTON, STOP)),
-        "use type = 'hertz', or 'hunt_crossley' with restitution and speed",
-        [lambda law=law: integrable((law, SHAKER), (law, STOP)) for law in INSTEAD.values()],
     ),
     (
         lambda: sb.Striker(drive=sb.FixedStop(), gap=5e-5, suspension_stiffness=2.0),

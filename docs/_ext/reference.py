@@ -384,9 +384,7 @@ def _questions() -> dict[str, Any]:
     from snapbeam.dynamics.flow import Stroboscope
     from snapbeam.dynamics.lifetimes import require_excitation
     from snapbeam.dynamics.periodic_orbits import require_isolated_orbits
-    from snapbeam.simulation.advance import tangent_obstacle
     from snapbeam.solver.assemble import make_ensemble
-    from snapbeam.solver.registry import resolve
 
     def advance(system: Any) -> None:
         make_ensemble(system, sb.Integration(early_termination=False), periods=1)
@@ -397,35 +395,17 @@ def _questions() -> dict[str, Any]:
     def orbits(system: Any) -> None:
         require_isolated_orbits(Stroboscope(system))
 
-    def tangents(system: Any) -> str:
-        return "flow" if tangent_obstacle(system) is None else "differences"
-
     def ends_early(system: Any) -> str:
         how = sb.Integration(cycles=1, early_termination=True)
         energy = make_ensemble(system, how).runs["decide_energy"][0]
         return "crossings, energy" if energy > float("-inf") else "crossings"
 
-    def on_cuda(system: Any) -> None:
-        ensemble = make_ensemble(system, sb.Integration(cycles=1))
-        try:
-            resolve(
-                "cuda", modes=system.model.modes, law=ensemble.law, drive=ensemble.drive,
-                striker_with_mass=bool(ensemble.structure.bodies),
-                unequal_wells=ensemble.structure.unequal_wells is not None,
-                environment=bool(system.surroundings), several_strikers=len(system.contacts) > 1,
-            )  # fmt: skip
-        except sb.InputError as error:
-            if "by the CPU engine alone" in str(error):
-                raise
-
     return {
         "`advance`": advance,
-        "tangents": tangents,
         "orbits, branches, attractors, basins": orbits,
         "sections, exponents": map_of,
         "lifetimes": require_excitation,
         "early termination": ends_early,
-        "CUDA": on_cuda,
     }
 
 
@@ -574,37 +554,24 @@ def _parts() -> dict[str, Any]:
 def _refused_systems() -> dict[str, Any]:
     """Functions that make systems whose parts do not go together, and assemble a run of them."""
     import snapbeam as sb
-    from snapbeam.model import default_values
-    from snapbeam.solver.restrictions import check_integrable
 
-    hertz, newton = default_values.CONTACT, sb.Restitution(0.9)
-    one, model = (sb.ReducedModel.from_beam(default_values.BEAM, modes=modes) for modes in (1, 2))
     parts = _parts()
     load = parts["a load with a sine"].axial_load
     base = parts["a base with a sine"].base_excitation
-    first = parts["the paper's"].striker
-    stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
-    heavy = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5, mass=2e-3)
     matrices = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
     chirp = parts["drive `chirp`"].striker.drive
     half = parts["drive `half_sine`"].striker.drive
 
-    def struck(*contacts: tuple[Any, Any], of: Any = model, **around: Any) -> Any:
-        return lambda: check_integrable(
-            sb.System(of, contacts=[sb.Contact(*each) for each in contacts], **around)
-        )
+    def made(**around: Any) -> Any:
+        return lambda: sb.System(matrices, **around)
 
-    newtonian = (newton, first)
     return {
-        "contact `restitution` with two modes": struck(newtonian),
-        "contact `restitution` with a striker with a mass": struck((newton, heavy), of=one),
-        "contact `restitution` with several strikers": struck(newtonian, (hertz, stop), of=one),
         "a base with a half sine": lambda: sb.BaseExcitation(motion=half),
         "a base with a chirp that does not carry the striker": lambda: sb.BaseExcitation(
             motion=chirp, striker_on_base=False
         ),
-        "a base under a structure given by matrices": struck(of=matrices, base_excitation=base),
-        "a changing load on a structure given by matrices": struck(of=matrices, axial_load=load),
+        "a base under a structure given by matrices": made(base_excitation=base),
+        "a changing load on a structure given by matrices": made(axial_load=load),
         "a suspension without a mass": lambda: sb.Striker(drive=sb.FixedStop(), suspension_stiffness=1e3),
         "an overdamped suspension": lambda: sb.Striker(
             drive=sb.FixedStop(), mass=1e-3, suspension_stiffness=1.0, suspension_damping=1.0

@@ -250,7 +250,7 @@ def test_every_page_is_in_the_tree():
 
 
 @pytest.mark.parametrize("name", [
-    "api", "parameters", "variables", "command_line", pytest.param("support", marks=pytest.mark.slow),
+    "api", "parameters", "variables", "command_line", "support",
 ])  # fmt: skip
 def test_tables_of_pages_are_those_of_the_program(name):
     """``python docs/_ext/reference.py`` writes them again."""
@@ -316,7 +316,6 @@ def test_a_proven_well_does_not_prove_the_class():
     assert (after[changed] == sb.ResponseClass.TRANSIENT_2).all()
 
 
-@pytest.mark.slow  # the step sizes of thirty systems
 def test_supported_combinations():
     """Every row has an answer to each question; every refusal has a reason and a remedy."""
     text = REFERENCE["support_tables"]()
@@ -333,7 +332,7 @@ def test_supported_combinations():
     }
     assert all(row["`advance`"] == row["lifetimes"] == "yes" for row in answers.values())
     several = answers["several strikers of one frequency, or in such a ratio"]
-    assert several["tangents, all exponents"] == several["orbits, sections, attractors, basins"] == "yes"
+    assert several["sections, exponents"] == several["orbits, branches, attractors, basins"] == "yes"
     reasons = re.findall(r"^\d+\. (.*)$", text, flags=re.MULTILINE)
     numbers = {
         int(number)

@@ -72,7 +72,7 @@ class Integration:
         "1", "whether a run ends once its response class is certain", default=False, kind=bool
     )
     threads: int | None = quantity(
-        "1", "threads of the CPU engine", default=None, kind=int, low=1, high=4096, optional=True
+        "1", "threads of the native core", default=None, kind=int, low=1, high=4096, optional=True
     )
     high_frequency_ratio: float = quantity(
         "1", "multiple of omega_1 above which the energy of a mode counts as high", default=5.0, low=0.0
