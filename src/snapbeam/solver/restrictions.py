@@ -35,9 +35,9 @@ def check_integrable(system: System, engine: str = "auto") -> None:
     InputError
     """
     used = "native" if is_native(engine) else engine
-    if used in ("native", "python") and updated():
+    if used == "python" and updated():
         raise InputError(
-            f"statistic {updated()[0].name!r}: is updated after every step, which engine = {used!r} does not do; use engine = 'cpu', "
+            f"statistic {updated()[0].name!r}: is updated after every step, which engine = {used!r} does not do; use engine = 'native', "
             "or take it out with unregister_statistic"
         )
     contacts = system.contacts
