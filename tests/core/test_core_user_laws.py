@@ -165,7 +165,7 @@ def without_numba(monkeypatch):
             raise ImportError(name)
         return found(name, globals, *more, **named)
 
-    monkeypatch.setattr(user_laws, "_function", user_laws._Function)
+    monkeypatch.setattr(user_laws, "_function", user_laws._function.__wrapped__)
     monkeypatch.setattr(builtins, "__import__", without)
 
 

@@ -146,9 +146,11 @@ def test_a_statistic_that_needs_every_step_is_refused_by_name():
             lambda *given: sb.sweep(given[0], {"drive.velocity_amplitude": [0.1]}, given[1]),
         ):
             with pytest.raises(InputError, match=r"statistic 'deepest'.*'python'.*engine = 'native'"):
-                call(system, how())
+                call(system, how("python"))
+        assert sb.simulate(system, how("native")).summary.deepest == 0.0
     finally:
         sb.unregister_statistic("deepest")
+    assert sb.simulate(system, how("python")).summary.impacts > 0
 
 
 def test_energy_of_everything_at_once_is_balanced():

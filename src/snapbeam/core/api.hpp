@@ -34,7 +34,17 @@ struct Problem {
     int levels;                   // lengths of steps: the flight step, the contact step and its halves
     int fewest_parts;             // parts of a kick in which forces of the velocity are integrated, at least
     double parts_per_decay;       // and parts over the time in which the damping stops the motion along a row
+    int updates;                  // statistics of a user
+    const long long *update;      // address of the Update of each
 };
+
+// A statistic of a user after a step that was accepted: what it holds then, of what it held and of the step.  Values at
+// both ends are a pair; penetration and touch are the first contact's, -1e30 and 0 without one.
+enum Completed : int {
+    COMPLETED_TIME, COMPLETED_LENGTH, COMPLETED_DISPLACEMENT, COMPLETED_VELOCITY = 4, COMPLETED_CENTER = 6,
+    COMPLETED_CENTER_VELOCITY = 8, COMPLETED_PENETRATION = 10, COMPLETED_TOUCHING = 12, COMPLETED
+};
+typedef double (*Update)(double held, const double *step);
 
 // Numbers of a run.  STEP is the flight step, CONTACT_STEP the longest step in contact, which is halved up to HALVINGS times; with more
 // than CALM_ENERGY (J above the first well) flight steps are shorter too.  Flights after impulsive contact lower than LOWEST (m) are none.
@@ -97,6 +107,7 @@ struct Batch {
     double *states;               // (runs, outputs, 2 modes + 1 + 2 channels): q, p, well, ticks in contact (-1: apart), states of laws
     double *statistics;           // (runs, STATISTICS)
     double *of_channels;          // (runs, channels, OF_CHANNEL)
+    double *held;                 // (runs, updates): at first their values at the start
     bool account;                 // account for the dissipation of the modes
     const volatile int *stop;
     int *next;                    // the next run, shared by threads

@@ -634,6 +634,7 @@ template <class L> struct Group {
             record_inside(*this);
             for (int j = 0; j < z.channels; ++j) was_touching |= z.channel[j].contact && lane(z.channel[j].closed, 0);
         }
+        if (problem->updates) totals.update(z, ok, *batch, run);
         totals.add_step(z, ok, amplitude, scratch);
         if (bits(alive & (!ok)) || batch->recorder) {
             for (int i = 0; i < n; ++i) assign(ok, z.q[i], z.q1[i]), assign(ok, z.p[i], z.p1[i]), assign(ok, z.k[i], z.k1[i]);

@@ -100,8 +100,9 @@ class Arguments {  // the arrays and numbers of one mapping
         return const_cast<T *>(found.data());
     }
     template <class T> T *optional(const char *key, const std::vector<size_t> &shape) {
-        return given_.contains(key) && !given_[key].is_none() ? array<T>(key, shape) : nullptr;
+        return has(key) ? array<T>(key, shape) : nullptr;
     }
+    bool has(const char *key) const { return given_.contains(key) && !given_[key].is_none(); }
     double number(const char *key, double low, double high) {
         double found;
         if (!given_.contains(key) || !nb::try_cast<double>(given_[key], found)) throw nb::type_error((where(key) + "must be a number").c_str());
@@ -173,6 +174,10 @@ static Problem problem_of(Arguments &a) {
     p.dividing_height = a.number("dividing_height", -1e300, 1e300);
     p.levels = a.integer("levels", 2, 40), p.fewest_parts = a.integer("fewest_parts", 1, 256);
     p.parts_per_decay = a.number("parts_per_decay", 0.0, 1e6);
+    const size_t updates = a.has("update") ? a.length("update") : 0;
+    p.updates = int(updates), p.update = a.optional<long long>("update", {updates});
+    for (size_t i = 0; i < updates; ++i)
+        if (!p.update[i]) a.refuse("update", "must be addresses of functions");
     return p;
 }
 
@@ -242,6 +247,7 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
     b.states = a.array<double, true>("states", {runs, size_t(b.outputs), 2 * n + 1 + 2 * channels}, false);
     b.statistics = a.array<double, true>("statistics", {runs, STATISTICS}, false);
     b.of_channels = a.array<double, true>("of_channels", {runs, channels, OF_CHANNEL}, false);
+    if (p.updates) b.held = a.array<double, true>("held", {runs, size_t(p.updates)}, false);
     b.account = a.integer("account", 0, 1) != 0;
     if (b.outputs)
         for (size_t i = 0; i < runs; ++i) {
@@ -309,9 +315,9 @@ template <class Work> static void in_threads(int threads, Shared &shared, int ru
     if (raised) throw nb::python_error();
 }
 
-// Laws of a user may call Python: a thread that is known to it calls ten times faster.
+// Laws and statistics of a user may call Python: a thread that is known to it calls ten times faster.
 template <class Work> static void with_python(const Problem &p, Work work) {
-    bool of_user = false;
+    bool of_user = p.updates > 0;
     for (int j = 0; j < p.channels; ++j) of_user |= plain::of_user(p.laws[j]);
     if (!of_user) return work();
     nb::gil_scoped_acquire known;

@@ -278,6 +278,28 @@ template <class L> struct Totals {
         assign(which, sum[k], max(sum[k], speed_on(v0, a0, v1, a1, h)));
     }
 
+    // Statistics of a user, before the step is added.
+    __attribute__((noinline)) void update(const Runs<L> &z, Marks ok, const Batch &batch, const int *run) const {
+        using namespace snapbeam;
+        const int n = s->size(), updates = s->problem->updates;
+        const Channel<L> *first = z.channels && z.channel[0].contact ? z.channel : nullptr;
+        const Number none = Number(-1e30), d0 = first ? first->d0 : none, d1 = first ? first->d1 : none;
+        const Number u = height(z, z.q1), v = dot<L>(row, z.p1, n);
+        const Number c = center_height(z, z.q1), cv = dot<L>(s->center, z.p1, n);
+        const Number pairs[] = {point.u, u, point.v, v, center.u, c, center.v, cv, d0, d1};
+        for (int l = 0; l < L::runs; ++l) {
+            if (!lane(ok, l)) continue;
+            double step[COMPLETED];
+            step[COMPLETED_TIME] = lane(z.t, l) * lane(z.tick, l), step[COMPLETED_LENGTH] = lane(value(z.h), l);
+            for (int i = 0; i < 10; ++i) step[COMPLETED_DISPLACEMENT + i] = lane(value(pairs[i]), l);
+            step[COMPLETED_TOUCHING] = first && lane(first->closed, l) ? 1.0 : 0.0;
+            for (int k = 0; k < updates; ++k) {
+                double &held = batch.held[long(run[l]) * updates + k];
+                held = reinterpret_cast<Update>(static_cast<__UINTPTR_TYPE__>(s->problem->update[k]))(held, step);
+            }
+        }
+    }
+
     SNAPBEAM_FN void add_step(Runs<L> &z, Marks ok, Plain *amplitude, Plain *memory) {
         using namespace snapbeam;
         const int n = s->size();

@@ -35,8 +35,10 @@ from snapbeam.solver.statistics import (
     OutputStates,
     Recorded,
     empty_accumulators,
+    updated,
 )
 from snapbeam.solver.step_size import TRIED, barrier_of
+from snapbeam.solver.user_laws import updates_of
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
@@ -97,6 +99,8 @@ class _Arrays:
         channels, structure = ensemble.channels, ensemble.structure
         assert channels is not None
         self.ensemble, self.channels = ensemble, channels
+        self.updated = updated()
+        self.updates = updates_of(self.updated)
         # charges and residual indentations are states of laws
         states: list[int] = [each.mode for each in structure.circuits if each.mode is not None]
         first = structure.modes_of_bodies.stop
@@ -148,6 +152,7 @@ class _Arrays:
             "levels": int(halvings.max()) + 2,
             "fewest_parts": fewest,
             "parts_per_decay": per_decay,
+            "update": np.array([each.address for each in self.updates], np.int64),
         }
         table = ensemble.runs
         # finer ticks than those of the table, so that an event lies on one to rounding
@@ -197,6 +202,7 @@ class _Arrays:
             "states": np.zeros((ensemble.size, 0, 2 * n + 1 + 2 * channels.laws.size)),
             "statistics": np.full((ensemble.size, len(STATISTICS)), np.nan),
             "of_channels": np.zeros((ensemble.size, channels.laws.size, len(OF_CHANNEL))),
+            "held": np.tile([float(row.start) for row in self.updated], (ensemble.size, 1)),
             "account": 0,
         }
         self.batch["statistics"][:, 0] = -1.0
@@ -213,6 +219,17 @@ class _Arrays:
             q[..., mode] = laws[..., contact]
         return q, p
 
+    def check(self) -> None:
+        """Raise the first error that a function of a user raised in the core."""
+        self.channels.check()
+        for each in self.updates:
+            each.check()
+
+    @property
+    def calls_python(self) -> bool:
+        """True if a function of a user holds the interpreter's lock, so that threads would wait for each other."""
+        return self.channels.calls_python or any(each.why_slow for each in self.updates)
+
     def accumulators(self) -> NDArray[Any]:
         """The records of the runs."""
         statistics, of_channels = self.batch["statistics"], self.batch["of_channels"]
@@ -225,6 +242,8 @@ class _Arrays:
                 found[name][begun] = statistics[begun, k]
         found["status"][begun] = np.array(STATUS, dtype=np.int64)[statistics[begun, 0].astype(int)]
         found["time"][begun] = np.rint(statistics[begun, 1] / self.finer)
+        for row, held in zip(self.updated, self.batch["held"].T, strict=True):
+            found[f"own_{row.name}"] = held
         contacts = {name: of_channels[:, : channels.contacts, k] for k, name in enumerate(OF_CHANNEL)}
         for name, column in (("impacts", "impacts"), ("total_impulse", "impulse"), ("work", "work"), ("lost", "lost"), ("contact_time", "contact_time")):  # fmt: skip
             found[name] = contacts[column].sum(axis=1)
@@ -269,10 +288,10 @@ def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) 
         arrays.batch,
         layout,
         os.environ.get("SNAPBEAM_SET", ""),
-        1 if arrays.channels.calls_python else threads or usable_cores(),
+        1 if arrays.calls_python else threads or usable_cores(),
         progress,
     )
-    arrays.channels.check()
+    arrays.check()
     if progress is not None:
         progress(arrays.ensemble.size, arrays.ensemble.size)
 
@@ -338,7 +357,7 @@ def record(
     layout = os.environ.get("SNAPBEAM_LAYOUT") or layout
     while True:
         _core.record(arrays.problem, arrays.batch, recorder, layout, os.environ.get("SNAPBEAM_SET", ""))
-        channels.check()
+        arrays.check()
         marks = recorder["marks"]
         accumulators = arrays.accumulators()
         held, impacts = int(marks[1]), int(marks[2])

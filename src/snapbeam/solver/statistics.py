@@ -55,6 +55,7 @@ class CompletedStep(NamedTuple):
     midspan_displacement: tuple[float, float]
     midspan_velocity: tuple[float, float]
     penetration: tuple[float, float]
+    """Of the first contact; -1e30 without a striker."""
     touching: bool
 
 

@@ -1,7 +1,7 @@
-"""A user's laws in the native core: their static methods as functions of C, by Numba or, without it, called back by ctypes.
+"""A user's laws and statistics in the native core: as functions of C, by Numba or, without it, called back by ctypes.
 
-A function gets x, y and the law's own numbers.  Its address is one of the numbers of the channel (``core/laws.hpp: User``), so that the
-core has one law of each kind for all of them.
+A function of a law gets x, y and the law's own numbers.  Its address is one of the numbers of the channel (``core/laws.hpp: User``), so
+that the core has one law of each kind for all of them.  One of a statistic gets what it held and the numbers of a step.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import functools
 import math
 import re
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,89 +19,143 @@ import numpy as np
 
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.local_force import LocalForce
+from snapbeam.solver.statistics import CompletedStep, Statistic
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.validation import InputError
 
-_C = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_double, ctypes.POINTER(ctypes.c_double))
 _FAR = 1e300
 """End of a range that has none."""
 MOST_NUMBERS = 55
 """Constants of a law, at most."""
 
 
-class _Function:
-    """A scalar function of a law's numbers, x and perhaps y, as a function of C; an error in it becomes NaN and is kept."""
+class Function:
+    """A function of C, of some doubles and a pointer to more, that calls one in Python; an error in it becomes NaN and is kept.
 
-    def __init__(self, function: Callable[..., float], numbers: Any, arguments: int) -> None:
-        self.name = f"{numbers.owner.__name__}.{function.__name__}"
+    *arguments* makes those in Python of those in C; *compiled* makes, of Numba, the function compiled and what to call after an error,
+    the function of C.
+    """
+
+    def __init__(self, name: str, function: Callable[..., float], doubles: int, arguments: Any, compiled: Any) -> None:  # fmt: skip
+        self.name = name
         self.error: tuple[BaseException, tuple[Any, ...]] | None = None
-        count = len(numbers._fields)
 
-        def called(x: float, y: float, given: Any) -> float:
-            of = (numbers(*given[:count]), x, y)[: arguments + 1]
+        def called(*given: Any) -> float:
+            if self.error is not None:
+                return math.nan
+            of = arguments(*given)
             try:
                 return float(function(*of))
             except BaseException as error:
-                self.error = self.error or (error, of)
+                self.error = error, of
                 return math.nan
 
-        self._called = _C(called)
-        self.why_slow, self._compiled = _compile(function, numbers, arguments, self._called)
-        address = (
-            self._compiled.address if self._compiled else ctypes.cast(self._called, ctypes.c_void_p).value
+        double = ctypes.c_double
+        self._called = ctypes.CFUNCTYPE(double, *[double] * doubles, ctypes.POINTER(double))(called)
+        self.why_slow, self._compiled = _compile(function, doubles, compiled, self._called)
+        self.address = int(
+            self._compiled.address
+            if self._compiled
+            else ctypes.cast(self._called, ctypes.c_void_p).value or 0
         )
-        self.bits: float = struct.unpack("d", struct.pack("Q", address))[0]
 
     def check(self) -> None:
         """Raise the error that the function raised in the core."""
         if self.error is not None:
-            (error, (law, *at)), self.error = self.error, None
-            words = ", ".join(f"{each:g}" for each in at)
-            raise InputError(f"{self.name}({law}, {words}): {type(error).__name__}: {error}") from error
+            (error, of), self.error = self.error, None
+            words = ", ".join(f"{each:g}" if isinstance(each, float) else str(each) for each in of)
+            raise InputError(f"{self.name}({words}): {type(error).__name__}: {error}") from error
 
 
-def _compile(function: Any, numbers: Any, arguments: int, called: Any) -> tuple[str, Any]:
+def _compile(function: Any, doubles: int, compiled: Any, called: Any) -> tuple[str, Any]:
     """The reason why Numba does not compile a function, or the function compiled; where it raises an error it calls *called*."""
     try:
         import numba
     except ImportError:
         return "Numba is not installed; install numba", None
-    from numba.np.unsafe.ndarray import to_fixed_tuple
-
-    count = len(numbers._fields)
-
-    @numba.njit
-    def law(given):
-        return numbers(*to_fixed_tuple(numba.carray(given, count), count))
-
-    def of_x(x, y, given):
-        try:
-            return float(physics(law(given), x))
-        except Exception:
-            return called(x, y, given)
-
-    def of_both(x, y, given):
-        try:
-            return float(physics(law(given), x, y))
-        except Exception:
-            return called(x, y, given)
-
     real = numba.types.float64
     try:
-        physics = numba.njit(function)
-        compiled = numba.cfunc(real(real, real, numba.types.CPointer(real)))(
-            of_x if arguments == 1 else of_both
-        )
+        made = compiled(numba, numba.njit(function), called)
+        return "", numba.cfunc(real(*[real] * doubles, numba.types.CPointer(real)))(made)
     except Exception as error:
         lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]
         reasons = [line for line in lines if line and not line.startswith("Failed in")] or [
             type(error).__name__
         ]
         return f"Numba cannot compile {function.__name__} ({reasons[0]})", None
-    return "", compiled
 
 
-_function = functools.cache(_Function)  # an address stays valid
+@functools.cache  # an address stays valid
+def _function(function: Callable[..., float], numbers: Any, arguments: int) -> Function:
+    """A function of a law's numbers, x and perhaps y."""
+    count = len(numbers._fields)
+
+    def compiled(numba: Any, physics: Any, called: Any) -> Any:
+        from numba.np.unsafe.ndarray import to_fixed_tuple
+
+        @numba.njit
+        def law(given):
+            return numbers(*to_fixed_tuple(numba.carray(given, count), count))
+
+        def of_x(x, y, given):
+            try:
+                return float(physics(law(given), x))
+            except Exception:
+                return called(x, y, given)
+
+        def of_both(x, y, given):
+            try:
+                return float(physics(law(given), x, y))
+            except Exception:
+                return called(x, y, given)
+
+        return of_x if arguments == 1 else of_both
+
+    return Function(
+        f"{numbers.owner.__name__}.{function.__name__}",
+        function,
+        2,
+        lambda x, y, given: (numbers(*given[:count]), x, y)[: arguments + 1],
+        compiled,
+    )
+
+
+def _step_of(a: Any) -> CompletedStep:
+    """A step of the numbers that the core passes, in the order of ``core/api.hpp: Completed``."""
+    return CompletedStep(
+        a[0], a[1], (a[2], a[3]), (a[4], a[5]), (a[6], a[7]), (a[8], a[9]), (a[10], a[11]), a[12] > 0.5
+    )
+
+
+@functools.cache
+def _update(function: Callable[..., float]) -> Function:
+    def compiled(numba: Any, update: Any, called: Any) -> Any:
+        step_of = numba.njit(_step_of)
+
+        def of_step(held, given):
+            try:
+                return float(update(held, step_of(given)))
+            except Exception:
+                return called(held, given)
+
+        return of_step
+
+    name = getattr(function, "__name__", type(function).__name__)
+    return Function(name, function, 1, lambda held, given: (held, _step_of(given)), compiled)
+
+
+def updates_of(statistics: Sequence[Statistic]) -> list[Function]:
+    """The functions that the core calls after every step, of statistics with ``update``."""
+    found = [_update(each.update) for each in statistics if each.update is not None]
+    tell(
+        Diagnostic(
+            "statistic.slow",
+            f"statistic {row.name!r}: the solver calls Python after every step, which is slow: {each.why_slow}",
+        )
+        for row, each in zip(statistics, found, strict=True)
+        if each.why_slow
+    )
+    return found
 
 
 @dataclass(frozen=True)
@@ -110,7 +164,7 @@ class UserLaw:
 
     kind: str
     """Law of the core that calls it."""
-    functions: tuple[_Function, ...]
+    functions: tuple[Function, ...]
     head: tuple[float, ...]
     limited: bool = False
 
@@ -171,5 +225,7 @@ def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, flo
         for each in reasons
     )
     low, high = np.clip(limits, -_FAR, _FAR).tolist()
-    addresses = [0.0 if each is None else each.bits for each in made]
+    addresses = struct.unpack(
+        f"{len(made)}d", struct.pack(f"{len(made)}Q", *(each.address if each else 0 for each in made))
+    )
     return UserLaw(core, functions, (*addresses, low, high, span, float(count)), limited)
