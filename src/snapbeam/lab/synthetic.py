@@ -67,7 +67,7 @@ def _summed(at: NDArray[np.int64], values: Floats, rows: int) -> Floats:
     columns = at.shape[-1]
     place = np.clip(at, 0, rows) * columns + np.arange(columns)
     sums = np.bincount(place.ravel(), values.ravel(), minlength=(rows + 1) * columns)
-    return sums.reshape(rows + 1, columns)[:rows]
+    return np.asarray(sums.reshape(rows + 1, columns)[:rows], dtype=np.float64)
 
 
 def edge_light(rows: Floats, height: int, table: Floats) -> Floats:

@@ -40,6 +40,10 @@ def check_integrable(system: System, engine: str = "auto") -> None:
             f"statistic {updated()[0].name!r}: is updated after every step, which engine = {used!r} does not do; use engine = 'cpu', "
             "or take it out with unregister_statistic"
         )
+    if system.model.damping is not None and used not in ("native", "python"):
+        raise InputError(
+            f"damping: a damping matrix is not integrated by engine = {engine!r}; use engine = 'native'"
+        )
     contacts = system.contacts
     for number, each in enumerate(contacts, 1):
         section, law = section_of("contact", number), each.law
