@@ -45,7 +45,9 @@ def let_go(mass, stiffness, damping, **more) -> sb.System:
 
 def integrated(system: sb.System, **how):
     """Time (s), amplitudes and velocities in the coordinates of the matrices at the end, and the run."""
-    run = sb.simulate(system, sb.Integration(**{"cycles": 4, "accuracy": "reference", "engine": "native"} | how))
+    run = sb.simulate(
+        system, sb.Integration(**{"cycles": 4, "accuracy": "reference", "engine": "native"} | how)
+    )
     end = run.final_state
     return float(run.dataset.time[-1]), np.concatenate((end.amplitude, end.velocity)), run
 

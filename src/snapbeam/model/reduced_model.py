@@ -751,7 +751,10 @@ class ReducedModel(Wells):
             )
         )
         model = cls(**given)
-        _ = model._linear, model.modal_damping  # refuse an unstable equilibrium here rather than at its first use
+        _ = (
+            model._linear,
+            model.modal_damping,
+        )  # refuse an unstable equilibrium here rather than at its first use
         return model
 
     # ------------------------------------------------------------------ shapes
