@@ -867,28 +867,31 @@ class ReducedModel(Wells):
     def modal_damping(self) -> ModalDamping:
         """The damping V^T C V of the linear modes as ratios, and as rows and coefficients of the rest.
 
-        The rest holds what couples modes, and the damping of modes that are rigid or not underdamped.
+        The rest holds what couples modes, and the damping of modes that are rigid or not underdamped; all of it of a
+        few dampers at points, whose rows are fewer.
         """
         if self.damping is None:
             assert self.given_damping_ratio is not None
             return ModalDamping(self.given_damping_ratio, np.zeros((0, self.modes)), np.zeros(0))
         modes, size = self.linear_modes, np.abs(self.linear_modes)
         with np.errstate(over="ignore", invalid="ignore"):
-            rest = np.array(_symmetric(modes.T @ self.damping @ modes))
-        if not np.isfinite(rest).all():
+            matrix = np.array(_symmetric(modes.T @ self.damping @ modes))
+        if not np.isfinite(matrix).all():
             raise InputError(
                 "damping: its rates are beyond what a number holds; are the units of the matrices right?"
             )
-        rest[np.abs(rest) <= _ROUNDINGS * self.modes * _EPSILON * (size.T @ np.abs(self.damping) @ size)] = (
-            0.0
-        )
-        rate = rest.diagonal().copy()
-        alone = (rate >= 0.0) & (rate < 2.0 * self.omega)
-        np.fill_diagonal(rest, np.where(alone, 0.0, rate))
-        coefficients, vectors = np.linalg.eigh(rest)
-        kept = np.abs(coefficients) > self.modes * _EPSILON * np.abs(coefficients).max()
-        ratio = np.where(alone, rate, 0.0) / np.where(alone, 2.0 * self.omega, 1.0)
-        found = ModalDamping(ratio, np.ascontiguousarray(vectors.T[kept]), coefficients[kept])
+        rounding = _ROUNDINGS * self.modes * _EPSILON
+        matrix[np.abs(matrix) <= rounding * (size.T @ np.abs(self.damping) @ size)] = 0.0
+        rate = matrix.diagonal()
+        alone = np.where((rate >= 0.0) & (rate < 2.0 * self.omega), rate, 0.0)
+        splits = []
+        for own in (alone, np.zeros(self.modes)):
+            coefficients, vectors = np.linalg.eigh(matrix - np.diag(own))
+            kept = np.abs(coefficients) > rounding * np.abs(coefficients).max()
+            ratio = own / np.where(own > 0.0, 2.0 * self.omega, 1.0)
+            splits.append(ModalDamping(ratio, np.ascontiguousarray(vectors.T[kept]), coefficients[kept]))
+        by_modes, by_rows = splits
+        found = by_rows if 2 * by_rows.coefficients.size <= by_modes.coefficients.size else by_modes
         for array in found:
             array.setflags(write=False)
         return found

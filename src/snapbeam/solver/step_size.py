@@ -159,10 +159,10 @@ def _with_coupled_damping(
         return step
     n, sigma = structure.omega.size, structure.damping_ratio * structure.omega
     scale = np.where(structure.omega > 0.0, structure.omega, 2.0 * math.pi / period)
-    alone, coupled = np.zeros((2, 2 * n, 2 * n))
-    alone[:n, n:], alone[n:, :n] = np.diag(scale), np.diag(-(structure.omega**2) / scale)
-    alone[n:, n:] = np.diag(-2.0 * sigma)
-    coupled[n:, n:] = -(rows.T * coefficients) @ rows
+    alone = np.zeros((n, 2, 2))
+    alone[:, 0, 1], alone[:, 1, 0], alone[:, 1, 1] = scale, -(structure.omega**2) / scale, -2.0 * sigma
+    matrix = np.block([[np.diag(alone[:, i, j]) for j in (0, 1)] for i in (0, 1)])
+    matrix[n:, n:] -= (rows.T * coefficients) @ rows
     fewest, per_decay = PARTS[order]
 
     def error(h: float) -> float:
@@ -175,8 +175,10 @@ def _with_coupled_damping(
             gain = (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0)))) ** parts - 1.0
             found[n:] += (rows.T * gain) @ (rows @ found[n:])
             if i < composition.flow.size:
-                found = flows[composition.flow[i]] @ found
-        exact = expm(h * (alone + coupled))
+                flow = flows[composition.flow[i]][..., None]
+                q, p = found[:n], found[n:]
+                found = np.concatenate([flow[:, k, 0] * q + flow[:, k, 1] * p for k in (0, 1)])
+        exact = expm(h * matrix)
         return float(
             np.linalg.norm(np.linalg.matrix_power(found, steps) - np.linalg.matrix_power(exact, steps), 2)
         )
