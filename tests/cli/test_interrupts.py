@@ -1,4 +1,4 @@
-"""Ctrl-C, termination and a closed terminal while the program starts, compiles and computes: a sentence and a status."""
+"""Ctrl-C, termination and a closed terminal while the program starts and computes: a sentence and a status."""
 
 from __future__ import annotations
 
@@ -33,9 +33,7 @@ main()
 
 @pytest.mark.slow
 @ALL
-@pytest.mark.parametrize(
-    "name", ["typer", *(pytest.param(name, marks=pytest.mark.slow) for name in LATER), "numba"]
-)
+@pytest.mark.parametrize("name", ["typer", *(pytest.param(name, marks=pytest.mark.slow) for name in LATER)])
 def test_while_modules_are_imported(tmp_path, number, name):
     code = AT_IMPORT.format(name=name, number=int(number))
     done = subprocess.run(
@@ -45,27 +43,6 @@ def test_while_modules_are_imported(tmp_path, number, name):
     assert done.stderr.splitlines()[-1] == SENTENCE
     assert "Traceback" not in done.stderr
     assert os.listdir(tmp_path) == []
-
-
-@pytest.mark.slow
-@ALL
-def test_while_a_kernel_is_compiled(tmp_path, number):
-    """The main thread is in the compiler for seconds; the program does not wait for it."""
-    command = ["map", "--modes", "3", "--cycles", "2", "-o", "map.nc"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "snapbeam", *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
-        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")},
-    )  # fmt: skip
-    line = process.stderr.readline()
-    while line and not line.startswith("compiling"):
-        line = process.stderr.readline()
-    assert line
-    process.send_signal(number)
-    _, messages = process.communicate(timeout=600)
-    assert process.returncode == 128 + number
-    assert messages.splitlines()[-1] == SENTENCE and "Traceback" not in messages
-    assert " of " not in messages  # no point was computed
-    assert not (tmp_path / "map.nc").exists()
 
 
 @pytest.mark.slow

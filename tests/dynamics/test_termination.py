@@ -153,7 +153,6 @@ def test_the_orbit_advice_is_not_the_default() -> None:
         sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03), [0.5, 0.5], iterations=1)
     assert "reference" not in str(error.value)
     with pytest.raises(sb.dynamics.OrbitNotFoundError, match="or use accuracy = 'reference'"):
-
         sb.dynamics.periodic_orbit(
             system_of(1, 1.6, 0.03), [0.5, 0.5], iterations=1, integration=sb.Integration(accuracy="standard")
         )

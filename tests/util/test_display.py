@@ -5,18 +5,15 @@ from __future__ import annotations
 import logging
 import time
 
-import numpy as np
 import pytest
-from numba.core import event
 from rich.console import Console
 
 import snapbeam as sb
 from snapbeam.cli import console
 from snapbeam.model import default_values
-from snapbeam.util import work_rate
 from snapbeam.util.compilation_notice import announce_compilation
 from snapbeam.util.diagnostics import counting, sharing
-from snapbeam.util.work_rate import WorkRate, compile_seconds
+from snapbeam.util.work_rate import WorkRate
 
 
 @pytest.fixture(scope="module")
@@ -131,33 +128,10 @@ def test_compilation_is_announced(monkeypatch, capsys):
     assert capsys.readouterr().err == "compiling a kernel, once on this machine\n"
 
 
-def test_estimates_leave_out_compilation(monkeypatch, capsys):
-    """A compilation in the middle of the work does not lengthen the remaining time."""
-    now = [100.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(work_rate, "compile_seconds", lambda: max(0.0, min(now[0] - 102.0, 30.0)))
-    report, lines = counting(True, "map"), console._Lines(Console(stderr=True), None, "points")
-    for seconds, done in ((0.0, 0), (34.0, 40)):
-        now[0] = 100.0 + seconds
-        report(done, 100)
-        lines(done, 100)
-    told = capsys.readouterr().err
-    assert "40 of 100 points, 6 s left" in told  # 4 s of work for 40 points
-    assert "40 of 100 points, 10 points/s, 6.0 s left" in told
-
-
-def test_seconds_of_compilation():
-    before = compile_seconds()
-    with event.trigger_event("numba:compile"):
-        assert np.isfinite(compile_seconds())
-    assert compile_seconds() > before
-
-
 def test_rate_of_the_later_half(monkeypatch):
-    """A delay in the first half of the work, as of a compilation in a worker, is left out after it."""
+    """A delay in the first half of the work, as at the start of a worker, is left out after it."""
     now = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(work_rate, "compile_seconds", lambda: 0.0)
     rate = WorkRate()
     for seconds, done in ((0.0, 10), (40.0, 20), (41.0, 30), (42.0, 40)):
         now[0] = seconds

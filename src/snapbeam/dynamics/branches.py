@@ -345,9 +345,7 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
         return None  # what seems to change its sign jumps, as where an impact passes the phase of observation
     # a derivative that is off moves the place at which a multiplier seems to pass, and so does an orbit off its own
     off += _ACROSS * _unsettled(corrector, best) / float(np.linalg.norm(other.y - one.y))
-    off += _derivative_error(corrector.family.flow) * abs(
-        1.0 / (_test(other, kind) - _test(one, kind))
-    )
+    off += _derivative_error(corrector.family.flow) * abs(1.0 / (_test(other, kind) - _test(one, kind)))
     found = float(best.y[-1]) * corrector.span
     error = _moved(corrector, (one, best, other), part, off) + corrector.span * _unsettled(corrector, best)
     return SpecialPoint(kind, orbit, found, at, error)

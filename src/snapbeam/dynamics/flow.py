@@ -891,7 +891,8 @@ def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tup
     known = [float(rate) for rate in np.ravel(np.asarray(rates, dtype=np.float64))]
     if isinstance(flow, Stroboscope):
         model = flow.system.model
-        known.append(float(np.min(model.damping_ratio * model.omega)))
+        rates = model.damping_ratio * model.omega if model.damping is None else -flow.system.poles().real
+        known.append(float(np.min(rates)))
     if not known:
         return least, f"{least} periods"
     slowest = min(known)

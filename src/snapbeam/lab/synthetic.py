@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -25,7 +24,6 @@ from snapbeam.lab.signals import make_signal
 from snapbeam.lab.tracking.edges import Floats, edge_profile
 from snapbeam.lab.tracking.settings import SIDES, Orientation
 from snapbeam.simulation.dataset import check_trajectory, trajectory_dataset
-from snapbeam.solver.compilation import keep_code
 from snapbeam.util.packages import needing
 from snapbeam.util.validation import (
     InputError,
@@ -50,6 +48,7 @@ TABLE_ENTRIES_PER_PIXEL = 256  # table entries per pixel
 CELLS_PER_PIXEL = 4  # cells to a pixel, each way
 FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frames", "hidden_frames")
 _FINE = 8  # rows of light drawn for a row of pixels
+_BLOCK = 200_000  # numbers of edges that are drawn together
 
 
 def step_table(blur: float) -> NDArray[np.float64]:
@@ -63,61 +62,32 @@ def step_table(blur: float) -> NDArray[np.float64]:
     return edge_profile(offsets, blur) - edge_profile(offsets - 1.0, blur)
 
 
-@numba.njit
-def _add_edge(
-    steps: NDArray, column: int, row: float, height: float, table: NDArray
-) -> None:  # pragma: no cover
+def _summed(at: NDArray[np.int64], values: Floats, rows: int) -> Floats:
+    """Sums of *values* (..., columns) by the rows *at*, shape (rows, columns): those above in row 0, those below left out."""
+    columns = at.shape[-1]
+    place = np.clip(at, 0, rows) * columns + np.arange(columns)
+    sums = np.bincount(place.ravel(), values.ravel(), minlength=(rows + 1) * columns)
+    return np.asarray(sums.reshape(rows + 1, columns)[:rows], dtype=np.float64)
+
+
+def edge_light(rows: Floats, height: int, table: Floats) -> Floats:
+    """Change of light by row, shape (height, columns), of edges at *rows* (instants, columns), of size 1 together."""
     reach = (table.size - 1) // (2 * TABLE_ENTRIES_PER_PIXEL)
-    first = int(np.floor(row)) - reach + 1
-    for r in range(first, first + 2 * reach):
-        if r >= steps.shape[0]:
-            break
-        at = (r - row + reach) * TABLE_ENTRIES_PER_PIXEL
-        i = int(at)
-        if 0 <= i < table.size - 1:
-            share = at - i
-            value = height * (table[i] * (1.0 - share) + table[i + 1] * share)
-            steps[max(r, 0), column] += value
-
-
-@numba.njit
-def _expose(
-    steps: NDArray,
-    beam: NDArray,
-    tip: NDArray,
-    slope: NDArray,
-    thickness: float,
-    profile: NDArray,
-    cover: NDArray,
-    marker: tuple[float, float],
-    contrast: tuple[float, float, float],
-    table: NDArray,
-) -> None:  # pragma: no cover
-    """Add the edges of all instants of one exposure to *steps* (rows, columns), the change of light by row.
-
-    ``beam`` and ``tip`` are rows of the beam's far edge and of the tip at the contact at each instant;
-    ``slope`` the beam's drop at each column, ``profile`` the tip's, ``cover`` how much of a column the
-    shaker covers; ``marker`` where a sticker begins and ends behind the tip, ``contrast`` the steps of
-    light at the beam's, the shaker's and the sticker's edges.
-    """
-    weight = 1.0 / beam.size
-    marker_from, marker_to = marker
-    beam_step, shaker_step, marker_step = contrast
-    for n in range(beam.size):
-        for x in range(steps.shape[1]):
-            far = beam[n] + slope[x]
-            near = far + thickness
-            _add_edge(steps, x, far, weight * beam_step, table)
-            _add_edge(steps, x, near, -weight * beam_step, table)
-            if cover[x] > 0.0:
-                edge = max(tip[n] + profile[x], near)
-                _add_edge(steps, x, edge, weight * cover[x] * shaker_step, table)
-                if marker_step != 0.0:
-                    _add_edge(steps, x, tip[n] + marker_from, weight * cover[x] * marker_step, table)
-                    _add_edge(steps, x, tip[n] + marker_to, -weight * cover[x] * marker_step, table)
-
-
-expose = keep_code(_expose, numba.__version__)
+    offsets = np.arange(1, 2 * reach + 1)[:, None, None]
+    ended = np.append(table, 0.0)  # nothing from the last entry on
+    ended[table.size - 1] = 0.0
+    slopes = np.diff(np.append(table, table[-1]), append=0.0)
+    slopes[table.size - 1] = 0.0
+    total = np.zeros((height, rows.shape[1]))
+    together = max(1, _BLOCK // (offsets.size * rows.shape[1]))
+    for begin in range(0, len(rows), together):
+        own = rows[begin : begin + together]
+        first = np.floor(own)
+        at = (offsets - (own - first)) * TABLE_ENTRIES_PER_PIXEL
+        entry = at.astype(np.int64)
+        values = ended[entry] + slopes[entry] * (at - entry)
+        total += _summed(first.astype(np.int64) + (offsets - reach), values, height)
+    return total / len(rows)
 
 
 @dataclass(frozen=True)
@@ -272,19 +242,21 @@ class GaussianPicture:
         stage, thickness = shape.stage, shape.thickness
         steps = np.zeros((shape.height, shape.width))
         steps[0] = stage.background
-        sticker = stage.marker - stage.shaker if stage.marker_thickness > 0.0 else 0.0
-        expose(
-            steps,
-            beam - 0.5 * thickness,
-            tip + 0.5 * thickness,
-            self.slope,
-            thickness,
-            self.profile,
-            self.cover,
-            shape.marker,
-            (stage.beam - stage.background, stage.shaker - stage.background, sticker),
-            self.tables[blurred],
+        table = self.tables[blurred]
+        across = self.slope if stage.slope else self.slope[:1]  # a level edge is the same in all columns
+        far, top = beam[:, None] - 0.5 * thickness + across, tip[:, None] + 0.5 * thickness
+        near = far + thickness
+        steps += (stage.beam - stage.background) * (
+            edge_light(far, shape.height, table) - edge_light(near, shape.height, table)
         )
+        seen = np.flatnonzero(self.cover)
+        if seen.size:
+            apex = np.maximum(top + self.profile[seen], near[:, seen] if stage.slope else near)
+            change = (stage.shaker - stage.background) * edge_light(apex, shape.height, table)
+            if stage.marker_thickness > 0.0:
+                upper, lower = (edge_light(top + border, shape.height, table) for border in shape.marker)
+                change += (stage.marker - stage.shaker) * (upper - lower)
+            steps[:, seen] += self.cover[seen] * change
         return np.asarray(np.cumsum(steps, axis=0), dtype=np.float32)
 
 
@@ -293,54 +265,13 @@ class GaussianPicture:
 # of error functions, so a tracker that fits them is not tested against itself.
 
 
-@numba.njit
-def _add(cover: NDArray, column: int, row: float, weight: float) -> None:  # pragma: no cover
-    """Add to the change of coverage by cell: everything below *row* (cells, 0 at the upper border)."""
-    if row <= 0.0:
-        cover[0, column] += weight
-        return
-    k = int(np.floor(row))
-    if k >= cover.shape[0]:
-        return
-    share = k + 1.0 - row
-    cover[k, column] += weight * share
-    if k + 1 < cover.shape[0]:
-        cover[k + 1, column] += weight * (1.0 - share)
-
-
-@numba.njit
-def _cover(
-    light: NDArray,
-    shaker: NDArray,
-    beam: NDArray,
-    tip: NDArray,
-    slope: NDArray,
-    profile: NDArray,
-    rod: NDArray,
-    sizes: NDArray,
-    levels: NDArray,
-) -> None:  # pragma: no cover
-    """Add the light of the beam at all instants, as changes by cell, to *light*, that of the rest to *shaker*.
-
-    ``sizes`` are the beam's thickness and the sticker's upper and lower border from the tip, ``levels`` the
-    steps of light at beam, shaker and sticker; ``rod`` the share of a column that the shaker covers.
-    """
-    weight = 1.0 / beam.size
-    for n in range(beam.size):
-        for x in range(light.shape[1]):
-            far = beam[n] + slope[x]
-            near = far + sizes[0]
-            _add(light, x, far, weight * levels[0])
-            _add(light, x, near, -weight * levels[0])
-            if rod[x] > 0.0:
-                part = weight * rod[x]
-                _add(shaker, x, max(tip[n] + profile[x], near), part * levels[1])
-                if levels[2] != 0.0:
-                    _add(shaker, x, max(tip[n] + sizes[1], near), part * levels[2])
-                    _add(shaker, x, max(tip[n] + sizes[2], near), -part * levels[2])
-
-
-keep_code(_cover, numba.__version__)
+def covered(rows: Floats, height: int) -> Floats:
+    """Change of coverage by cell, shape (height, columns), by what lies below *rows* (instants, columns; cells from the top)."""
+    inside = np.maximum(rows, 0.0)
+    first = np.floor(inside)
+    share = first + 1.0 - inside
+    at = first.astype(np.int64)
+    return (_summed(at, share, height) + _summed(at + 1, 1.0 - share, height)) / len(rows)
 
 
 def disk_kernel(radius: float) -> NDArray[np.float32]:
@@ -392,14 +323,27 @@ class AreaPicture:
         shape, margin = self.outline, self.margin
         stage = shape.stage
         rows = (shape.height + 2 * margin) * CELLS_PER_PIXEL
-        light, rod = np.zeros((rows, self.slope.size)), np.zeros((rows, self.slope.size))
         # row r of a pixel's centre is the cell border (r + 1/2 + margin) FINE
         far = (beam - 0.5 * shape.thickness + 0.5 + margin) * CELLS_PER_PIXEL
         top = (tip + 0.5 * shape.thickness + 0.5 + margin) * CELLS_PER_PIXEL
-        sizes = np.array([shape.thickness, *shape.marker]) * CELLS_PER_PIXEL
-        marker = stage.marker - stage.shaker if stage.marker_thickness > 0.0 else 0.0
-        levels = np.array([stage.beam - stage.background, stage.shaker - stage.background, marker])
-        _cover(light, rod, far, top, self.slope, self.profile, self.rod, sizes, levels)
+        thickness, upper, lower = (size * CELLS_PER_PIXEL for size in (shape.thickness, *shape.marker))
+        beam_rows = far[:, None] + self.slope
+        light = (stage.beam - stage.background) * (
+            covered(beam_rows, rows) - covered(beam_rows + thickness, rows)
+        )
+        rod = np.zeros_like(light)
+        seen = np.flatnonzero(self.rod)
+        if seen.size:
+            near, tips = beam_rows[:, seen] + thickness, top[:, None]
+            change = (stage.shaker - stage.background) * covered(
+                np.maximum(tips + self.profile[seen], near), rows
+            )
+            if stage.marker_thickness > 0.0:
+                change += (stage.marker - stage.shaker) * (
+                    covered(np.maximum(tips + upper, near), rows)
+                    - covered(np.maximum(tips + lower, near), rows)
+                )
+            rod[:, seen] = self.rod[seen] * change
         layers = [np.cumsum(layer, axis=0).astype(np.float32) for layer in (light, rod)]
         if self.grain is not None:  # which moves with what it is on
             for layer, rows_of in zip(layers, (far, top), strict=True):

@@ -15,7 +15,7 @@ from snapbeam.model.equilibria import landscape_of
 from snapbeam.model.matrix_pairs import eigenpairs, fixed_coordinates, is_positive_definite, symmetric
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.singular_values import svd
-from snapbeam.util.validation import InputError, finite_array, integer, nonnegative, positive, within
+from snapbeam.util.validation import InputError, finite_array, integer, nonnegative, positive, shown, within
 
 MAX_MODES = 256
 """Largest number of modes offered; the closed forms themselves know no limit."""
@@ -330,8 +330,9 @@ class StructureMatrices:
     nonlinear_stiffness: float
     well_amplitude: ArrayLike | None
     length_scale: float
-    damping_ratio: ArrayLike
+    damping_ratio: ArrayLike | None
     reference_frequency: float | None
+    damping: ArrayLike | None = None
     transverse_force: ArrayLike | None = None
     base_shape: ArrayLike | None = None
     elongation_matrix: ArrayLike | None = None
@@ -382,7 +383,17 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
             "well_amplitude with transverse_force: leave it out, the equilibria follow from the force"
         )
 
-    damping = finite_array("damping_ratio", given.damping_ratio)
+    ratio, damping = None, None
+    if given.damping is None:
+        ratio = finite_array("damping_ratio", 0.0 if given.damping_ratio is None else given.damping_ratio)
+    elif given.damping_ratio is not None:
+        raise InputError(
+            f"damping with damping_ratio = {shown(given.damping_ratio)}: must be one of the two; leave one out"
+        )
+    else:
+        damping = _matrix("damping", given.damping)
+        _require_shape("damping", damping, (count, count), "as large as the mass matrix")
+        damping = symmetric("damping", damping)
     fixed = fixed_coordinates(stiffness, mass)
     if fixed.any():
         _tell_fixed(fixed, stiffness)
@@ -391,8 +402,9 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         mass = mass[free][:, free]
         stiffness = stiffness[free] if stiffness.ndim == 1 else stiffness[free][:, free]
         elongation = None if elongation is None else elongation[free][:, free]
-        if damping.shape == (count,):
-            damping = damping[: free.size]  # the others are those of the fixed coordinates
+        damping = None if damping is None else damping[free][:, free]
+        if ratio is not None and ratio.shape == (count,):
+            ratio = ratio[: free.size]  # the others are those of the fixed coordinates
         count = free.size
     _require_mass(mass)
     if given.modes is not None:
@@ -412,9 +424,12 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         rows = {name: None if row is None else basis.T @ row for name, row in rows.items()}
         if gamma > 0.0:
             elongation = basis.T @ (basis if elongation is None else elongation @ basis)
+        damping = None if damping is None else basis.T @ (damping @ basis)
         mass, count = np.eye(modes), modes
     if elongation is not None:
         elongation = _stretching(_dense(elongation))
+    if damping is not None:
+        damping = _losing(_dense(damping))
     contact_shape, force = rows["contact_shape"], rows["transverse_force"]
     assert contact_shape is not None
     midspan_shape = contact_shape.copy() if rows["midspan_shape"] is None else rows["midspan_shape"]
@@ -430,7 +445,8 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         "well_amplitude": equilibrium,
         "transverse_force": force,
         "length_scale": positive("length_scale", given.length_scale, "m"),
-        "damping_ratio": damping_ratios(damping, count),
+        "given_damping_ratio": None if ratio is None else damping_ratios(ratio, count),
+        "damping": damping,
         "midspan_shape": midspan_shape,
         "contact_shape": contact_shape,
         "base_shape": rows["base_shape"],
@@ -540,6 +556,15 @@ def _stretching(matrix: _Array) -> _Array:
             "than 0; give the geometric stiffness matrix of a unit tension"
         )
     return matrix
+
+
+def _losing(matrix: _Array) -> _Array:
+    eigenvalue = np.linalg.eigvalsh(matrix)
+    if eigenvalue[0] < -1e-12 * max(float(eigenvalue[-1]), 0.0):
+        raise InputError(
+            f"damping: its lowest eigenvalue is {eigenvalue[0]:g}; must be at least 0, so that no motion gains energy"
+        )
+    return np.asarray(0.5 * matrix + 0.5 * matrix.T)
 
 
 def _equilibrium(

@@ -26,7 +26,7 @@ from snapbeam.util.validation import InputError, InputTypeError, mapping, shown
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude", "length_scale",
 )  # fmt: skip
-_OPTIONAL = ("base_shape", "elongation_matrix", "patch_shape")
+_OPTIONAL = ("base_shape", "elongation_matrix", "patch_shape", "damping")
 _START = (
     "amplitude",
     "velocity",
@@ -46,8 +46,6 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
     start: State | None = system.initial_state
     sections: dict[str, dict[str, Any]] = {}
     section: dict[str, Any] = {}
-    damping = model.damping_ratio
-    uniform = bool(np.all(damping == damping[0]))
     if model.beam is not None:
         beam = model.beam
         derived = {"buckling_level", "axial_load"} - {beam.given}
@@ -65,7 +63,9 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
             section.pop("well_amplitude")  # follows from the force
             section["transverse_force"] = model.transverse_force
         section |= {name: getattr(model, name) for name in _OPTIONAL if getattr(model, name) is not None}
-    section["damping_ratio"] = float(damping[0]) if uniform else np.array(damping)
+    if model.damping is None:
+        ratio = model.damping_ratio
+        section["damping_ratio"] = float(ratio[0]) if np.all(ratio == ratio[0]) else np.array(ratio)
     if model.given_reference_frequency is not None:
         section["reference_frequency"] = model.given_reference_frequency
     sections["model"] = section
@@ -498,8 +498,12 @@ def _model_replacing(
     if model.beam is None:
         if beam is not None or of_beam:
             raise InputError("beam: this model was given by matrices, it has no beam")
+        if model.damping is not None and "damping_ratio" in of_model:
+            raise InputError(
+                f"model.damping_ratio = {shown(of_model['damping_ratio'])}: cannot be changed, the model has a damping matrix"
+            )
         given = {
-            "damping_ratio": of_model.get("damping_ratio", model.damping_ratio),
+            "damping_ratio": of_model.get("damping_ratio", model.given_damping_ratio),
             "reference_frequency": of_model.get("reference_frequency", model.given_reference_frequency),
         }
         names = (

@@ -198,6 +198,17 @@ def _read_only(omega: _Array, vectors: _Array, parity: NDArray[np.int_]) -> Line
     return modes
 
 
+class ModalDamping(NamedTuple):
+    """Damping of the linear modes, 2 zeta omega on the diagonal and sum_k c_k u_k u_k^T; read-only."""
+
+    ratio: _Array
+    """zeta, each in [0, 1), shape (N,)."""
+    rows: _Array
+    """u_k, shape (K, N)."""
+    coefficients: _Array
+    """c_k of either sign, 1/s, shape (K,)."""
+
+
 # ----------------------------------------------------------------------------------------------------
 # The wells of a reduced model: where they are, what is between them, and which of them counts.
 
@@ -490,6 +501,8 @@ MODEL_QUANTITIES: dict[str, tuple[ParameterField, Any]] = {
 }  # fmt: skip
 """Parameters of a reduction in addition to the beam, with their defaults."""
 
+_EPSILON, _ROUNDINGS = float(np.finfo(float).eps), 64
+"""Rounding of a damping matrix in modal coordinates, over its terms and the number of modes."""
 _LEAST_COMPLIANCE = 1e-300
 """1/kg, below which the inverse is no number."""
 
@@ -519,6 +532,8 @@ class ReducedModel(Wells):
         the height of the centre in the well of minimum energy; None for a straight beam.
     beam : Beam or None
         Beam from which the model was reduced.
+    damping : array of shape (N, N) or None
+        Damping matrix C, N s/m, if it was given; *given_damping_ratio* are the damping ratios if they were.
     given_reference_frequency : float or None
         Frequency to normalise with, Hz, if it is not the first natural frequency.
     imperfection : Imperfection or None
@@ -540,9 +555,10 @@ class ReducedModel(Wells):
     nonlinear_stiffness: float
     well_amplitude: _Array
     length_scale: float | None
-    damping_ratio: _Array
     midspan_shape: _Array
     contact_shape: _Array | None = None
+    given_damping_ratio: _Array | None = None
+    damping: _Array | None = None
     beam: Beam | None = None
     given_reference_frequency: float | None = None
     transverse_force: _Array | None = None
@@ -632,7 +648,7 @@ class ReducedModel(Wells):
             nonlinear_stiffness=gamma,
             well_amplitude=equilibrium,
             length_scale=length_scale,
-            damping_ratio=damping_ratios(damping_ratio, count),
+            given_damping_ratio=damping_ratios(damping_ratio, count),
             midspan_shape=shapes.shape(0.5 * beam.length),
             beam=beam,
             given_reference_frequency=None
@@ -653,7 +669,8 @@ class ReducedModel(Wells):
         nonlinear_stiffness: float = 0.0,
         well_amplitude: ArrayLike | None = None,
         length_scale: float = 1.0,
-        damping_ratio: ArrayLike = 0.0,
+        damping_ratio: ArrayLike | None = None,
+        damping: ArrayLike | None = None,
         reference_frequency: float | None = None,
         transverse_force: ArrayLike | None = None,
         base_shape: ArrayLike | None = None,
@@ -684,7 +701,11 @@ class ReducedModel(Wells):
         length_scale : float
             Length that normalises displacements, m.
         damping_ratio : float or array of shape (N,)
-            Damping ratio of each linear mode about the equilibrium, each in [0, 1).
+            Damping ratio of each linear mode about the equilibrium, each in [0, 1); 0 by default.
+        damping : array of shape (N, N), optional
+            Damping matrix C in place of *damping_ratio*, N s/m: adds C alpha' to the left side, about both wells.  Symmetric,
+            without negative eigenvalues; an array or a sparse matrix of SciPy.  It may couple the linear modes, make
+            some of them overdamped, and damp rigid ones.
         reference_frequency : float, optional
             Frequency that normalises the excitation, Hz; needed if the first natural frequency is 0.
         transverse_force : array of shape (N,), optional
@@ -706,8 +727,8 @@ class ReducedModel(Wells):
         Raises
         ------
         InputError
-            For matrices of the wrong shape, not symmetric or not positive definite, values that are not
-            finite or out of range, or an equilibrium that is none or is unstable; if rounding hides whether a natural
+            For matrices of the wrong shape, not symmetric or not positive definite, a damping matrix with a negative
+            eigenvalue or beside *damping_ratio*, values that are not finite or out of range, or an equilibrium that is none or is unstable; if rounding hides whether a natural
             frequency is 0.
         """
         given = checked_structure(
@@ -720,6 +741,7 @@ class ReducedModel(Wells):
                 well_amplitude=well_amplitude,
                 length_scale=length_scale,
                 damping_ratio=damping_ratio,
+                damping=damping,
                 reference_frequency=reference_frequency,
                 transverse_force=transverse_force,
                 base_shape=base_shape,
@@ -729,7 +751,10 @@ class ReducedModel(Wells):
             )
         )
         model = cls(**given)
-        _ = model._linear  # refuses an unstable equilibrium here rather than at its first use
+        _ = (
+            model._linear,
+            model.modal_damping,
+        )  # refuse an unstable equilibrium here rather than at its first use
         return model
 
     # ------------------------------------------------------------------ shapes
@@ -839,8 +864,58 @@ class ReducedModel(Wells):
         return alpha if self.elongation_matrix is None else self.elongation_matrix @ alpha
 
     @cached_property
+    def modal_damping(self) -> ModalDamping:
+        """The damping V^T C V of the linear modes as ratios, and as rows and coefficients of the rest.
+
+        The rest holds what couples modes, and the damping of modes that are rigid or not underdamped; all of it of a
+        few dampers at points, whose rows are fewer.
+        """
+        if self.damping is None:
+            assert self.given_damping_ratio is not None
+            return ModalDamping(self.given_damping_ratio, np.zeros((0, self.modes)), np.zeros(0))
+        modes, size = self.linear_modes, np.abs(self.linear_modes)
+        with np.errstate(over="ignore", invalid="ignore"):
+            matrix = np.array(_symmetric(modes.T @ self.damping @ modes))
+        if not np.isfinite(matrix).all():
+            raise InputError(
+                "damping: its rates are beyond what a number holds; are the units of the matrices right?"
+            )
+        rounding = _ROUNDINGS * self.modes * _EPSILON
+        matrix[np.abs(matrix) <= rounding * (size.T @ np.abs(self.damping) @ size)] = 0.0
+        rate = matrix.diagonal()
+        alone = np.where((rate >= 0.0) & (rate < 2.0 * self.omega), rate, 0.0)
+        splits = []
+        for own in (alone, np.zeros(self.modes)):
+            coefficients, vectors = np.linalg.eigh(matrix - np.diag(own))
+            kept = np.abs(coefficients) > rounding * np.abs(coefficients).max()
+            ratio = own / np.where(own > 0.0, 2.0 * self.omega, 1.0)
+            splits.append(ModalDamping(ratio, np.ascontiguousarray(vectors.T[kept]), coefficients[kept]))
+        by_modes, by_rows = splits
+        found = by_rows if 2 * by_rows.coefficients.size <= by_modes.coefficients.size else by_modes
+        for array in found:
+            array.setflags(write=False)
+        return found
+
+    @cached_property
+    def damping_ratio(self) -> _Array:
+        """Damping ratio of each linear mode, shape (N,).
+
+        Of a damping matrix C it is (V^T C V)_ii/(2 omega_i), without what couples the modes, and 0 of a rigid mode; the
+        modes of the damped structure follow from :meth:`~snapbeam.System.poles`.
+        """
+        if self.damping is None:
+            return self.modal_damping.ratio
+        rate = np.sum(self.linear_modes * (self.damping @ self.linear_modes), axis=0)
+        moving = self.omega > 0.0
+        ratio: _Array = np.where(moving, rate, 0.0) / np.where(moving, 2.0 * self.omega, 1.0)
+        ratio.setflags(write=False)
+        return ratio
+
+    @cached_property
     def damping_matrix(self) -> _Array:
-        """C = m V diag(2 zeta omega) V^T m, the same about both wells, shape (N, N)."""
+        """C, as given or m V diag(2 zeta omega) V^T m, the same about both wells, shape (N, N)."""
+        if self.damping is not None:
+            return self.damping
         mv = self.mass @ self.linear_modes
         return _symmetric((mv * (2.0 * self.damping_ratio * self.omega)) @ mv.T)
 

@@ -87,6 +87,8 @@ class Channels:
     laws: NDArray[np.int32]
     """Shape (channels,): contacts first, the first striker's before the others."""
     contacts: int
+    circuits: int
+    """Channels of circuits, which are last."""
     uses: _Array
     """Factor of each signal in each channel, shape (channels, signals)."""
     signals: _Array
@@ -212,7 +214,7 @@ class _Builder:
         self.pieces.append(tables.reshape(-1, 7))
         return self.add_signal(section, 1, numbers)
 
-    def built(self, contacts: int) -> Channels:
+    def built(self, contacts: int, circuits: int) -> Channels:
         """Everything as arrays."""
         most = max((each.shape[1] for each in self.numbers), default=0)
         padded = [np.pad(each, ((0, 0), (0, most - each.shape[1]))) for each in self.numbers]
@@ -221,7 +223,7 @@ class _Builder:
         signals = np.stack(self.signals, axis=1) if self.signals else np.zeros((self.runs, 0, len(SIGNAL)))
         jumps = np.stack(list(self.jumps.values()), axis=1) if self.jumps else np.zeros((self.runs, 0))
         return Channels(
-            np.array(self.laws, np.int32), contacts, uses.reshape(len(self.laws), len(self.sections)), signals,
+            np.array(self.laws, np.int32), contacts, circuits, uses.reshape(len(self.laws), len(self.sections)), signals,
             np.array(self.kinds, np.int32), np.array(self.windows, np.int32),
             np.concatenate(self.pieces) if self.pieces else np.zeros((0, 7)), jumps,
             np.stack(padded, axis=1) if self.laws else np.zeros((self.runs, 0, 0)),
@@ -278,6 +280,8 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         built.add(BASE, structure.base_load, 0, 0.0, {"base_excitation": up})
     if system.axial_load is not None:
         built.add(AXIAL_LOAD, np.zeros(structure.omega.size), 0, 0.0, {"axial_load": 1.0})
+    for row, coefficient in zip(structure.damping_rows, structure.damping_coefficients, strict=True):
+        built.add(LINEAR_DAMPING, row, 0, 0.0, {}, [coefficient])
     starts = structure.circuits_of(ensemble.starts[:, 0]).reshape(len(ensemble.starts), -1)
     for circuit, coupling, state in zip(structure.circuits, ensemble.circuits, starts.T, strict=False):
         if circuit.mode is None:
@@ -286,7 +290,7 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
             built.add(CIRCUIT, circuit.row, 0, 0.0, {}, [coupling.rate, 0.0, state[table["start_row"]]])
     observed = np.array([structure.row_of_beam(row) for row in ensemble.contact_rows])
     built.place(observed, table["contact_row"], table["rest_contact"])
-    return built.built(len(system.contacts))
+    return built.built(len(system.contacts), len(structure.circuits))
 
 
 def _cancelled(structure: Structure, rows: _Array) -> _Array:

@@ -15,7 +15,6 @@ from snapbeam import _core
 from snapbeam.solver.channels import (
     AXIAL_LOAD,
     BASE,
-    CIRCUIT,
     EXTERNAL_FORCE,
     LINEAR_DAMPING,
     STEEP,
@@ -37,7 +36,7 @@ from snapbeam.solver.statistics import (
     empty_accumulators,
     updated,
 )
-from snapbeam.solver.step_size import TRIED, barrier_of
+from snapbeam.solver.step_size import PARTS, TRIED, barrier_of
 from snapbeam.solver.user_laws import updates_of
 from snapbeam.util.status_codes import RunStatus
 
@@ -77,8 +76,6 @@ FEW_MODES = 16
 _MOST_TICKS = 2.0**52
 _FINER = 16
 """Halvings of a tick, at most: events lie on ticks."""
-_PARTS = {4: (4, 8.0), 6: (4, 16.0)}
-"""Parts of a kick, at least, and over the time in which damping stops a motion, by the order of the composition."""
 _STEEP = 7
 """Further halvings of the shortest step where a force grows without bound."""
 _SAMPLES, _IMPACTS, _BUDGET = 20_000, 4096, 200_000
@@ -114,7 +111,7 @@ class _Arrays:
         if np.isin(channels.laws, STEEP).any() or any(each.limited for each in channels.of_user):
             halvings += _STEEP  # near a magnet or an electrode
         lossy = bool(np.isin(channels.laws, _core.LOSSY).any())
-        fewest, per_decay = _PARTS[ensemble.order]
+        fewest, per_decay = PARTS[ensemble.order]
         wells = structure.unequal_wells
         has_two = structure.stretch > 0.0
         high = structure.high_modes(ensemble.high_omega)
@@ -123,7 +120,7 @@ class _Arrays:
             return np.ascontiguousarray(np.asarray(values, dtype=float)[..., self.order])
 
         self.row = row
-        self.circuits = np.flatnonzero(np.isin(channels.laws, (CIRCUIT, LINEAR_DAMPING)))
+        self.circuits = np.arange(channels.laws.size)[channels.laws.size - channels.circuits :]
         """Channels of the circuits."""
         self.problem = {
             "omega": row(structure.omega),
@@ -263,7 +260,11 @@ class _Arrays:
         works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")
         found["gross_work"] = of_channels[:, :, works[1]].sum(axis=1)
         for j, law in enumerate(channels.laws.tolist()):
-            if j >= channels.contacts and j not in self.circuits:
+            if j < channels.contacts or j in self.circuits:
+                continue
+            if law == LINEAR_DAMPING:  # of the structure
+                found["dissipated"] += self.batch["account"] * of_channels[:, j, works[2]]
+            else:
                 found[_work_of(law)] += of_channels[:, j, works[0]] - of_channels[:, j, works[2]]
         if self.batch["account"]:
             found["dissipated"] += found["lost"]
@@ -392,7 +393,10 @@ def _recorded(
     )
     found[:, len(SAMPLED) :] = own[:, arrays.circuits, 4]
     for j, law in enumerate(channels.laws[channels.contacts :].tolist()):
-        if law in (CIRCUIT, LINEAR_DAMPING):
+        if channels.contacts + j in arrays.circuits:
+            continue
+        if law == LINEAR_DAMPING:
+            found[:, SAMPLED.index("dissipated")] += others[:, j, 4]
             continue
         found[:, SAMPLED.index(_work_of(law))] += others[:, j, 3] - others[:, j, 4]
     table = recorder["impacts"][:impacts]

@@ -2,10 +2,10 @@
 
 In the linear modes q about the first well (section Damping there), with everything that a system may have:
 
-    q'' + 2 zeta omega q' + omega^2 q + gamma [(q.Gq) g + (2 g.q + q.Gq) G q]
+    q'' + 2 zeta omega q' + R q' + omega^2 q + gamma [(q.Gq) g + (2 g.q + q.Gq) G q]
         = P_1(t) (g + G q) + y''(t) b + sum_j r_j f_j + sum_k h_k F_k(t) + sum_k l_k F_k(u_k, u_k') + sum_k t_k z_k
 
-P_1 is the change of the axial load and y the motion of the base; r_j, h_k, l_k and t_k are the rows of contacts, external and
+R is what a damping matrix has beyond the damping ratios, P_1 is the change of the axial load and y the motion of the base; r_j, h_k, l_k and t_k are the rows of contacts, external and
 local forces and circuits, V^T phi at their locations.  With w_j the drive of a tip and D_j its residual indentation,
 
     d_j = d_j0 + w_j(t) - r_j.q - D_j,     f_j = max[0, F_j(d_j) + c_j(d_j) d_j']  for d_j > 0,     z_k' = -t_k.q' - lambda_k z_k.
@@ -104,6 +104,8 @@ class Equations:
         system, structure, table = ensemble.systems[run], ensemble.structure, ensemble.runs[run]
         self.structure, self.n, self.omega = structure, structure.omega.size, structure.omega
         self.decay = 2.0 * structure.damping_ratio * self.omega
+        rows = structure.damping_rows
+        self.R = (rows.T * structure.damping_coefficients) @ rows
         self.g, self.G, self.gamma = structure.well, structure.coupling, structure.nonlinear_stiffness
         self.b: Any = structure.base_load
         self.breaks: list[float] = []
@@ -185,9 +187,10 @@ class Equations:
         q, p = s[:n], s[n : 2 * n]
         Gq = self.G @ q
         square = float(q @ Gq)
-        total = -self.decay * p - self.omega**2 * q
+        damping = self.decay * p + self.R @ p
+        total = -damping - self.omega**2 * q
         total -= self.gamma * (square * self.g + (2.0 * float(self.g @ q) + square) * Gq)
-        power["dissipated"] = float(self.decay @ (p * p))
+        power["dissipated"] = float(damping @ p)
         if self.load is not None:
             change = self.load(t)[0] * (self.g + Gq)
             total, power["load_work"] = total + change, float(change @ p)
@@ -199,9 +202,9 @@ class Equations:
             total, power["force_work"] = total + F * row, power["force_work"] + F * float(row @ p)
         for each, law in self.local:
             u, v = each.rest + float(each.row @ q), float(each.row @ p)
-            damping = law.damping_force(each.law, u, v)
-            total += (law.force(each.law, u) + damping) * each.row
-            power["local_force_work"] += damping * v
+            lossy = law.damping_force(each.law, u, v)
+            total += (law.force(each.law, u) + lossy) * each.row
+            power["local_force_work"] += lossy * v
         touched, lost, dq = [], [], p.copy()
         for (row, mode, rate), z in zip(self.circuits, self.currents(s), strict=True):
             total += z * row

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 from scipy.sparse.csgraph import connected_components
 
 from snapbeam import _core
@@ -18,7 +19,7 @@ from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import ACCURACIES, Integration
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
-from snapbeam.solver.splitting import COMPOSITIONS
+from snapbeam.solver.splitting import COMPOSITIONS, GENERAL
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, Severity
@@ -108,19 +109,20 @@ def flight_step(
     """
     period = 1.0 / _first_frequency(model)
     limit *= min(1.0, impact / (_SHORT_IMPACT * period))
-    if model.nonlinear_stiffness == 0.0 or not model.tension_matrix.any():
+    linear = model.nonlinear_stiffness == 0.0 or not model.tension_matrix.any()
+    if linear and not model.modal_damping.coefficients.size:
         return period / _FEWEST  # nothing but linear modes, whose flow is exact
     structure = structure_of(model, "below")
     places = model.beam if model.contact_shape is None else model.contact_shape.tobytes()
     longest = min(impact / period, max(duration for _, duration, *_ in _STARTS))
     key = (structure.hash, order, limit, period, model.length_scale, places, longest, resonances)
     if key not in _CHOSEN:
-        chosen = period / _Bench(structure, order, longest).fewest(limit)
-        if not structure.wells_are_mirror_images:
+        chosen = period / (_FEWEST if linear else _Bench(structure, order, longest).fewest(limit))
+        if not linear and not structure.wells_are_mirror_images:
             chosen = min(chosen, period / _Bench(structure, order, longest, far=True).fewest(limit))
         while resonances and chosen > period / _MOST and growth(structure, order, chosen) > _MOST_GROWTH:
             chosen *= 0.97
-        _CHOSEN[key] = chosen
+        _CHOSEN[key] = _with_coupled_damping(structure, order, chosen, _COUPLED * limit, period)
         while len(_CHOSEN) > _MOST_CHOSEN:
             _CHOSEN.popitem(last=False)
     return _CHOSEN[key]
@@ -139,6 +141,53 @@ _TENSIONS = np.concatenate((np.geomspace(0.02, 0.5, 8), np.linspace(0.75, 8.0, 1
 _MOST_GROWTH = 0.05
 """Growth of a motion at fixed tension, by its logarithm in a period of the first mode, that counts as none."""
 _SQUARINGS = 14
+_COUPLED = 10.0
+"""Error limit of damping that couples modes, over that of the tension: of a period and any start, here in energies."""
+PARTS = {4: (4, 8.0), 6: (4, 16.0)}
+"""Parts of a kick, at least, and over the time in which damping stops a motion, by the order of the composition."""
+
+
+def _with_coupled_damping(
+    structure: Structure, order: int, step: float, limit: float, period: float
+) -> float:
+    """A step (s) not longer, with which kicks by the damping that couples modes err less than *limit* in a period.
+
+    The error is the norm of the difference from the exact flow of the linear modes, in the coordinates omega q and p.
+    """
+    coefficients, rows, composition = structure.damping_coefficients, structure.damping_rows, GENERAL[order]
+    if not coefficients.size:
+        return step
+    n, sigma = structure.omega.size, structure.damping_ratio * structure.omega
+    scale = np.where(structure.omega > 0.0, structure.omega, 2.0 * math.pi / period)
+    alone = np.zeros((n, 2, 2))
+    alone[:, 0, 1], alone[:, 1, 0], alone[:, 1, 1] = scale, -(structure.omega**2) / scale, -2.0 * sigma
+    matrix = np.block([[np.diag(alone[:, i, j]) for j in (0, 1)] for i in (0, 1)])
+    matrix[n:, n:] -= (rows.T * coefficients) @ rows
+    fewest, per_decay = PARTS[order]
+
+    def error(h: float) -> float:
+        steps, found = math.ceil(period / h), np.eye(2 * n)
+        flows = {weight: expm(weight * h * alone) for weight in set(composition.flow.tolist())}
+        for i, weight in enumerate(composition.kick.tolist()):
+            decay = float(np.abs(weight * h * coefficients).sum())
+            parts = min(max(round(decay * per_decay + 0.5), fewest), 256)
+            x = -weight * h * coefficients / parts  # by Runge and Kutta, as the core kicks
+            gain = (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0)))) ** parts - 1.0
+            found[n:] += (rows.T * gain) @ (rows @ found[n:])
+            if i < composition.flow.size:
+                flow = flows[composition.flow[i]][..., None]
+                q, p = found[:n], found[n:]
+                found = np.concatenate([flow[:, k, 0] * q + flow[:, k, 1] * p for k in (0, 1)])
+        exact = expm(h * matrix)
+        return float(
+            np.linalg.norm(np.linalg.matrix_power(found, steps) - np.linalg.matrix_power(exact, steps), 2)
+        )
+
+    shortest = period / _MOST
+    with np.errstate(all="ignore"):
+        while step > shortest and not (found := error(step)) <= limit:
+            step *= min(0.8, max(0.25, (limit / found) ** (1.0 / order))) if math.isfinite(found) else 0.25
+    return max(step, shortest)
 
 
 def growth(structure: Structure, order: int, step: float) -> float:
@@ -364,7 +413,10 @@ def choose_base_step(
     flight = flight_step(model, order, limit, duration if duration > 0.0 else math.inf, resonances=longer)
     if accuracy == "reference" and fastest * flight > _FREE_TURN:
         flight = _FREE_TURN / fastest
-    decay = float((model.damping_ratio * model.omega).max())
+    damping = model.modal_damping
+    decay = max(
+        float((damping.ratio * model.omega).max()), 0.5 * float(np.abs(damping.coefficients).max(initial=0.0))
+    )
     if decay * flight > _MOST_DECAY:
         flight = _MOST_DECAY / decay
     impact = flight

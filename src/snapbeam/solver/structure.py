@@ -95,6 +95,11 @@ class Structure:
     omega: _Array
     """Natural frequencies, rad/s."""
     damping_ratio: _Array
+    """Of the modes by themselves; what a damping matrix has beyond it is sum_k c_k u_k u_k^T."""
+    damping_rows: _Array
+    """u_k, shape (K, N)."""
+    damping_coefficients: _Array
+    """c_k, 1/s, shape (K,)."""
     coupling: _Array
     """G = V^T V, shape (N, N), exactly 0 between modes that the tension does not couple."""
     nonlinear_stiffness: float
@@ -257,6 +262,8 @@ class Structure:
         for part in (self.omega, self.damping_ratio, self.coupling, self.well, self.center, self.equilibrium):
             digest.update(np.ascontiguousarray(part).tobytes())
         digest.update(np.array([self.nonlinear_stiffness, self.sign]).tobytes())
+        if self.damping_coefficients.size:
+            digest.update(np.column_stack((self.damping_coefficients, self.damping_rows)).tobytes())
         if self.unequal_wells is not None:
             digest.update(np.ascontiguousarray(self.unequal_wells.force).tobytes())
         for circuit in self.circuits:
@@ -301,7 +308,9 @@ def structure_of(
     modes = model.linear_modes
     structure = Structure(
         omega=model.omega,
-        damping_ratio=model.damping_ratio,
+        damping_ratio=model.modal_damping.ratio,
+        damping_rows=model.modal_damping.rows,
+        damping_coefficients=model.modal_damping.coefficients,
         coupling=model.tension_matrix,
         nonlinear_stiffness=float(model.nonlinear_stiffness),
         well=modes.T @ model.pulled(equilibrium),
@@ -383,6 +392,7 @@ def _with_mode(
         structure,
         omega=np.append(structure.omega, omega),
         damping_ratio=np.append(structure.damping_ratio, damping_ratio),
+        damping_rows=np.pad(structure.damping_rows, ((0, 0), (0, 1))),
         coupling=coupling,
         well=np.append(structure.well, 0.0),
         center=np.append(structure.center, 0.0),

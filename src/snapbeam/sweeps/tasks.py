@@ -8,7 +8,6 @@ import platform
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass, field, fields
 from functools import cached_property
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -293,7 +292,7 @@ class MemoryRunner:
 _WORDS = {
     "version": "version of snapbeam",
     "code": "state of its code",
-    "libraries": "version of NumPy, Numba or Python",
+    "libraries": "version of NumPy or Python",
     "arithmetic": "kind of rounding in NumPy and its linear algebra",
     "processor": "type of processor",
 }
@@ -332,13 +331,7 @@ def _code(system: System) -> str:
 
 
 def _libraries() -> str:
-    found = []
-    for name in ("numpy", "numba"):
-        try:
-            found.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            found.append(f"{name} of unknown version")
-    return ", ".join([*found, f"python {platform.python_version()}"])
+    return f"numpy {np.__version__}, python {platform.python_version()}"
 
 
 def differences(provenances: Iterable[Provenance]) -> list[str]:

@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 WORDS = "interrupted; no file was left half written"
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _GRACE = 0.5
-"""Seconds that the main thread has to react, before the program ends if it compiles or holds signals back."""
+"""Seconds that the main thread has to react, before the program ends if it holds signals back."""
 _LONGEST = 5.0
 """Seconds after which the program ends if the main thread has not reacted, as in a call of a library that does not end."""
 
@@ -104,7 +104,7 @@ def _handle(held: _Held) -> None:
 
 
 def end(code: Any) -> None:
-    """End an interrupted program with the status of the signal; threads that still compile are not awaited."""
+    """End an interrupted program with the status of the signal; threads that still compute are not awaited."""
     if _State.number and code:
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError):  # a closed terminal
@@ -116,13 +116,13 @@ def _stop(number: int, frame: FrameType | None) -> None:
     """Handle a signal: the second one, and one while nothing needs to be closed, ends the program at once."""
     again, _State.number = _State.number, number
     _State.heard.set()
-    if again or not _State.in_command or _compiles(frame):
+    if again or not _State.in_command:
         _leave(number)
     raise KeyboardInterrupt
 
 
 def _watch(reader: int) -> None:
-    """End a program whose main thread compiles, writes a large file or is in a call that does not end.
+    """End a program whose main thread writes a large file or is in a call that does not end.
 
     It reacts to a signal only after seconds, or never.  A call of a library that keeps the interpreter's lock keeps this
     thread waiting too.
@@ -133,18 +133,9 @@ def _watch(reader: int) -> None:
         since = time.monotonic()
         while not _State.heard.wait(_GRACE):
             late = time.monotonic() - since >= _LONGEST
-            frame = sys._current_frames().get(threading.main_thread().ident or 0)
-            if late or _State.held is not None or _compiles(frame):
+            if late or _State.held is not None:
                 _leave(data[0])
         _State.heard.clear()  # the next signal must be heard too, while the program closes its files
-
-
-def _compiles(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if str(frame.f_globals.get("__name__")).partition(".")[0] in ("numba", "llvmlite"):
-            return True
-        frame = frame.f_back
-    return False
 
 
 def _leave(number: int) -> NoReturn:

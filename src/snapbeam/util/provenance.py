@@ -182,13 +182,12 @@ def made_by(parameters: Any = None, *, command: str | None = None) -> dict[str, 
     Returns
     -------
     dict of str
-        ``snapbeam_version``, ``numpy_version``, ``numba_version``, ``platform``, ``command``, ``created``
+        ``snapbeam_version``, ``numpy_version``, ``platform``, ``command``, ``created``
         and, with *parameters*, ``parameter_hash``.
     """
     attributes = {
         "snapbeam_version": __version__,
         "numpy_version": np.__version__,
-        "numba_version": _installed_version("numba"),
         "platform": platform_name(),
         "command": command_line() if command is None else command,
         "created": created_now(),
@@ -196,13 +195,3 @@ def made_by(parameters: Any = None, *, command: str | None = None) -> dict[str, 
     if parameters is not None:
         attributes["parameter_hash"] = parameter_hash(parameters)
     return attributes
-
-
-@cache
-def _installed_version(package: str) -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"

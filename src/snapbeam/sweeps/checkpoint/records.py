@@ -213,7 +213,7 @@ class TaskRecord:
     code: str
     """Hash of the code of the package, and of contact laws and drives that are defined outside it."""
     libraries: str
-    """Versions of NumPy, Numba and Python."""
+    """Versions of NumPy and Python."""
     arithmetic: str
     """Hash of the rounding of products, sums and elementary functions."""
     processor: str
