@@ -299,5 +299,3 @@ def test_other_parts_of_the_package() -> None:
         InputError, match=r"model.damping_ratio = 0.01: cannot be changed, the model has a damping"
     ):
         system.replace(**{"model.damping_ratio": 0.01})
-    with pytest.raises(InputError, match="damping: a damping matrix is not integrated by engine = 'cuda'"):
-        sb.simulate(system, sb.Integration(cycles=1, engine="cuda"))
