@@ -127,6 +127,7 @@ template <class L> struct Group {
             for (int i = 0; i < problem->law_numbers; ++i) c.P[i] = Number(1.0);
             for (int i = 0; i < z.channels; ++i) c.M[i] = Number(0.0);
             c.rest = c.offset = c.early = c.z = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
+            for (Number &x : c.decay) x = Number(0.0);
             c.closed = c.pressing = FromBits<Marks>::of(0), c.onset = c.safe = Real(0.0);
             c.impulse = c.work = c.lost = c.own_impulse = c.deepest = c.hardest = Number(0.0);
             for (Number &x : c.sums) x = Number(0.0);
@@ -233,14 +234,22 @@ template <class L> struct Group {
 
     // What carries a circuit of run l along with the beam.
     void load_circuit(Channel<L> &c, int l, const double *row, const int *row_of) {
-        const double lam = lane(value(c.P[0]), l);
+        double lam = lane(value(c.P[0]), l);
+        // an overdamped mode may decay as the circuit does: the circuit then decays otherwise by as little as tells them apart
+        const auto alike = [&](int m) {
+            const double square = problem->omega[m] * problem->omega[m], D = lam * lam - 2.0 * problem->sigma[m] * lam + square;
+            return row[m] != 0.0 && abs(D) < 1e-8 * (lam * lam + square);
+        };
+        for (int m = 0; m < problem->modes; ++m)
+            while (alike(m)) lam *= 1.0 + 1e-7, m = 0;
+        set_lane(c.P[0], l, lam);
         for (int k = 0; k < z.channels; ++k) set_lane(c.along_M[k], l, 0.0);
         for (int m = 0; m < problem->modes; ++m) {
-            // an overdamped mode that decays as fast as the circuit carries none along: it never follows
-            const double square = problem->omega[m] * problem->omega[m], D = lam * lam - 2.0 * problem->sigma[m] * lam + square, t = D > 0.0 ? row[m] / D : 0.0;
+            // beside an overdamped mode that decays as fast a circuit never follows
+            const double square = problem->omega[m] * problem->omega[m], D = lam * lam - 2.0 * problem->sigma[m] * lam + square, t = row[m] != 0.0 ? row[m] / D : 0.0;
             set_element<L>(c.along_q, s->place[m], l, t * square), set_element<L>(c.along_p, s->place[m], l, t * lam);
             for (int k = 0; k < z.channels; ++k)
-                set_lane(c.along_M[k], l, !(D > 0.0) ? INFINITY : lane(value(c.along_M[k]), l) + t * lam * batch->rows[long(row_of[k]) * problem->modes + m]);
+                set_lane(c.along_M[k], l, row[m] != 0.0 && !(D > 0.0) ? INFINITY : lane(value(c.along_M[k]), l) + t * lam * batch->rows[long(row_of[k]) * problem->modes + m]);
         }
     }
 
@@ -367,10 +376,11 @@ template <class L> struct Group {
     // Steps in which a circuit neither follows the beam nor changes slowly.
     SNAPBEAM_FN Marks half_resolved(Real length) const {
         Marks found = FromBits<Marks>::of(0);
-        for (int j = 0; j < z.channels && problem->composition; ++j) {
-            if (!z.channel[j].circuit) continue;
-            const Real decay = value(z.channel[j].P[0]) * length * z.tick;
-            found = found | ((decay > Real(RESOLVED)) & (decay <= Real(FOLLOWS)));
+        for (int j = 0; j < z.channels; ++j) {
+            const Channel<L> &c = z.channel[j];
+            if (!c.circuit) continue;
+            const Real decay = value(c.P[0]) * length * z.tick;
+            found = found | ((decay > Real(RESOLVED[problem->composition])) & (!follows(c, j, Number(decay))));
         }
         return found;
     }
@@ -394,7 +404,16 @@ template <class L> struct Group {
                 for (long i = 0; i < flow; ++i) set_lane(own[i], l, lane(from[i], l));
             }
         }
+        set_lengths();
+    }
+    // What signals and circuits have for the length of the step.
+    SNAPBEAM_FN void set_lengths() {
         for (int i = 0; i < z.signals; ++i) z.signal[i].set_length(s->composition, z.h);
+        for (int j = 0; j < z.channels; ++j)
+            for (int f = 0; z.channel[j].circuit && f < s->composition.distinct; ++f) {
+                const Number x = z.channel[j].P[0] * z.h;
+                z.channel[j].decay[f] = decay_of(select(follows(z.channel[j], j, x), Number(0.0), x) * Number(s->composition.flow[f]));
+            }
     }
     SNAPBEAM_FN void form_flows(Plain *to, Marks which) {
         if constexpr (L::runs > 1 && L::fixed != 1) {  // few runs at a time: their modes side by side

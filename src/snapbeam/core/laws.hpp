@@ -16,7 +16,7 @@
 // affine: the force is linear in y;  contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force
 // is the channel's signal;  state: place among the numbers of a state of the law's own, or -1;  rough: bounds may be largest anywhere.
 //
-// A circuit has a state z that changes with time, its x: z' = rate(z, y, P).  A contact with memory has one that stays as it is until
+// A circuit has a state z that changes with time, its x.  A contact with memory has one that stays as it is until
 // the contact turns back from beyond yield(P); then it grows to grown(x, P), and so does what x is measured from.  An impulsive
 // contact lasts no time, or is held together by the force that this takes (impact.hpp).
 #pragma once
@@ -52,7 +52,6 @@ template <int NUMBERS> struct ForceLaw {
     static constexpr bool contact = false, lossy = false, timed = false, affine = false, memory = false, impulsive = false, rough = false;
     template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T loss(T, T y, T f, const T *) { return -(f * y); }
-    template <class T> static SNAPBEAM_FN T rate(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
@@ -194,7 +193,6 @@ struct Circuit : ForceLaw<3> {
     static constexpr bool lossy = true, affine = true;
     template <class T> static SNAPBEAM_FN auto follows(const T *P) { return P[1] > T(0.0); }
     template <class T> static SNAPBEAM_FN T force(T x, T v, const T *P) { return select(follows(P), P[1] * (x - v), x); }
-    template <class T> static SNAPBEAM_FN T rate(T z, T v, const T *P) { return select(follows(P), T(0.0), -fma(P[0], z, v)); }
     template <class T> static SNAPBEAM_FN T loss(T, T, T f, const T *P) { return P[0] * f * f; }
     template <class T> static SNAPBEAM_FN T potential(T z, const T *) { return T(0.5) * z * z; }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(1.0); }

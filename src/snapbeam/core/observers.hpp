@@ -72,7 +72,7 @@ template <class L> void record_inside(Group<L> &run) {
         z.h = typename L::Number(part);
         run.form_flows(run.own, FromBits<typename L::Marks>::of(1u));
         z.flows = run.own;
-        for (int i = 0; i < z.signals; ++i) z.signal[i].set_length(run.s->composition, z.h);
+        run.set_lengths();
         take_step(z);
         for (int j = 0; j < z.channels; ++j) hold_together(run, z.channel[j]);
         write_sample(run, to.times[to.marks[0]], true);

@@ -15,15 +15,14 @@
 //
 //   y(t) = y_0 e^(-x) - (a + M f_e) t phi_1(x),   phi_1 = (1 - e^(-x))/x,   phi_2 = (1 - phi_1)/x,   phi_3 = (1/2 - phi_2)/x.
 //
-// A circuit changes within a kick too, and stays as it is in a flow: alone, v' = a + M z, z' = -v - lam z, exactly by the series of
-//
-//   z'' = -a - M z - lam z'.
-//
-// Where it is faster than the step it follows the beam.  Free modes carry a circuit along as z = -along_q.q - along_p.p with
+// A circuit, z' = -v - lam z, is a force z that stays as it is in a kick.  Free modes carry it along as z = -along_q.q - along_p.p,
 //
 //   along_q = t omega^2/D,   along_p = t lam/D,   D = lam^2 - 2 sigma lam + omega^2,   t its row;
 //
-// other accelerations k move it away from there by along_p.k/lam, if they change little within 1/lam.  So, with v and a by along_p,
+// what differs from that dies away by e^(-lam t), so that z after a flow is exact too.  What it loses, lam z^2, kicks add up.
+//
+// Where it is faster than the step it follows the beam: other accelerations k move it away from there by along_p.k/lam, if they
+// change little within 1/lam.  So, with v and a by along_p,
 //
 //   f = g (x - v),   x = a/lam - along_q.q,   g = 1/(1 - along_p.t/lam).
 //
@@ -54,6 +53,7 @@ template <class L> struct Channel {
     // at a kick: x and y of the law, force; force of the first kick; penetration and rate at both ends
     Number x, y, f, first_f, v;
     Number z;                    // of a circuit, the state at the kick at hand, at last at the end of the step
+    Number decay[MOST_DISTINCT]; // of it e^(-lam t) - 1 over each flow of the step
     Number early;                // of a lossy channel 2/w^2 times the integral of (w - t) f over a kick of w: f if it is constant
     Number d0, r0, d1, r1;
     typename L::Marks closed, pressing;  // pressing: of one with memory, beyond its yield and deeper ever
@@ -87,9 +87,9 @@ template <class L> struct Runs {
     bool direct;                          // nothing acts but the tension: the first flow begins from q, p, k
 };
 
-constexpr int BLOCK_ARRAYS = 16;
+constexpr int BLOCK_ARRAYS = 13;
 constexpr double FOLLOWS = 8.0;  // decay of a circuit in a step, lam h, beyond which it follows the beam
-constexpr double RESOLVED = 1.5; // and, of order 6, below which a step is as long as wanted
+constexpr double RESOLVED[3] = {3.0, 1.5, 1.5};  // and, of each composition, up to which a step is as long as wanted
 
 template <class L, class X, class Y> SNAPBEAM_FN typename L::Cell dot_cells(const X *a, const Y *b, int n) {
     typename L::Cell s = a[0] * b[0];
@@ -209,6 +209,15 @@ template <class L> SNAPBEAM_FN typename L::Number penetration(const Runs<L> &z, 
 
 // Runs in which a contact acts: it is closed, and a lossy one presses.
 template <class L> SNAPBEAM_FN typename L::Marks acting(const Channel<L> &c) { return c.memory ? c.closed : c.closed & c.pressing; }
+// A force that depends on no velocity, by which the others are pushed.
+template <class L> SNAPBEAM_FN bool is_steady(const Channel<L> &c) { return c.active && (c.circuit || !c.lossy) && c.law != AXIAL_LOAD; }
+template <class L> SNAPBEAM_FN typename L::Number steady_force(const Channel<L> &c) {
+    return c.circuit ? select(c.follows, typename L::Number(0.0), c.z) : c.f;
+}
+// Runs in which the force of a channel changes within a kick.
+template <class L> SNAPBEAM_FN typename L::Marks changing(const Channel<L> &c) {
+    return c.circuit ? c.follows : c.contact ? c.closed : FromBits<typename L::Marks>::of(~0u);
+}
 // Force of a channel at x and y; of a contact only where it acts.
 template <class L>
 SNAPBEAM_FN typename L::Number force_at(const Channel<L> &c, typename L::Number x, typename L::Number y) {
@@ -263,41 +272,6 @@ SNAPBEAM_FN void affine_kick(const Channel<L> &c, typename L::Number w, typename
     }
 }
 
-// A circuit, exactly; *a* and *v* along its row.
-template <class L>
-SNAPBEAM_FN void circuit_kick(const Channel<L> &c, typename L::Number w, typename L::Number M, typename L::Number a, typename L::Number v,
-                              typename L::Number &state, typename L::Number *impulse, typename L::Number *twice, typename L::Number *lost) {
-    typedef typename L::Number Number;
-    typedef typename L::Real Real;
-    constexpr int TERMS = 18;  // where (lam + M^(1/2)) h <= 1
-    const double *node = GAUSS_NODE, *share = GAUSS_SHARE;
-    const Number zero = Number(0.0), lam = select(c.follows, zero, c.P[0]);
-    const Real parts = max(nearest(value((lam + sqrt(M)) * abs(w)) + Real(0.5)), Real(1.0));
-    const Number h = w / Number(parts), lam_h = lam * h, M_h = M * h * h;
-    *impulse = *twice = *lost = zero;
-    for (int part = 0;; ++part) {
-        const auto within = Real(double(part)) < parts;
-        if (!any(within)) break;
-        Number b[TERMS], end = state, mean = state, mean_of_mean = Number(0.5) * state;
-        b[0] = state, b[1] = -fma(lam, state, v) * h;
-        for (int n = 1; n < TERMS; ++n) {
-            if (n > 1) b[n] = -(fma(lam_h * Number(double(n - 1)), b[n - 1], M_h * b[n - 2]) + (n == 2 ? a * h * h : zero)) * Number(1.0 / (n * (n - 1)));
-            end += b[n], mean = fma(b[n], Number(1.0 / (n + 1)), mean), mean_of_mean = fma(b[n], Number(1.0 / ((n + 1) * (n + 2))), mean_of_mean);
-        }
-        Number squares = zero;
-        for (int i = 0; i < 4; ++i) {
-            Number at = b[TERMS - 1];
-            for (int n = TERMS - 2; n >= 0; --n) at = fma(at, Number(node[i]), b[n]);
-            squares = fma(Number(share[i]) * at, at, squares);
-        }
-        const Number step = select(within, h, zero);
-        *twice += step * fma(h, mean_of_mean, *impulse);
-        *impulse = fma(step, mean, *impulse), *lost = fma(step * lam, squares, *lost);
-        v += step * fma(M, mean, a);
-        assign(within, state, end);
-    }
-}
-
 // Product of what a channel sees with the row of channel j: the row itself, or along_p.
 template <class L> SNAPBEAM_FN typename L::Number product_seen(const Channel<L> &c, int j) {
     return c.circuit ? select(c.follows, c.along_M[j], c.M[j]) : c.M[j];
@@ -309,7 +283,7 @@ template <class L> SNAPBEAM_FN void follow(const Runs<L> &z, Channel<L> &c, int 
     Number by_p = dot<L>(c.along_p, z.k1, n);
     for (int j = 0; j < z.channels; ++j) {
         const Channel<L> &other = z.channel[j];
-        if (other.active && !other.lossy && other.law != AXIAL_LOAD) by_p = fma(c.along_M[j], other.f, by_p);
+        if (is_steady(other)) by_p = fma(c.along_M[j], steady_force(other), by_p);
     }
     assign(c.follows, a, by_p), assign(c.follows, v, dot<L>(c.along_p, z.p1, n));
     const Number per = Number(1.0) / max(c.P[0], Number(1e-300));
@@ -321,7 +295,7 @@ template <class L> SNAPBEAM_FN void follow(const Runs<L> &z, Channel<L> &c, int 
 template <class L> SNAPBEAM_FN typename L::Number pulled_along(const Runs<L> &z, const Channel<L> &c, const typename L::Number *f, int i, int count) {
     typedef typename L::Number Number;
     Number sum = Number(0.0);
-    if (!c.circuit || !any(c.follows)) return sum;
+    if (!c.circuit) return sum;
     for (int j = 0; j < count; ++j)
         if (j != i) sum = fma(c.along_M[z.late[j]], f[j], sum);
     return select(c.follows, c.P[1] / max(c.P[0], Number(1e-300)) * sum, Number(0.0));
@@ -335,7 +309,7 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
     const int n = s.size();
     Number *v = z.block, *a = v + z.channels, *y = a + z.channels, *slope = y + z.channels, *change = slope + z.channels;
     Number *f = change + z.channels, *impulse = f + z.channels, *lost = impulse + z.channels, *elastic = lost + z.channels;
-    Number *tip = elastic + z.channels, *twice = tip + z.channels, *x = twice + z.channels, *flow = x + z.channels, *gain = flow + z.channels, *settled = gain + z.channels, *wanted = settled + z.channels;
+    Number *tip = elastic + z.channels, *twice = tip + z.channels, *settled = twice + z.channels, *wanted = settled + z.channels;
     int held = 0;
     Real decay = Real(0.0);
     for (int i = 0; i < count; ++i) {
@@ -343,15 +317,13 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
         v[i] = dot<L>(c.row, z.p1, n), a[i] = dot<L>(c.row, z.k1, n);
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &other = z.channel[j];
-            if (other.active && !other.lossy && other.law != AXIAL_LOAD) a[i] = fma(c.M[j], other.f, a[i]);
+            if (is_steady(other)) a[i] = fma(c.M[j], steady_force(other), a[i]);
         }
         if (c.circuit) {
             c.P[1] = Number(0.0);
             settled[i] = Number(0.0);
-            if (any(c.follows)) {
-                follow(z, c, z.late[i], a[i], v[i]);
-                if (first) assign(c.follows, settled[i], c.z - force_at(c, c.x, v[i]));
-            }
+            follow(z, c, z.late[i], a[i], v[i]);
+            if (first) assign(c.follows, settled[i], c.z - force_at(c, c.x, v[i]));
         }
         impulse[i] = lost[i] = twice[i] = Number(0.0);
         if (c.impulsive) ++held, wanted[i] = signal_bend(z, c) - a[i] - linear_acceleration(s, c.row, z.q1, z.p1);
@@ -360,22 +332,20 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
         const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]);
         const Number damping = with_law(c.law, [&](auto law) { return law.damping(c.contact ? max(c.x, Number(0.0)) : c.x, fastest, c.P); });
         decay += value(product_seen(c, z.late[i]) * (c.contact ? select(acting(c), damping, Number(0.0)) : damping));
-        if (c.circuit) decay += select(c.follows, Real(0.0), value(c.P[0] + sqrt(c.M[z.late[i]])));
     }
-    const bool alone = count == 1 && z.channel[z.late[0]].affine;
-    auto exact = decay * abs(value(w)) <= Real(alone ? 1.0 : -1.0);
-    Number exact_impulse = Number(0.0), exact_twice = Number(0.0), exact_lost = Number(0.0);
-    if (alone) {
-        const Channel<L> &c = z.channel[z.late[0]];
-        affine_kick(c, w, product_seen(c, z.late[0]), a[0], v[0], tip[0], &exact_impulse, &exact_twice, &exact_lost);
-        if (c.circuit && any(!c.follows)) {
-            const auto coupled = !c.follows;
-            Number state = c.z, own_impulse, own_twice, own_lost;
-            circuit_kick(c, w, c.M[z.late[0]], a[0], v[0], state, &own_impulse, &own_twice, &own_lost);
-            assign(coupled, exact_impulse, own_impulse), assign(coupled, exact_twice, own_twice), assign(coupled, exact_lost, own_lost);
-            assign(coupled, z.channel[z.late[0]].z, state);
-            exact = exact | coupled;
-        }
+    // nothing changes, or one that is linear alone
+    auto exact = FromBits<typename L::Marks>::of(~0u);
+    for (int i = 0; i < count; ++i) exact = exact & (!changing(z.channel[z.late[i]]));
+    for (int i = 0; i < count; ++i) {
+        const Channel<L> &c = z.channel[z.late[i]];
+        auto alone = changing(c) & (decay * abs(value(w)) <= Real(c.affine ? 1.0 : -1.0));
+        for (int j = 0; j < count; ++j)
+            if (j != i) alone = alone & (!changing(z.channel[z.late[j]]));
+        if (!any(alone)) continue;
+        Number own_impulse, own_twice, own_lost;
+        affine_kick(c, w, product_seen(c, z.late[i]), a[i], v[i], tip[i], &own_impulse, &own_twice, &own_lost);
+        assign(alone, impulse[i], own_impulse), assign(alone, twice[i], own_twice), assign(alone, lost[i], own_lost);
+        exact = exact | alone;
     }
     Real parts = nearest(decay * abs(value(w)) * Real(s.problem->parts_per_decay) + Real(0.5));
     parts = min(max(parts, Real(double(s.problem->fewest_parts))), Real(256.0));
@@ -385,14 +355,14 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
         const auto within = (Real(double(part)) < parts) & (!exact);
         if (!any(within)) break;
         const Number step = select(within, h, Number(0.0));
-        for (int i = 0; i < count; ++i) change[i] = slope[i] = flow[i] = gain[i] = Number(0.0), twice[i] = fma(step, impulse[i], twice[i]);
+        for (int i = 0; i < count; ++i) change[i] = slope[i] = Number(0.0), twice[i] = fma(step, impulse[i], twice[i]);
         for (int stage = 0; stage < 4; ++stage) {
             for (int i = 0; i < count; ++i) {
                 const Channel<L> &c = z.channel[z.late[i]];
                 const Number own = fma(Number(ahead[stage]) * step, slope[i], v[i]);
-                y[i] = c.contact ? tip[i] - own : own, x[i] = c.x;
-                if (c.circuit) assign(!c.follows, x[i], fma(Number(ahead[stage]) * step, flow[i], c.z));
-                f[i] = force_at(c, x[i], y[i]);
+                y[i] = c.contact ? tip[i] - own : own;
+                f[i] = force_at(c, c.x, y[i]);
+                if (c.circuit) f[i] = select(c.follows, f[i], Number(0.0));
             }
             for (int i = 0; i < count; ++i) f[i] += pulled_along(z, z.channel[z.late[i]], f, i, count);
             for (int sweep = 0; sweep < (held > 1 ? 16 : held); ++sweep)  // held together, each by the others
@@ -412,17 +382,16 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
                 change[i] = fma(weight, slope[i], change[i]);
                 impulse[i] = fma(weight, f[i], impulse[i]);
                 if (stage < 3) twice[i] = fma(step * step * Number(1.0 / 6.0), f[i], twice[i]);
-                lost[i] = fma(weight, power_lost(c, x[i], y[i], f[i], elastic[i]), lost[i]);
-                if (c.circuit) flow[i] = Circuit::rate(x[i], y[i], c.P), gain[i] = fma(weight, flow[i], gain[i]);
+                lost[i] = fma(weight, power_lost(c, c.x, y[i], f[i], elastic[i]), lost[i]);
             }
         }
-        for (int i = 0; i < count; ++i) v[i] += change[i], z.channel[z.late[i]].z += gain[i];
+        for (int i = 0; i < count; ++i) v[i] += change[i];
     }
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
-        if (alone) assign(exact, impulse[i], exact_impulse), assign(exact, twice[i], exact_twice), assign(exact, lost[i], exact_lost);
-        c.f = select(differ(w, Number(0.0)), impulse[i] / w, Number(0.0));
-        c.early = select(differ(w, Number(0.0)), Number(2.0) * twice[i] / (w * w), Number(0.0));
+        const typename L::Marks here = c.circuit ? c.follows : FromBits<typename L::Marks>::of(~0u);
+        assign(here, c.f, select(differ(w, Number(0.0)), impulse[i] / w, Number(0.0)));
+        assign(here, c.early, select(differ(w, Number(0.0)), Number(2.0) * twice[i] / (w * w), Number(0.0)));
         c.lost += lost[i];
         if (c.circuit) {
             if (first) impulse[i] += settled[i] / max(c.P[0], Number(1e-300)), c.lost += settled[i] * (Number(2.0) * c.z - Number(1.5) * settled[i]);
@@ -454,6 +423,55 @@ template <class L> SNAPBEAM_FN void timed_work(Runs<L> &z, Channel<L> &c, typena
     c.work += w * c.f * fma(Number(0.5) * w, a, c.v);
 }
 
+// Does a circuit, channel j, follow the beam where it decays by so much in a step?  Only if that slows the motion less than it decays.
+template <class L> SNAPBEAM_FN typename L::Marks follows(const Channel<L> &c, int j, typename L::Number decay) {
+    return (value(decay) > typename L::Real(FOLLOWS)) & (value(c.along_M[j]) < typename L::Real(0.5) * value(c.P[0]));
+}
+
+// A flow after the kick by the tension, of the modes (MODES) and with them of some circuits.
+template <class L> struct Flow {
+    typedef typename L::Cell Cell;
+    typedef typename L::Number Number;
+    const typename L::Plain *flows;
+    const Cell *from_q, *from_p, *from_k;
+    Cell by_g, by_r, weight;
+    bool first;
+    int which;
+
+    template <int CIRCUITS, bool MODES> SNAPBEAM_FN void take(Runs<L> &z, Channel<L> *one, Channel<L> *other) const {
+        const Structure<L> &s = *z.s;
+        const int n = s.size();
+        const typename L::Plain *a = flows;
+        Channel<L> *const circuit[2] = {one, other};
+        Cell before = Cell(0.0), after = Cell(0.0), gq = Cell(0.0), carried[2] = {Cell(0.0), Cell(0.0)}, moved[2] = {Cell(0.0), Cell(0.0)};
+        for (int i = 0; i < n; ++i, a += 4) {
+            const Cell q = from_q[i], p = first ? fma(weight, from_k[i], from_p[i]) : fma(by_g, s.g[i], fma(by_r, z.r[i], from_p[i]));
+            const Cell dq = fma(a[0], q, a[1] * p), q1 = q + dq, dp = fma(a[3], p, a[2] * q), p1 = p + dp;
+            for (int k = 0; k < CIRCUITS; ++k) {
+                const Cell by_q = circuit[k]->along_q[i], by_p = circuit[k]->along_p[i];
+                carried[k] = fma(by_q, q, fma(by_p, p, carried[k])), moved[k] = fma(by_q, dq, fma(by_p, dp, moved[k]));
+            }
+            if constexpr (MODES) {
+                if (z.account) {
+                    const Cell oq = s.omega[i] * q, oq1 = s.omega[i] * q1;
+                    before = fma(p, p, fma(oq, oq, before)), after = fma(p1, p1, fma(oq1, oq1, after));
+                }
+                gq = fma(s.g[i], q1, gq);
+                z.q1[i] = q1, z.p1[i] = p1;
+            }
+        }
+        for (int k = 0; k < CIRCUITS; ++k) {
+            Channel<L> &c = *circuit[k];
+            Number stood, went;
+            L::totals(carried[k], moved[k], stood, went);
+            assign(!c.follows, c.z, c.z + fma(c.decay[which], c.z + stood, -went));
+        }
+        if (!MODES) return;
+        z.next_gq = gq;
+        if (z.account) z.dissipated = fma(Number(0.5), L::total(before - after), z.dissipated);
+    }
+};
+
 template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
     typedef typename L::Number Number;
     typedef typename L::Real Real;
@@ -462,7 +480,7 @@ template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         c.impulse = c.work = c.lost = Number(0.0), c.z = c.circuit ? c.P[c.state] : Number(0.0);
-        if (c.circuit) c.follows = (value(c.P[0] * z.h) > Real(FOLLOWS)) & (value(c.along_M[j]) < Real(0.5) * value(c.P[0]));
+        if (c.circuit) c.follows = follows(c, j, c.P[0] * z.h);
         c.active = !c.contact || any(c.closed), z.direct &= !c.active;
         if (!(c.law == AXIAL_LOAD)) c.f = c.first_f = Number(0.0);
     }
@@ -481,7 +499,7 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
     bool timed = false;
     for (int j = 0; j < z.channels; ++j) {
         const Channel<L> &c = z.channel[j];
-        if (c.active && c.lossy) z.late[late++] = j;
+        if (c.active && c.lossy && (!c.circuit || any(c.follows))) z.late[late++] = j;
         timed |= c.timed;
     }
     // Within a step the two factors of the acceleration serve, whatever the neighbours of a run need the row for.
@@ -502,6 +520,7 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
         } else {
             c.x = c.contact ? penetration(z, c, z.q1) : along(z, c, z.q1);
             if (!c.lossy) c.f = force_at(c, c.x, Number(0.0));
+            if (c.circuit) c.f = c.early = steady_force(c), c.lost = fma(w * c.P[0] * c.f, c.f, c.lost);
         }
     }
     if (late) velocity_kick(z, w, late, stage == 0);
@@ -517,8 +536,8 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
     }
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
-        if (!c.active || c.lossy || c.law == AXIAL_LOAD) continue;
-        const Cell push = Cell(w * c.f);
+        if (!is_steady(c)) continue;
+        const Cell push = Cell(w * steady_force(c));
         for (int i = 0; i < n; ++i) z.p1[i] = fma(push, c.row[i], z.p1[i]);
     }
     const Cell weight = Cell(w);
@@ -535,19 +554,15 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
     }
     const bool direct = stage == 0 && z.direct;
     const Cell *from_q = direct ? z.q : z.q1, *from_p = direct ? z.p : z.p1, *from_k = direct ? z.k : z.k1;
-    Cell before = Cell(0.0), after = Cell(0.0), gq = Cell(0.0);
-    for (int i = 0; i < n; ++i, a += 4) {
-        const Cell q = from_q[i], p = stage ? fma(by_g, s.g[i], fma(by_r, z.r[i], from_p[i])) : fma(weight, from_k[i], from_p[i]);
-        const Cell q1 = q + fma(a[0], q, a[1] * p), p1 = p + fma(a[3], p, a[2] * q);
-        if (z.account) {
-            const Cell oq = s.omega[i] * q, oq1 = s.omega[i] * q1;
-            before = fma(p, p, fma(oq, oq, before)), after = fma(p1, p1, fma(oq1, oq1, after));
-        }
-        gq = fma(s.g[i], q1, gq);
-        z.q1[i] = q1, z.p1[i] = p1;
-    }
-    z.next_gq = gq;
-    if (z.account) z.dissipated = fma(Number(0.5), L::total(before - after), z.dissipated);
+    const Flow<L> flow = {a, from_q, from_p, from_k, by_g, by_r, weight, stage == 0, which};
+    int circuits = 0, first = z.channels, second = z.channels;
+    for (int j = 0; j < z.channels; ++j)
+        if (z.channel[j].circuit && circuits++ < 2) (circuits == 1 ? first : second) = j;
+    for (int j = second + 1; j < z.channels; ++j)
+        if (z.channel[j].circuit) flow.template take<1, false>(z, &z.channel[j], nullptr);
+    if (!circuits) flow.template take<0, true>(z, nullptr, nullptr);
+    else if (circuits == 1) flow.template take<1, true>(z, &z.channel[first], nullptr);
+    else flow.template take<2, true>(z, &z.channel[first], &z.channel[second]);
     for (int i = 0; i < z.signals; ++i) z.signal[i].advance(which);
     if (stage + 1 == s.composition.flows && any(z.jumping))
         for (int i = 0; i < z.signals; ++i) z.signal[i].before_jump(z.jumping, z.t + z.ticks, z.tick);

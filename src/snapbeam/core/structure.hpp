@@ -45,13 +45,19 @@ SNAPBEAM_FN Composition composition_of(int number) {
 
 constexpr int FEWEST_PARTS = 8, PARTS_PER_TURN = 12;
 
+// e^(-x) - 1 for any x.
+template <class T> SNAPBEAM_FN T decay_of(T x) {
+    const auto fast = abs(x) > T(4.0);
+    const T less = decay_less_one(x);
+    return any(fast) ? select(fast, each(x, [](double y) { return ::expm1(-y); }), less) : less;
+}
+
 // The four numbers of the flow of a mode over a time.
 template <class T> SNAPBEAM_FN void set_flow(T time, T sigma, T omega, T *a) {
     const T omega2 = omega * omega, square = fma(sigma, -sigma, omega2), damped = sqrt(max(square, T(1e-200)));
     const Turn<T> w = turn(time * damped);
-    T over = w.sine / damped, cosine_less = w.cosine_less_one, less = decay_less_one(time * sigma);
-    const auto fast = abs(time * sigma) > T(4.0), creeping = square < T(0.0);
-    if (any(fast)) less = select(fast, each(time * sigma, [](double x) { return ::expm1(-x); }), less);
+    T over = w.sine / damped, cosine_less = w.cosine_less_one, less = decay_of(time * sigma);
+    const auto creeping = square < T(0.0);
     if (any(creeping)) {  // overdamped: cosh and sinh in place of cos and sin
         const T rate = sqrt(max(-square, T(0.0))), half = each(T(0.5) * rate * time, [](double x) { return ::sinh(x); });
         over = select(creeping, each(rate * time, [](double x) { return ::sinh(x); }) / rate, over);
