@@ -155,3 +155,15 @@ def test_a_record_in_pieces_has_every_impact_once(monkeypatch):
         found += [run.impacts.onset.values, run.impacts.impulse.values]
     assert whole[0].size > 10
     np.testing.assert_array_equal(pieces, whole)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "velocity", "location"), [(0.8, 0.24, 0.48), (0.46, 0.36, 0.35), (0.25, 0.55, 0.49)]
+)
+def test_a_contact_that_opens_does_not_land_again_at_once(ratio, velocity, location):
+    """It opens where the force that holds it together is zero, with a gap that grows."""
+    model = sb.ReducedModel.from_beam(sb.model.default_values.BEAM, 1, damping_ratio=0.005)
+    shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, location=location)
+    system = sb.System(model, contacts=[sb.Contact(sb.Restitution(0.0), shaker)])
+    impulse = sb.simulate(system, sb.Integration(cycles=6, engine="native")).impacts.impulse.values
+    assert impulse.size > 2 and impulse.min() > 1e-6 * impulse.max()

@@ -18,6 +18,9 @@ constexpr double GRADING = 0.5, RELEASE = 0.5, CONTACT_TURN = 0.35, NEARER = 0.2
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 
 template <class L> struct Group;
+template <class L>
+typename L::Number pressed_by(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p,
+                              const typename L::Cell *k);
 template <class L> void hit(Group<L> &runs, int number, typename L::Marks on);
 template <class L> void jumped_velocity(Group<L> &runs, typename L::Marks which);
 template <class L> void hold_together(Group<L> &runs, Channel<L> &c);
@@ -564,12 +567,15 @@ template <class L> struct Group {
             e.flip = mine, e.force = FromBits<Marks>::of(0);
             if (c.lossy || c.memory) {  // where the force of a closed contact changes its sign, or its branch
                 const Marks active = c.pressing;
-                const Real f1 = value(going_on(c, c.d1, c.r1, c.f));
+                // the mean force of the last kick has no zero where the contact opens; that at the end of the step, times M, has
+                const bool held = c.impulsive && any(c.closed);
+                const Number end_f = held ? pressed_by(z, c, z.q1, z.p1, z.k1) : c.f, begin_f = held ? c.M[j] * c.first_f : c.first_f;
+                const Real f1 = value(going_on(c, c.d1, c.r1, end_f));
                 const Marks wrong = alive & c.closed & (f1 < Real(0.0)) & (active | (d1 > Real(0.0)));
                 const Marks cut_before = mine & c.closed & (!differ(e.at_force, Real(1.0)));
                 const Marks first = wrong & (!cut_before);
                 if (any(first)) {
-                    const Real f0 = max(value(going_on(c, c.d0, c.r0, c.first_f)), Real(0.0));
+                    const Real f0 = max(value(going_on(c, c.d0, c.r0, begin_f)), Real(0.0));
                     e.low = select(first, Real(0.0), e.low), e.low_f = select(first, f0, e.low_f), e.high_f = select(first, f1, e.high_f);
                     at = select(first, max(nearest(ticks * (f0 / (f0 - f1))), Real(1.0)), at);
                     e.high = select(first, ticks, e.high);
