@@ -288,6 +288,8 @@ _RESOLVED = 24.0
 """Flight steps, at least, in a period of a base's or an axial load's fastest part."""
 _TAPPED = {"standard": 0.35, "reference": 0.1}
 """Longest step over the reciprocal of the angular frequency or rate of what is in the kicks beside tension and contacts."""
+_DECAY, _FOLLOWS = 3.0, 8.0
+"""Decay of a circuit in a step, lam h, at most, and beyond which it follows the beam (``core/step.hpp``)."""
 _GENERAL = 0.4
 """Step with the general composition of order 6 over that with the one for forces of position alone, for an equal error."""
 
@@ -476,6 +478,8 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
             each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate))) if rate > 0.0 else each
             for each, rate in zip(plans, fastest.tolist(), strict=True)
         ]
+    if integration.step is None and system.harvesters:
+        plans = _with_circuits(plans, system, columns, integration.accuracy)
     if integration.step is None and system.local_forces:
         longest = _longest_with_local_forces(system, integration.accuracy)
         plans = [each._replace(step=min(each.step, longest)) for each in plans]
@@ -516,6 +520,34 @@ def _longest_with_local_forces(system: System, accuracy: str) -> float:
         squared += mobility * force.greatest_stiffness(largest)
         decay += mobility * force.greatest_damping(largest, fastest) if force.dissipative else 0.0
     return _TAPPED[accuracy] / max(math.sqrt(squared), decay, 1e-300)
+
+
+def _with_circuits(
+    plans: list[Plan], system: System, columns: Mapping[str, _Array], accuracy: str
+) -> list[Plan]:
+    """Steps that resolve circuits.
+
+    The stiffness t.t of circuits with inertia, and the damping rate t.t of those without, are in the kicks.  The decay lam h of a
+    circuit in a step is at most 3, or over 8: then it follows the beam.
+    """
+    model, runs = _struck(system), len(plans)
+    squared, decay, longest = 0.0, np.zeros(runs), np.full(runs, math.inf)
+    step = np.array([each.step for each in plans])
+    for harvester, circuit in zip(system.harvesters, _circuits(system, columns, runs), strict=True):
+        row = model.linear_modes.T @ harvester.row(model)
+        if harvester.inertia > 0.0:
+            squared += float(row @ row) / harvester.inertia
+            resolved = circuit.rate * step <= _FOLLOWS
+            longest = np.where(
+                resolved, np.minimum(longest, _DECAY / np.maximum(circuit.rate, 1e-300)), longest
+            )
+        else:
+            decay += float(row @ row) * circuit.rate
+    exchange = np.maximum(np.maximum(math.sqrt(squared), decay), 1e-300)
+    longest = np.minimum(longest, 2.0 * _TAPPED[accuracy] / exchange)
+    return [
+        each._replace(step=min(each.step, own)) for each, own in zip(plans, longest.tolist(), strict=True)
+    ]
 
 
 def _struck(system: System) -> ReducedModel:
