@@ -63,7 +63,10 @@ Component = Tone | Pieces | Sweep
 
 def in_pieces(*pieces: tuple[_Array, dict[int, _Array] | _Array], gain: _Array | float = 1.0) -> Pieces:
     """Pieces from their begins and coefficients, arrays of shape (runs,) by power."""
-    runs = max(np.size(begin) for begin, _ in pieces)
+    runs = max(len(begin) for begin, _ in pieces)
+    for _, powers in pieces:
+        each = powers.values() if isinstance(powers, dict) else [powers]
+        runs = max([runs, *(len(np.atleast_1d(values)) for values in each)])
     begins = np.stack([np.broadcast_to(begin, runs) for begin, _ in pieces], axis=1)
     coefficients = np.zeros((runs, len(pieces), 6))
     for i, (_, powers) in enumerate(pieces):
