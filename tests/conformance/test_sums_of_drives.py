@@ -12,17 +12,11 @@ from several_oracle import Tip, solve_several
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.solver.excitation import tip_motion
+from snapbeam.solver.excitation import motion_of
 
 SINE = sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.1, phase=0.4)
 BURST = sb.Burst(frequency_ratio=2.3, velocity_amplitude=0.08, duration_cycles=3.0)
 KICK = sb.HalfSine(displacement_amplitude=0.05, duration=0.4)
-
-
-def numbers_of(drive: sb.Drive, scale):
-    columns = {name: np.array([value]) for name, value in drive.values().items()}
-    found = drive.numbers(columns, scale)
-    return drive.numbers_type()(*(float(found[name][0]) for name in drive.number_names))
 
 
 def test_motion_is_the_sum_and_begins_at_zero() -> None:
@@ -30,17 +24,17 @@ def test_motion_is_the_sum_and_begins_at_zero() -> None:
     total = SINE + BURST + KICK
     system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=total))])
     scale = system.scale
-    numbers = numbers_of(total, scale)
-    parts = [(drive, numbers_of(drive, scale)) for drive in (SINE, BURST, KICK)]
+    whole = motion_of(total, scale, 0.0, 0.0, 1.0)[0]
+    parts = [
+        motion_of(drive, scale, getattr(drive, "phase", 0.0), 0.0, 1.0)[0] for drive in (SINE, BURST, KICK)
+    ]
     for t in np.linspace(0.0, 6.0, 61) * 2.0 * math.pi / scale.omega:
-        w, v = tip_motion(numbers, np.empty(0), numbers.omega * t)
-        pairs = [
-            tip_motion(own, np.empty(0), own.omega * t + getattr(drive, "phase", 0.0)) for drive, own in parts
-        ]
-        start = parts[0][1].amplitude * math.sin(0.4)
-        assert w == pytest.approx(sum(pair[0] for pair in pairs) - start, abs=1e-11 * LEVEL)
-        assert v == pytest.approx(sum(pair[1] for pair in pairs), abs=1e-9 * LEVEL * scale.omega)
-    assert tip_motion(numbers, np.empty(0), 0.0)[0] == pytest.approx(0.0, abs=1e-18)
+        w, v, a = whole(t)
+        terms = [part(t) for part in parts]
+        assert w == pytest.approx(sum(term[0] for term in terms) - parts[0](0.0)[0], abs=1e-11 * LEVEL)
+        assert v == pytest.approx(sum(term[1] for term in terms), abs=1e-9 * LEVEL * scale.omega)
+        assert a == pytest.approx(sum(term[2] for term in terms), abs=1e-9 * LEVEL * scale.omega**2)
+    assert whole(0.0)[0] == pytest.approx(0.0, abs=1e-18)
 
 
 def test_kept_and_told() -> None:
@@ -73,10 +67,10 @@ def test_terms_that_have_samples() -> None:
         return sb.System(model, contacts=[contact], base_excitation=base)
 
     scale = struck_by(total).scale
-    numbers, samples = numbers_of(total, scale), total.samples()
+    motion = motion_of(total, scale, 0.0, 0.0, 1.0)[0]
     cycle = 2.0 * math.pi / (1.4 * scale.omega)
     instants = np.arange(0.0, 5.0 * cycle, 1e-5)
-    rows = np.array([tip_motion(numbers, samples, numbers.omega * t) for t in instants])
+    rows = np.array([motion(t) for t in instants.tolist()])
     record = sb.RecordedMotion(
         displacement=rows[:, 0], velocity=rows[:, 1], sampling_frequency=1e5, frequency=1.0 / cycle
     )

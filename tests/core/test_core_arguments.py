@@ -32,7 +32,7 @@ def test_every_field_is_checked(which, name):
     changed = []
     if isinstance(value, np.ndarray):
         changed += [
-            value.astype(np.float32 if value.dtype.kind == "f" else np.int64),
+            value.astype(np.float32 if value.dtype.kind == "f" else np.int16),
             "text",
             value[..., None],
         ]

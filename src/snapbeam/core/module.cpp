@@ -174,8 +174,8 @@ static Problem problem_of(Arguments &a) {
     p.dividing_height = a.number("dividing_height", -1e300, 1e300);
     p.levels = a.integer("levels", 2, 40), p.fewest_parts = a.integer("fewest_parts", 1, 256);
     p.parts_per_decay = a.number("parts_per_decay", 0.0, 1e6);
-    const size_t updates = a.has("update") ? a.length("update") : 0;
-    p.updates = int(updates), p.update = a.optional<long long>("update", {updates});
+    const size_t updates = a.length("update");
+    p.updates = int(updates), p.update = a.array<long long>("update", {updates}, false);
     for (size_t i = 0; i < updates; ++i)
         if (!p.update[i]) a.refuse("update", "must be addresses of functions");
     return p;
@@ -247,7 +247,7 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
     b.states = a.array<double, true>("states", {runs, size_t(b.outputs), 2 * n + 1 + 2 * channels}, false);
     b.statistics = a.array<double, true>("statistics", {runs, STATISTICS}, false);
     b.of_channels = a.array<double, true>("of_channels", {runs, channels, OF_CHANNEL}, false);
-    if (p.updates) b.held = a.array<double, true>("held", {runs, size_t(p.updates)}, false);
+    b.held = a.array<double, true>("held", {runs, size_t(p.updates)}, false);
     b.account = a.integer("account", 0, 1) != 0;
     if (b.outputs)
         for (size_t i = 0; i < runs; ++i) {

@@ -33,8 +33,7 @@ def states_of(
     far = (well_sign < 0)[:, None]
     first = np.where(far, q + structure.shift, q)
     # the phase of a periodic drive is reduced to one period
-    comes_round = ensemble.drive.harmonic or (ensemble.drive.parts and ensemble.drive.is_periodic)
-    turned = (ticks % runs["period"] if comes_round else ticks) / runs["period"]
+    turned = (ticks % runs["period"] if ensemble.comes_round else ticks) / runs["period"]
     tick = runs["tick"]
     return State(
         amplitude=structure.amplitudes(first),

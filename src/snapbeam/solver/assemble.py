@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.drive.base import HORIZON, Drive
-from snapbeam.model.drive.combined import joined
-from snapbeam.model.drive.sine import Sine
 from snapbeam.model.early_termination import decidable_energy, passed_heights
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN as RUN_SCOPE
@@ -24,7 +22,7 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.solver.channels import channels_of
 from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
-from snapbeam.solver.excitation import tip_motion
+from snapbeam.solver.excitation import displacements, motion_of
 from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
@@ -65,7 +63,8 @@ def others_of(
         own_rows = np.array([structure.row(shape, j + 1, sign) for shape in shapes])
         rows += list(own_rows)
         at_rest[:, j] = sign * structure.sign * structure.rests(shapes)[which]
-        begun = _begun(striker.drive, columns, moving, system, runs)
+        phase = columns.get(f"{moving}.phase", np.zeros(runs))
+        begun = displacements(striker.drive, _own(columns, moving, runs), system.scale, phase)
         gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
         rest = _reach_at_rest(system, structure, which, own_rows)
         offset[:, j] = rest + np.where(np.isnan(gap), -begun, -gap)
@@ -75,33 +74,7 @@ def others_of(
     )  # fmt: skip
 
 
-def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
-    """Displacement of the tip from its mid-position at the start, m, shape (runs,)."""
-    own = _own(columns, section, runs)
-    phase = columns.get(f"{section}.phase", np.zeros(runs))
-    if not phase.any():
-        return np.zeros(runs)
-    found, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
-    made: Any = kind.numbers_type()
-    table = np.stack([found[name] for name in kind.number_names], axis=1)
-    return np.array(
-        [tip_motion(made(*row), np.empty(0), at)[0] for row, at in zip(table, phase, strict=True)]
-    )
-
-
-# What moves in every run of an ensemble, and as which drive kernels integrate it.
-
-
-class Driven(NamedTuple):
-    """Drive of the first striker: its type, and its numbers for each run."""
-
-    kind: type[Drive]
-    numbers: _Array
-    period: _Array
-    """Period of one cycle, s."""
-    highest: _Array
-    """From the mid-position, m."""
-    samples: _Array
+# What moves in every run of an ensemble.
 
 
 _SHORTEST_PERIOD = 1e-300
@@ -141,72 +114,55 @@ def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _A
     return own or {"": np.zeros(runs)}
 
 
-def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
-    """Arrange the striker's drive, or it and what else moves, for kernels."""
-    if any(section != "drive" for section, _ in system.moving):
-        return _together(system, columns, runs)
-    scale, striker = system.scale, system.striker
-    if striker is None:
-        numbers = np.tile([1.0 * scale.omega, 0.0], (runs, 1))
-        return Driven(Sine, numbers, cycles_of(system, columns), np.full(runs, -np.inf), np.empty(0))
-    drive = striker.drive
-    own = _own(columns, "drive", runs)
-    found = drive.numbers(own, scale)
-    highest = drive.bounds(own, scale)[0]
-    samples = _samples(system, "drive", drive)
-    if (
-        striker.side == "above" and drive.recorded
-    ):  # made in space; other motions are positive as the striker pushes
-        highest = drive.mirrored_bounds(own, scale)
-    table = np.stack([found[name] for name in drive.number_names], axis=1)
-    return Driven(drive.integrated_as or type(drive), table, cycles_of(system, columns), highest, samples)
+def clock_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
+    """Rate of the phase of each run, rad/s: of its one motion, or of the time since they began that several motions share."""
+    if not system.moving:
+        return np.full(runs, system.scale.omega)
+    if len(system.moving) > 1:
+        return 2.0 * math.pi / (HORIZON * cycles_of(system, columns))
+    section, drive = system.moving[0]
+    return drive.numbers(_own(columns, section, runs), system.scale)["omega"]
 
 
-def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
-    """The motions of a system with a base, a load, external forces or several strikers as one drive.
+def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
+    """Highest position of the tip from its mid-position, m; -inf without one, inf where nothing is said of it.
 
-    Nothing is said of how high the tip comes to be used: no such run is decided by it.
+    A body goes wherever it is thrown, and a shaken beam too: no such run is decided by it.
     """
-    scale, names = system.scale, {"drive": "tip", "base_excitation": "base", "axial_load": "load"}
-    names |= {section_of("drive", i + 1): f"tip{i}" for i in range(1, len(system.contacts))}
-    forces = [section for section, _ in system.moving if numbered(section)[0] == "force"]
-    names |= {section: f"force{i}" for i, section in enumerate(forces)}
-    kinds: dict[str, type[Drive]] = {}
-    found: dict[str, _Array] = {}
-    fastest = np.zeros(runs)
-    tables: list[_Array] = []
-    for section, drive in system.moving:
-        part, own = names[section], _own(columns, section, runs)
-        numbers = drive.numbers(own, scale)
-        kinds[part] = drive.integrated_as or type(drive)
-        found |= {f"{part}_{name}": numbers[name] for name in drive.number_names}
-        for name in drive.number_names:
-            if name.split("_")[-1] == "table":
-                found[f"{part}_{name}"] += sum(each.size for each in tables)
-        tables.append(_samples(system, section, drive))
-        found[f"{part}_phase"] = columns.get(f"{section}.phase", np.zeros(runs))
-        fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
-        if section == "base_excitation" or section in forces:
-            found[f"{part}_hardest"] = drive.peak_acceleration(own, scale)
-    if system.base_excitation is not None:
-        own, base = _own(columns, "base_excitation", runs), system.base_excitation
-        sign = 1.0 if base.direction == "up" else -1.0
-        side = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
-        follow = 0.0 if base.striker_on_base or system.striker is None else -side * sign
-        found["base_sign"], found["base_follow"] = np.full(runs, sign), np.full(runs, follow)
-    kind, cycle = joined(kinds), cycles_of(system, columns)
-    only = next(iter(kinds)) if kind.alone else ""
-    found["omega"] = found[f"{only}_omega"] if only else 2.0 * math.pi / (HORIZON * cycle)
-    found["fastest"] = fastest
-    table = np.stack([found[name] for name in kind.number_names], axis=1)
-    return Driven(kind, table, cycle, np.full(runs, np.inf), np.concatenate(tables))
+    if (
+        any(section != "drive" for section, _ in system.moving)
+        or any(each.striker.mass is not None for each in system.contacts)
+        or len(system.contacts) > 1
+        or system.local_forces
+    ):
+        return np.full(runs, np.inf)
+    if system.striker is None:
+        return np.full(runs, -np.inf)
+    drive, own = system.striker.drive, _own(columns, "drive", runs)
+    if (
+        system.striker.side == "above" and drive.recorded
+    ):  # made in space; other motions are positive as it pushes
+        return drive.mirrored_bounds(own, system.scale)
+    return drive.bounds(own, system.scale)[0]
 
 
-def _samples(system: System, section: str, drive: Drive) -> _Array:
-    """Samples of a motion; a record of a striker's, made in space, is positive as the striker pushes."""
-    kind, number = numbered(section)
-    above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
-    return drive.samples() * (-1.0 if above else 1.0)
+def _begun_at(system: System, columns: Mapping[str, _Array], clock: _Array, phase: _Array) -> _Array:
+    """Displacement of the first tip from its mid-position at the start, m, in the frame of the ends; shape (runs,)."""
+    runs, base = phase.size, system.base_excitation
+    assert system.striker is not None
+    motions = [("drive", system.striker.drive, 1.0)]
+    if base is not None and not base.striker_on_base:
+        side = -1.0 if system.striker.side == "above" else 1.0
+        motions.append(("base_excitation", base.motion, -side if base.direction == "up" else side))
+    found = np.zeros(runs)
+    for section, drive, share in motions:
+        own = _own(columns, section, runs)
+        arguments = phase
+        if len(system.moving) > 1:
+            rate = drive.numbers(own, system.scale)["omega"]
+            arguments = phase / clock * rate + columns.get(f"{section}.phase", np.zeros(runs))
+        found = found + share * displacements(drive, own, system.scale, arguments)
+    return found
 
 
 def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
@@ -253,28 +209,13 @@ def tip_of(ensemble: Ensemble, system: System, number: int, times: _Array) -> _A
 
 def _motion_at(ensemble: Ensemble, system: System, section: str, drive: Drive, times: _Array) -> _Array:
     """Displacement and velocity of one motion of the one run of an ensemble, shape (times, 2)."""
-    begun, alone = float(ensemble.runs["phase"][0]), getattr(ensemble.drive, "alone", True)
-    if not alone:
-        times = times + begun / float(ensemble.drive_numbers[0, ensemble.drive.number_names.index("omega")])
-    own = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
-    numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
-    table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
-    memory = _samples(system, section, drive)
-    arguments = numbers["omega"][0] * times + (begun if alone else float(getattr(drive, "phase", 0.0)))
-    return np.array([tip_motion(table, memory, at) for at in arguments.tolist()]).reshape(-1, 2)
-
-
-def begun_at(driven: Driven, phase: _Array) -> _Array:
-    """Displacement of the tip from its mid-position at the start, m, shape (runs,)."""
-    if driven.kind.harmonic:
-        amplitude = driven.numbers[:, driven.kind.number_names.index("amplitude")]
-        return np.where(phase == 0.0, 0.0, amplitude * np.sin(phase))
-    numbers = driven.kind.numbers_type()
-    begun = [
-        tip_motion(numbers(*row), driven.samples, at)[0]
-        for row, at in zip(driven.numbers, phase, strict=True)
-    ]
-    return np.array(begun)
+    begun, later = float(ensemble.runs["phase"][0]), 0.0
+    if len(system.moving) > 1:
+        begun, later = float(getattr(drive, "phase", 0.0)), begun / float(ensemble.clock[0])
+    kind, number = numbered(section)
+    above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
+    motion, _ = motion_of(drive, system.scale, begun, later, -1.0 if above else 1.0)
+    return np.array([motion(at)[:2] for at in times.tolist()]).reshape(-1, 2)
 
 
 def _is_around(section: str) -> bool:
@@ -344,19 +285,17 @@ def make_ensemble(
     if step_factor != 1.0:
         plans = [each.scaled(step_factor) for each in plans]
     _require_clock(system, state)
-    driven = driven_of(system, columns, runs)
+    clock = clock_of(system, columns, runs)
     table = np.zeros(runs, dtype=RUN)
     places = _places(structure, table, columns.get("contact.location", np.full(runs, 0.5)))
     since = state.flat().contact_times(max(1, len(system.contacts)))
     units = np.array([each.unit for each in system.harvesters] or [1.0])
     starts = _starts(structure, table, state, since, units)
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
-    table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, driven)
-    highest = table["rest_contact"] + table["offset"] + driven.highest
-    if structure.bodies or driven.kind.parts or len(system.contacts) > 1 or system.local_forces:
-        highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
-    time = clocked(table, system, integration, driven.period, plans, periods)
-    _require_record(system, table, driven)
+    table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, clock)
+    highest = table["rest_contact"] + table["offset"] + highest_of(system, columns, runs)
+    time = clocked(table, system, integration, cycles_of(system, columns), plans, periods)
+    _require_record(system, table, clock)
     _decisions(table, system, structure, integration, time, places.location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
     law: type[ContactLaw] = HertzContact if system.contact_law is None else type(system.contact_law)
@@ -365,10 +304,9 @@ def make_ensemble(
         scale=system.scale,
         order=plans[0].order,
         law=law,
-        drive=driven.kind,
         runs=table,
-        drive_numbers=driven.numbers,
-        samples=driven.samples,
+        clock=clock,
+        comes_round=len(system.moving) < 2 and all(drive.is_periodic for _, drive in system.moving),
         location=places.location,
         highest=highest,
         contact_rows=places.rows,
@@ -393,14 +331,13 @@ def _systems(system: System, points: Mapping[str, _Array], runs: int) -> tuple[S
     return tuple(system.replace(**changes) for changes in found)
 
 
-def _require_record(system: System, table: NDArray[Any], driven: Driven) -> None:
+def _require_record(system: System, table: NDArray[Any], clock: _Array) -> None:
     """Refuse runs that last longer than the shortest record."""
     records: list[Any] = [each for _, each in system.moving if each.recorded]
     if not records:
         return
     record = min(records, key=lambda each: each.duration)
-    omega = driven.numbers[:, driven.kind.number_names.index("omega")]
-    ends = float((table["end"] * table["tick"] + table["phase"] / omega).max())
+    ends = float((table["end"] * table["tick"] + table["phase"] / clock).max())
     if ends > record.duration * (1.0 + 1e-9) + float(table["tick"].max()):
         what = record.name.replace("_", " ")
         raise InputError(
@@ -655,7 +592,7 @@ def _offsets(
     table: NDArray[Any],
     rows: _Array,
     starts: _Array,
-    driven: Driven,
+    clock: _Array,
 ) -> _Array:
     """Penetration of the tip at mid-stroke into the beam at rest in the first well."""
     if system.striker is None:
@@ -669,7 +606,7 @@ def _offsets(
     pairs = {(int(run["contact_row"]), int(run["start_row"])) for run in table}
     reach = {(workspace, at): float(rows[workspace] @ starts[at, 0]) for workspace, at in pairs}
     touching = np.array([reach[int(run["contact_row"]), int(run["start_row"])] for run in table])
-    begun = begun_at(driven, table["phase"])
+    begun = _begun_at(system, columns, clock, table["phase"])
     offset = touching - begun
     if "contact.gap" in columns:
         # the gap is that to the beam at rest, which a local force moves out of the well of the structure

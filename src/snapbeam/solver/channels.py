@@ -340,8 +340,7 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
         return
     own = _own(columns, section, runs)
     alone = len(system.moving) < 2
-    clock = ensemble.drive_numbers[:, ensemble.drive.number_names.index("omega")]
-    begun = table["phase"] / clock
+    begun = table["phase"] / ensemble.clock
     kind, number = numbered(section)
     above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
     bounds = _bounds(drive, own, system)

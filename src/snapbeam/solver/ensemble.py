@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.contact.base import ContactLaw
-from snapbeam.model.drive.base import Drive, Scale
+from snapbeam.model.drive.base import Scale
 from snapbeam.solver.structure import Structure
 
 _REALS = (
@@ -81,20 +81,19 @@ class FurtherContactTable:
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """Runs of one structure under one law of contact and one kind of drive, ready for any engine."""
+    """Runs of one structure, ready for any engine."""
 
     structure: Structure
     scale: Scale
     order: int
     """Order of the composition."""
     law: type[ContactLaw]
-    drive: type[Drive]
     runs: NDArray[Any]
     """Records of :data:`~snapbeam.solver.ensemble.RUN`, shape (runs,)."""
-    drive_numbers: _Array
-    """Numbers of the drive likewise."""
-    samples: _Array
-    """Tables of the drive."""
+    clock: _Array
+    """Rate of the phase of each run, rad/s."""
+    comes_round: bool
+    """True if the phase repeats after one turn."""
     location: _Array
     """x_s of each run."""
     highest: _Array
@@ -150,18 +149,6 @@ class Ensemble:
         """Flight step of each run, s."""
         times: _Array = self.runs["step"] * self.runs["tick"]
         return times
-
-    @property
-    def max_halvings(self) -> int:
-        """Most halvings of the flight step that any run takes."""
-        return int(self.runs["max_halvings"].max())
-
-    @property
-    def fastest(self) -> float:
-        """Maximum angular frequency of a mode or a drive, rad/s."""
-        names = self.drive.number_names
-        rate = names.index("fastest") if "fastest" in names else 0
-        return max(float(self.structure.omega.max()), float(self.drive_numbers[:, rate].max()))
 
 
 # What describes one run of an ensemble to an engine: a record by name, SI units, as the striker pushes: positive into the beam.

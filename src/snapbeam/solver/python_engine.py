@@ -25,9 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from snapbeam.model.drive.base import Drive, Scale
+from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.sum import SumDrive
 from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.excitation import Motion, motion_of
 from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records, nodes_of
 from snapbeam.solver.statistics import WORKS, OutputStates, Recorded
 from snapbeam.solver.step_size import seconds_of
@@ -35,7 +36,6 @@ from snapbeam.util.diagnostics import Diagnostic, Severity, tell
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
-_Motion = Callable[[float], tuple[float, float, float]]
 _Event = Callable[[float, _Array], float]
 _RTOL = {4: 1e-9, 6: 2e-12}
 """Relative error of a step by the order of the accuracy level."""
@@ -50,39 +50,6 @@ _SECONDS, _TURN = 1.5e-3, 0.6
 _SLOW = "engine = 'python' is made to be read: here about {:.0f} times slower than engine = 'native', some {:.1g} s a run"
 
 
-def motion_of(
-    drive: Drive, scale: Scale, phase: float, later: float, sign: float
-) -> tuple[_Motion, list[float]]:
-    """w(t), w'(t) and w''(t) of a drive that began *later* seconds ago at a *phase*, and the times at which it jumps."""
-    if isinstance(drive, SumDrive):
-        own = [(each, scale, getattr(each, "phase", 0.0)) for each in drive.parts_of_sum]
-        terms = [motion_of(*each, later, sign) for each in own]
-        begun = sum(motion_of(*each, 0.0, sign)[0](0.0)[0] for each in own if each[0].harmonic)
-
-        def together(t: float) -> tuple[float, float, float]:
-            w, v, a = (sum(each) for each in zip(*(term(t) for term, _ in terms), strict=True))
-            return w - begun, v, a
-
-        return together, [at for _, jumps in terms for at in jumps]
-    columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
-    kind: Any = drive.integrated_as or type(drive)
-    found, samples = drive.numbers(columns, scale), sign * drive.samples()
-    numbers = kind.numbers_type()(*(float(found[name][0]) for name in kind.number_names))
-    omega = numbers.omega
-
-    def harmonic(t: float) -> tuple[float, float, float]:
-        angle, size = omega * (t + later) + phase, numbers.amplitude
-        w = size * math.sin(angle)
-        return w, size * omega * math.cos(angle), -(omega**2) * w
-
-    def general(t: float) -> tuple[float, float, float]:
-        at = omega * (t + later) + phase
-        return *kind.motion(numbers, samples, at), kind.acceleration(numbers, samples, at)
-
-    jumps = [getattr(numbers, name) - later - phase / omega for name in kind.discontinuities]
-    return harmonic if kind.harmonic else general, jumps
-
-
 class Contact(NamedTuple):
     """A tip and its law."""
 
@@ -90,7 +57,7 @@ class Contact(NamedTuple):
     row: _Array
     offset: float
     """d_j0."""
-    motion: _Motion
+    motion: Motion
     follows: float
     """Share of the motion of the base in that of the tip, in the frame of the ends."""
     memory: int | None
@@ -109,10 +76,9 @@ class Equations:
         self.g, self.G, self.gamma = structure.well, structure.coupling, structure.nonlinear_stiffness
         self.b: Any = structure.base_load
         self.breaks: list[float] = []
-        clock, alone = ensemble.drive.number_names.index("omega"), getattr(ensemble.drive, "alone", True)
-        begun, omega = float(table["phase"]), float(ensemble.drive_numbers[run, clock])
+        alone, begun, omega = len(system.moving) < 2, float(table["phase"]), float(ensemble.clock[run])
 
-        def moves(drive: Drive, sign: float = 1.0) -> _Motion:
+        def moves(drive: Drive, sign: float = 1.0) -> Motion:
             # one motion alone goes on at its phase, several share a clock
             own = (getattr(drive, "phase", 0.0), begun / omega)
             own = (begun, 0.0) if alone and not isinstance(drive, SumDrive) else own

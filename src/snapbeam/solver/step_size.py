@@ -313,7 +313,7 @@ class _Bench:
             "gamma": float(self.structure.nonlinear_stiffness), "shift": None, "far_force": self.force.copy(), "second": None, "high": None,
             "beam": np.ones(n), "lift": 0.0, "block_sizes": self.blocks, "laws": np.zeros(0, np.int32),
             "signals": 0, "uses": nothing, "signal_kinds": np.zeros(0, np.int32), "windows": np.zeros(0, np.int32), "jumps": 0, "law_numbers": 0, "center": zero, "center_rest": 0.0, "dividing_height": 0.0, "levels": 2,
-            "fewest_parts": 1, "parts_per_decay": 1.0,
+            "update": np.zeros(0, np.int64), "fewest_parts": 1, "parts_per_decay": 1.0,
         }  # fmt: skip
 
     def fewest(self, limit: float) -> float:
@@ -356,7 +356,7 @@ def _free_runs(rest: _Array, velocity: _Array, steps: _Array, counts: _Array) ->
         "since": np.zeros((runs, 0)), "rows": np.zeros((1, n)), "row_of": np.zeros((runs, 1), np.int32), "rest": np.zeros((runs, 1)),
         "q": np.tile(rest, (runs, 1)), "p": np.tile(velocity, (runs, 1)), "order": np.argsort(-counts, kind="stable").astype(np.int32),
         "outputs": 1, "states": np.full((runs, 1, 2 * n + 1), np.nan), "statistics": np.zeros((runs, _core.STATISTICS)),
-        "of_channels": np.zeros((runs, 0, _core.OF_CHANNEL)),
+        "of_channels": np.zeros((runs, 0, _core.OF_CHANNEL)), "held": np.zeros((runs, 0)),
         "account": 0,
     }  # fmt: skip
 

@@ -106,8 +106,6 @@ class Drive:
     integrated_as: ClassVar[type[Drive] | None] = None
     """The drive whose kernels integrate it, if they are those of another drive."""
     number_names: ClassVar[tuple[str, ...]] = ("omega",)
-    parts: ClassVar[tuple[tuple[str, type[Drive]], ...]] = ()
-    """The moving parts by name, if several motions are integrated as one: :mod:`snapbeam.model.drive.combined`."""
     terms: ClassVar[tuple[type[Drive], ...]] = ()
     """The kinds that it is a sum of."""
     amplitudes: ClassVar[tuple[str, ...]] = ("amplitude",)
