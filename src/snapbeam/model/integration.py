@@ -42,7 +42,7 @@ class Integration:
         Multiple of omega_1 above which the energy of a mode counts as high, for ``high_frequency_energy_fraction``.
     max_steps : int, optional
         Maximum number of steps of one run. If free flight alone needs more, an InputError is raised; if
-        contacts need more, the run ends with the status STEP_LIMIT. Default: about one hour on one core, 6e9
+        contacts need more, the run ends with the status STEP_LIMIT. Default: about one hour on one core, 1e10
         steps with 1 mode, 7e8 with 64.
 
     Raises

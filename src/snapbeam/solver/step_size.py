@@ -437,8 +437,8 @@ def choose_base_step(
 # The clock of a run: time in ticks, so that halved steps and located events are whole numbers.
 
 
-_STEP_COST, _MODE_COST = 0.5e-6, 0.07e-6
-"""Seconds of one core for a step, and more of it for each mode."""
+_STEP_COST, _MODE_COST, _PAIR_COST = 0.3e-6, 0.02e-6, 0.8e-9
+"""Seconds of one core for a step, and more of it for each mode and each pair of modes."""
 _FEWEST_CLOCK = 4.0
 """Flight steps, at least, in a cycle of excitation and in a period of the first mode, of a step that was asked for."""
 
@@ -559,7 +559,7 @@ def require_resolved(system: System, integration: Integration, cycle: _Array) ->
 
 def seconds_of(steps: float, modes: int) -> float:
     """Estimated time of a number of steps on one core, s, within a factor of two or three."""
-    return steps * (_STEP_COST + _MODE_COST * modes)
+    return steps * (_STEP_COST + _MODE_COST * modes + _PAIR_COST * modes**2)
 
 
 def most_steps(integration: Integration, modes: int) -> int:
@@ -607,13 +607,14 @@ def long_run(modes: int, length: float, steps: float, limited: str) -> list[Diag
     ]
 
 
-def long_sweep(runs: int, steps: float, each: float, cores: int) -> list[Diagnostic]:
+def long_sweep(runs: int, steps: float, each: float, cores: int, early: bool = False) -> list[Diagnostic]:
     """Announcement of *runs* of *steps* flight steps and *each* s on average if they may take over a minute on so many cores."""
     seconds = runs * each / cores
     if not seconds > _ANNOUNCED:
         return []
+    spent = f"{'up to' if early else 'some'} {_words(seconds)}"
     message = (
-        f"{runs} runs of {steps:.3g} steps in flight on average may take some {_words(seconds)} on {cores} "
+        f"{runs} runs of {steps:.3g} steps in flight on average may take {spent} on {cores} "
         f"core{'s' if cores > 1 else ''}, more with many contacts, and less with early termination or refinement"
     )
     numbers = {"runs": runs, "steps": steps, "cores": cores, "seconds": seconds}

@@ -428,12 +428,20 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
     return setup
 
 
+_PROBES, _GOLDEN = 64, 0.6180339887498949
+"""Points that the duration of a sweep is estimated from."""
+
+
 def announce_long_sweep(setup: SweepSetup, repeats: int = 1, *, by_cluster: bool = False) -> None:
     """Say before a sweep with *repeats* runs at each point that it may take over a minute on the cores that it uses.
 
-    The estimate is that of a run (:func:`~snapbeam.solver.step_size.seconds_of`), averaged over the limits of the axes.
+    The estimate is that of a run (:func:`~snapbeam.solver.step_size.seconds_of`), averaged over points in all parts of the sweep, or
+    over the limits of its axes if each point has a model of its own.
     """
-    columns = setup.points.take(np.array(_ends(setup.points)))
+    size, alike = setup.points.size, all(lookup(name).is_run for name in setup.points.names)
+    # multiples of the golden section fall on the columns of no grid
+    spread = np.unique((np.arange(min(size, _PROBES)) * _GOLDEN % 1.0 * size).astype(np.int64))
+    columns = setup.points.take(spread if alike else np.array(_ends(setup.points)))
     steps: list[float] = []
     seconds: list[float] = []
     for system, integration, _, points in setup.groups(columns):
@@ -445,7 +453,8 @@ def announce_long_sweep(setup: SweepSetup, repeats: int = 1, *, by_cluster: bool
     runs = setup.points.size * repeats
     threads = setup.integration.threads or usable_cores()
     cores = 1 if by_cluster else max(1, min(threads, usable_cores(), runs))
-    tell(long_sweep(runs, float(np.mean(steps)), float(np.mean(seconds)), cores))
+    early = setup.integration.early_termination
+    tell(long_sweep(runs, float(np.mean(steps)), float(np.mean(seconds)), cores, early))
 
 
 def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.int64]]:
