@@ -36,32 +36,6 @@ def pytest_configure():
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
-FIRST = (
-    "conformance/test_reference_corpus.py",
-    "lab/",
-    "conformance/",
-)
-"""The files and folders to begin with.  The first file compiles the kernels that most tests use."""
-LATER = "lab/test_test_series.py"
-"""A file of the laboratory that needs one of these kernels."""
-
-
-def pytest_collection_modifyitems(items):
-    """Sort the files so that two workers hardly ever compile the same kernel, which takes ten seconds.
-
-    With ``--dist loadfile --no-loadscope-reorder`` one worker begins with the first file.  The other runs tests of the
-    laboratory, which need no kernel, and later finds the common kernels on disk.
-    """
-
-    def place(item):
-        path = item.path.as_posix()
-        if path.endswith(LATER):
-            return len(FIRST)
-        return next((k for k, part in enumerate(FIRST) if f"/tests/{part}" in path), len(FIRST))
-
-    items.sort(key=place)
-
-
 @pytest.fixture(autouse=True)
 def close_figures():
     """Close the figures of a test: Matplotlib warns of more than twenty open ones, in whatever test comes next."""

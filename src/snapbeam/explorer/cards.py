@@ -60,7 +60,7 @@ class WindowControl:
         self._token: jobs.Token | None = None
         self._moved, self._pushed = 0, 0.0
         self._awake = False
-        self._waiting = jobs.Waiting(card.shared.compiling, card.later)
+        self._waiting = jobs.Waiting(card.later)
 
     def wake(self) -> None:
         """Start computing visible windows; the page is now loaded in a browser."""
@@ -170,9 +170,9 @@ class WindowControl:
             self._pushed = now
             self.card.post(lambda: self._draw_growing(window, token))
 
-    def _still(self, seconds: float, why: str) -> None:
+    def _still(self, seconds: float) -> None:
         if self._token is not None:
-            self.card.tell(f"computing this view, {seconds:.0f} s" + (f"; {why}" if why else ""))
+            self.card.tell(f"computing this view, {seconds:.0f} s")
 
     def _draw_growing(self, window: maps.Window, token: jobs.Token) -> None:
         if token is not self._token:
@@ -210,7 +210,7 @@ class WindowControl:
         if self._token is not None:
             self._token.cancel()
             self._token = None
-            self._waiting.end(0, computed=False)
+            self._waiting.end(0)
             self.card.stop.visible = False
         self.card.more.visible = False
         if words:

@@ -1,6 +1,6 @@
 """Background jobs of a page: newest first, cancelled by a new request.
 
-Kernels let go of Python's lock, so that threads are enough.  A job hears that it is cancelled where it reports its
+The core lets go of Python's lock, so that threads are enough.  A job hears that it is cancelled where it reports its
 progress; a window's next batch waits while a run, which a person waits for, is computed.
 """
 
@@ -37,7 +37,7 @@ class Cancelled(Exception):
 class Token:
     """Cancellation token of a job, with a time limit.
 
-    The time before its first report, in which an engine may be compiled, is not counted.
+    The time before its first report, in which a user's laws may be compiled, is not counted.
     """
 
     seconds: float = float("inf")
@@ -206,7 +206,7 @@ def conditioned(run: Run, token: Token) -> str:
 
 
 # ----------------------------------------------------------------------------------------------------
-# What a page says while one waits: for how long so far, and that the engine is being compiled.
+# What a page says while one waits: for how long so far.
 
 
 _FIRST = 700
@@ -214,63 +214,27 @@ _FIRST = 700
 _AGAIN = 1000
 
 
-class Compiling(logging.Handler):
-    """Hears in the package's log that code is being compiled.
-
-    Attributes
-    ----------
-    words : str
-        What was said of it; empty if nothing is compiled.
-    """
-
-    def __init__(self) -> None:
-        super().__init__(logging.INFO)
-        self.words = ""
-        self._log = logging.getLogger("snapbeam")
-        self._before = self._log.level
-        self._log.addHandler(self)
-        if self._log.getEffectiveLevel() > logging.INFO:
-            self._log.setLevel(logging.INFO)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Hear one line."""
-        text = record.getMessage()
-        if text.startswith("compiling"):
-            self.words = text
-
-    def over(self) -> None:
-        """Something was computed: what it needed is compiled."""
-        self.words = ""
-
-    def close(self) -> None:
-        """Hear no more."""
-        self._log.removeHandler(self)
-        self._log.setLevel(self._before)
-        super().close()
-
-
 class Waiting:
     """The waits of one page.
 
     Parameters
     ----------
-    heard : Compiling
     later : callable
         ``later(work, milliseconds)``: do something on the page's own thread a little later.
     """
 
-    def __init__(self, heard: Compiling, later: Callable[[Callable[[], None], int], object]) -> None:
-        self._heard, self._later = heard, later
+    def __init__(self, later: Callable[[Callable[[], None], int], object]) -> None:
+        self._later = later
         self._asked: dict[int, object] = {}
 
-    def begin(self, which: int, tell: Callable[[float, str], None]) -> object:
-        """Call ``tell(seconds, words)`` every second until *which* ends, or begins again; returns what stands for it."""
+    def begin(self, which: int, tell: Callable[[float], None]) -> object:
+        """Call ``tell(seconds)`` every second until *which* ends, or begins again; returns what stands for it."""
         begun, mark = time.monotonic(), object()
         self._asked[which] = mark
 
         def look() -> None:
             if self._asked.get(which) is mark:
-                tell(time.monotonic() - begun, self._heard.words)
+                tell(time.monotonic() - begun)
                 self._later(look, _AGAIN)
 
         self._later(look, _FIRST)
@@ -280,10 +244,9 @@ class Waiting:
         """Return whether the wait that :meth:`begin` started for *mark* continues."""
         return self._asked.get(which) is mark
 
-    def end(self, which: int, computed: bool = True) -> None:
-        """There is something to see, or, if nothing was *computed*, no more to wait for."""
-        if self._asked.pop(which, None) is not None and computed:
-            self._heard.over()
+    def end(self, which: int) -> None:
+        """There is something to see, or no more to wait for."""
+        self._asked.pop(which, None)
 
 
 # ----------------------------------------------------------------------------------------------------

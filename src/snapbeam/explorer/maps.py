@@ -1349,7 +1349,7 @@ def _filled(
 ) -> Window:
     window.asks = None
     structural = [not _is_run(name) for name in window.names]
-    paced, spent = (2, 0.0) if window.seconds else (0, 0.0)  # the first batch may compile the engine
+    paced, spent = (2, 0.0) if window.seconds else (0, 0.0)  # the first batch may compile a user's laws
     for stride in _STRIDES:
         (row0, rows), (column0, columns) = _blocks(window.y.size, stride), _blocks(window.x.size, stride)
         refines = window.refines(stride)

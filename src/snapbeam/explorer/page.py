@@ -128,7 +128,7 @@ class Page(jobs.Tab):
         self.card.asked = self.ask
         self.card.moved = self.write_address
         self.card.cut_moved = self._cut_moved
-        self.waiting = jobs.Waiting(shared.compiling, self.later)
+        self.waiting = jobs.Waiting(self.later)
         self.runs = [RunView(self.look, "A", self.post, self.later)]
         self.runs[0].turned = self.write_address
         self.points: list[maps.Point | None] = [None, None]
@@ -186,9 +186,8 @@ class Page(jobs.Tab):
         self.later(self._at_rest, _AFTER)
 
     def _at_rest(self) -> None:
-        """Build hidden parts and prepare the first run after the page is loaded."""
+        """Build hidden parts after the page is loaded."""
         self.runs[0].complete()
-        self.shared.warm()
 
     def system_card(self) -> SystemCard:
         """The card of the system, made when it is first needed."""
@@ -282,7 +281,7 @@ class Page(jobs.Tab):
         if token is not None:
             token.cancel()
         self.points[which] = None
-        self.waiting.end(which, computed=False)
+        self.waiting.end(which)
         self.runs[which].forget()
         self._mark()
 
@@ -336,7 +335,7 @@ class Page(jobs.Tab):
 
         self.shared.jobs.run(work, done, token)  # what follows is said while it is computed
         view.notes = {}
-        mark = self.waiting.begin(which, lambda seconds, why: view.wait(words, seconds, why))
+        mark = self.waiting.begin(which, lambda seconds: view.wait(words, seconds))
         self.later(lambda: view.begin(words) if self.waiting.waits(which, mark) else None, _PATIENT)
         with self._together():
             self._fill_fields(point)

@@ -955,11 +955,9 @@ class RunView:
         self._write_notes()
         self._head(style.BUSY.format("computing"), words)
 
-    def wait(self, words: str, seconds: float, why: str) -> None:
-        """Say for how long it has been computed, and what takes the time if that is known."""
-        self._head(
-            style.BUSY.format(f"computing, {seconds:.0f} s"), words, style.FAINT.format(why) if why else ""
-        )
+    def wait(self, words: str, seconds: float) -> None:
+        """Say for how long it has been computed."""
+        self._head(style.BUSY.format(f"computing, {seconds:.0f} s"), words)
 
     def fail(self, words: str) -> None:
         """Say why there is no run; the pictures of the run before are greyed."""

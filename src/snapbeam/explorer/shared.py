@@ -7,9 +7,8 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
-import snapbeam as sb
 from snapbeam import InputError, Integration, System
-from snapbeam.explorer.jobs import Compiling, Jobs, Token
+from snapbeam.explorer.jobs import Jobs
 from snapbeam.explorer.maps import Source, Window, integration_of, system_of
 
 _WINDOWS = 48
@@ -31,8 +30,6 @@ class Shared:
         self.source = source
         self.file = file
         self.jobs = Jobs()
-        self.compiling = Compiling()
-        self._warm = False
         self.pages = 0
         self._lock = threading.Lock()
         self._windows: OrderedDict[Any, Window] = OrderedDict()
@@ -44,19 +41,6 @@ class Shared:
             self.integration = integration_of(source.attrs)
         except (InputError, ValueError) as error:
             self.why_not = str(error)
-
-    def warm(self) -> None:
-        """Have the engine compiled, or fetched from the disk, while nobody waits for it; once."""
-        system, how = self.system, self.integration
-        if self._warm or system is None:
-            return
-        self._warm = True
-        short = how.replace(cycles=1, engine="auto", threads=None)
-
-        def work(token: Token) -> object:
-            return sb.simulate(system, short, progress=token.check).dataset
-
-        self.jobs.run(work, lambda *_: self.compiling.over(), Token())
 
     def window(self, made: Window) -> Window:
         """The window that was computed for the same question, or *made*, kept from now on."""
@@ -76,7 +60,6 @@ class Shared:
     def close(self) -> None:
         """Compute no more."""
         self.jobs.close()
-        self.compiling.close()
 
 
 def _area(window: Window) -> float:

@@ -89,7 +89,7 @@ def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
     )
 
 
-# What moves in every run of an ensemble, and as which drive kernels integrate it.
+# What moves in every run of an ensemble, and as which drive it is integrated.
 
 
 class Driven(NamedTuple):
@@ -142,7 +142,7 @@ def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _A
 
 
 def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
-    """Arrange the striker's drive, or it and what else moves, for kernels."""
+    """Arrange the striker's drive, or it and what else moves, for the engine."""
     if any(section != "drive" for section, _ in system.moving):
         return _together(system, columns, runs)
     scale, striker = system.scale, system.striker

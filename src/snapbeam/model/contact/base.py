@@ -161,7 +161,7 @@ class ContactLaw:
 
     @classmethod
     def numbers_type(cls) -> Any:
-        """The named tuple of the law's numbers, as kernels see them; an attribute of the class, ``Numbers``."""
+        """The named tuple of the law's numbers, as its functions get them; an attribute of the class, ``Numbers``."""
         fields = [item.name for item in dataclasses.fields(cls)]  # type: ignore[arg-type]
         return numbers_type(cls, (*fields, cls.memory) if cls.memory else fields)
 

@@ -1,4 +1,4 @@
-"""Several motions that kernels integrate as one drive: those of tips, the base, the axial load and external forces.
+"""Several motions that are integrated as one drive: those of tips, the base, the axial load and external forces.
 
 A run has one clock, whose argument belongs to one drive.  If one thing alone moves, the argument is its own, and what
 repeats goes on repeating; of several each has its argument from the time since they began.
@@ -20,7 +20,7 @@ _SEPARATOR = "__"
 class Joined(Drive):
     """Motions of several parts; subclasses are made by :func:`joined`, one for each mixture of kinds.
 
-    Kernels see the numbers of each part under its name, as ``base_amplitude``; unless one moves *alone*, its phase at
+    The engine sees the numbers of each part under its name, as ``base_amplitude``; unless one moves *alone*, its phase at
     the start too.  Of a base and of each external force they see a bound on its acceleration, or on itself, as
     ``base_hardest``; of a base the sign ``base_sign`` with which it counts in space, and ``base_follow``, how much of its
     motion the tip makes in the frame of the ends.
