@@ -50,7 +50,7 @@ class LawProperties:
     energy_bound: bool = True
     """Untouched, the beam's energy only falls: which early termination needs."""
     smooth: bool = True
-    """The force is continuous where contact begins and ends, so that the tangent flow is plain."""
+    """The force is continuous where contact begins and ends, so that tangents do not jump."""
     tangent: bool = True
     """Small changes of the state can be carried along."""
 
