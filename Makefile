@@ -96,9 +96,9 @@ test:
 	$(MAKE) --no-print-directory --jobs 2 lint quick-tests
 
 quick-tests: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile
 
-# Lines of the core and its parts that the quick tests run; compiled code counts as not run.
+# Lines of the core and its parts that the quick tests run; the native core is not counted.
 coverage: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS) --dist loadfile --cov=snapbeam --cov-report=term --cov-report=xml
 
@@ -111,7 +111,7 @@ OLDEST_PYTHON ?= python3.11
 
 $(OLDEST)/.installed: pyproject.toml $(CORE) tests/reliability/oldest.py
 	$(OLDEST_PYTHON) -m venv $(OLDEST)
-	$(OLDEST)/bin/python tests/reliability/oldest.py lab cluster video test > $(OLDEST)/oldest.txt
+	$(OLDEST)/bin/python tests/reliability/oldest.py lab cluster video laws test > $(OLDEST)/oldest.txt
 	$(OLDEST)/bin/python -m pip install --quiet --requirement $(OLDEST)/oldest.txt
 	$(OLDEST)/bin/python -m pip install --quiet --no-deps --editable .
 	@touch $@
@@ -135,7 +135,7 @@ bench: $(VENV)/.installed-bench
 lock: constraints.txt
 	$(PIP) install uv
 	$(BIN)/uv pip compile --quiet --universal --generate-hashes --no-header --no-annotate --constraint constraints.txt \
-		--python-version 3.11.5 --extra lab --extra cluster --extra video --group dev pyproject.toml \
+		--python-version 3.11.5 --extra lab --extra cluster --extra video --extra laws --group dev pyproject.toml \
 		--output-file requirements-dev.txt
 
 audit: $(VENV)/.installed-dev

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.simulation.dataset import joined
+from snapbeam.solver import native
 from snapbeam.solver.assemble import make_ensemble
-from snapbeam.solver.cpu import driver as cpu_engine
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.step_size import Plan, choose_base_step
 
@@ -25,7 +25,6 @@ __all__ = [
     "Case",
     "model_of",
     "reference_plan",
-    "stepped",
 ]
 
 _Array = NDArray[np.float64]
@@ -118,7 +117,7 @@ class Case:
         """Displacement of the contact point from rest, in b, at :attr:`times`, by snapbeam."""
         ensemble = self.ensemble(plan, ERROR_CYCLES, factor=factor)
         end = float(ensemble.runs["tick"][0] * ensemble.runs["end"][0])
-        recorded = joined(list(cpu_engine.record(ensemble, np.minimum(self.times, end), False)))
+        recorded = joined(list(native.record(ensemble, np.minimum(self.times, end), False)))
         alpha = ensemble.structure.amplitudes(recorded.q)
         shape = self.model.shape_at(self.location)
         return np.asarray(alpha @ shape / self.model.length_scale) - self.at_rest
@@ -143,11 +142,6 @@ class Case:
         return float(difference.max()) if np.isfinite(difference).all() else math.inf
 
 
-def stepped(plan: Plan, factor: float) -> Plan:
-    """The same plan with every step multiplied by *factor*."""
-    return plan._replace(step=plan.step * factor)
-
-
 def reference_plan(case: Case) -> Plan:
     """Half the steps of the level "reference"."""
-    return stepped(case.default_plan("reference"), 0.5)
+    return case.default_plan("reference").scaled(0.5)

@@ -9,7 +9,7 @@ import numpy as np
 
 from snapbeam.plot.style import figure_style, new_figure, save_figure
 
-__all__ = ["layouts_chart", "requests_chart", "scaling_chart", "work_precision_chart"]
+__all__ = ["requests_chart", "scaling_chart", "work_precision_chart"]
 
 # library: colour; method: marker and line
 _COLORS = {
@@ -110,7 +110,7 @@ def scaling_chart(data: dict[str, Any], path: Path) -> None:
     """Time per run against the number of runs; time against the number of modes."""
     with figure_style():
         figure = new_figure("double", 70.0)
-        left, middle, right = figure.subplots(1, 3)
+        left, right = figure.subplots(1, 2)
         runs, modes = data["runs"], data["modes"]
         left.plot(
             [r["runs"] for r in runs], [r["microseconds"] for r in runs], "o-", color="#000000", markersize=4
@@ -118,39 +118,10 @@ def scaling_chart(data: dict[str, Any], path: Path) -> None:
         left.set(xscale="log", xlabel="runs", ylabel=r"time per run ($\mathrm{\mu}$s)")
         left.set_ylim(0.0, 1.4 * max(r["microseconds"] for r in runs))
         count = [r["modes"] for r in modes]
-        middle.plot(count, [r["milliseconds"] for r in modes], "o-", color="#000000", markersize=4)
-        middle.set(xscale="log", yscale="log", xlabel="modes $N$", ylabel="time per 200 cycles (ms)")
-        for name, words, marker, color in (
-            ("modal_nanoseconds", "modal, dense per parity", "s-", "#B03A27"),
-            ("rank_one_nanoseconds", "rank one, undamped", "^--", "#16245E"),
-        ):
-            right.plot(count, [r[name] for r in modes], marker, color=color, markersize=4, label=words)
-        right.set(xscale="log", yscale="log", xlabel="modes $N$", ylabel="time per acceleration (ns)")
-        right.legend(loc="upper left")
-        for ax in (left, middle, right):
+        right.plot(count, [r["milliseconds"] for r in modes], "o-", color="#000000", markersize=4)
+        right.set(xscale="log", yscale="log", xlabel="modes $N$", ylabel="time per 200 cycles (ms)")
+        for ax in (left, right):
             ax.grid(True, color="#E4E4E4", linewidth=0.4)
-        for ax in (middle, right):
-            ax.set_xticks(count, [str(n) for n in count])
-            ax.xaxis.minorticks_off()
-        save_figure(figure, path)
-
-
-def layouts_chart(path: Path, records: list[dict[str, Any]]) -> None:
-    """Time of a step of one run against the number of modes, in both layouts of the CPU engine."""
-    modes = [record["modes"] for record in records]
-    with figure_style():
-        figure = new_figure("single", 62.0)
-        ax = figure.subplots()
-        for name, words, marker, color in (
-            ("modes_wide", "eight modes of a run\nin a register", "o-", "#16245E"),
-            ("runs_wide", "eight runs\nin a register", "s-", "#B03A27"),
-        ):
-            ax.plot(
-                modes, [record[name] for record in records], marker, color=color, markersize=4, label=words
-            )
-        most = max(max(record["modes_wide"], record["runs_wide"]) for record in records)
-        ax.set(xlabel="Number of modes $N$", ylabel="Time per step and run (ns)", ylim=(0.0, 1.15 * most))
-        ax.set_xticks(modes)
-        ax.grid(True, color="#E4E4E4", linewidth=0.4)
-        ax.legend(loc="lower right")
+        right.set_xticks(count, [str(n) for n in count])
+        right.xaxis.minorticks_off()
         save_figure(figure, path)

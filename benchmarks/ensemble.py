@@ -12,8 +12,8 @@ from benchmarks.cases import CONTACT, model_of
 from benchmarks.report import save, table
 from benchmarks.timing import measure
 from snapbeam.model import default_values
+from snapbeam.solver import native
 from snapbeam.solver.assemble import make_ensemble
-from snapbeam.solver.cpu import driver as cpu_engine
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.util.status_codes import RunStatus
 
@@ -82,8 +82,8 @@ def run(folder: Path, quick: bool) -> None:
 
 def _throughput(modes: int, size: int, early: bool, repeats: int) -> dict[str, Any]:
     ensemble = ensemble_of(modes, sample(size), early)
-    timing = measure(lambda: cpu_engine.run_ensemble(ensemble, 1), repeats)
-    accumulators_of_runs = cpu_engine.run_ensemble(ensemble, 1)
+    timing = measure(lambda: native.run_ensemble(ensemble, 1), repeats)
+    accumulators_of_runs = native.run_ensemble(ensemble, 1)
     whole = ensemble.runs["tick"] * ensemble.runs["end"]
     decided = accumulators_of_runs["status"] == RunStatus.EARLY_STOP
     lasted = np.where(decided, accumulators_of_runs["early_stop_time"], whole)

@@ -17,7 +17,7 @@ from benchmarks.report import save, table
 from benchmarks.rivals import LIMIT, WELL, chosen_points
 from benchmarks.timing import measure
 from snapbeam.model import default_values
-from snapbeam.solver.cpu import driver
+from snapbeam.solver import native
 
 __all__ = ["run"]
 
@@ -49,14 +49,13 @@ def run(folder: Path, quick: bool) -> None:
         }
         good = [step for step, found in errors.items() if found.max() <= LIMIT]
         ensemble = ensemble_of(modes, points, False, cycles)
-        for _ in range(1 + int(driver.FEWEST_STEPS / ensemble.work.sum())):
-            driver.run_ensemble(ensemble, 1)
+        native.run_ensemble(ensemble, 1)
         for step in dict.fromkeys((_STEP, good[0] if good else min(errors))):
             program = Program(cases, step)
             theirs, ours = [], []
             for _ in range(repeats):
                 theirs.append(measure(lambda: program.advance(cycles), 1, warm=False).seconds)  # noqa: B023
-                ours.append(measure(lambda: driver.run_ensemble(ensemble, 1), 1, warm=False).seconds)  # noqa: B023
+                ours.append(measure(lambda: native.run_ensemble(ensemble, 1), 1, warm=False).seconds)  # noqa: B023
             record = {
                 "modes": modes, "step": step, "runs": len(cases), "well_conditioned": len(fair),
                 "program_error": [float(np.median(errors[step])), float(errors[step].max())],

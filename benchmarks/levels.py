@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.cases import REQUEST_POINTS, Case, stepped
+from benchmarks.cases import REQUEST_POINTS, Case
 from benchmarks.report import save, table
 
 __all__ = ["run"]
@@ -38,7 +38,7 @@ def run(folder: Path, quick: bool) -> None:
             case = Case(modes, *point)
             for level in _PROMISED:
                 name, halved, _ = level.partition(", half")
-                plan = stepped(case.default_plan(name), 0.5 if halved else 1.0)
+                plan = case.default_plan(name).scaled(0.5 if halved else 1.0)
                 error = case.error(case.displacement(plan))
                 records.append(
                     {

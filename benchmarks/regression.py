@@ -1,6 +1,7 @@
 """The present tree against a commit, in alternating processes: ``python -m benchmarks.regression COMMIT``.
 
-Each case of ``systems`` is integrated by both trees, each with its own definition of the case and with one thread.  A process
+The tree of the commit is installed into a folder of its own, which compiles its core; of the present tree, the core that is there is
+taken (``make core``).  Each case of ``systems`` is integrated by both, each with its own definition of the case and with one thread.  A process
 counts with the least processor time of its repeats, a tree with the least of its processes.
 """
 
@@ -21,6 +22,7 @@ from benchmarks.timing import machine
 __all__ = ["compare", "main"]
 
 _ROOT = Path(__file__).resolve().parents[1]
+_SITE = "build/site"
 PAPER = "the paper's"
 DEFAULT = (
     f"{PAPER}, 1 mode", f"{PAPER}, 8 modes", f"{PAPER}, 32 modes",
@@ -30,17 +32,17 @@ _WORKER = """
 import json, sys, time
 sys.path.insert(0, sys.argv[1])
 from benchmarks import systems
-from snapbeam.solver.cpu import driver
+from snapbeam.solver.engines import engine_of
 name, runs, cycles, repeats = sys.argv[2], *map(int, sys.argv[3:])
 parts = {} if name.startswith("the paper's") else systems.MODELS[name]
 systems._MODES = int(name.split()[-2]) if name.startswith("the paper's") else 8
 ensemble = systems._ensemble(parts, runs, cycles)
-for _ in range(1 + int(driver.FEWEST_STEPS / ensemble.work.sum())):
-    steps = float(driver.run_ensemble(ensemble, 1)["steps"].sum())
+engine = engine_of(ensemble)
+steps = float(engine.run_ensemble(ensemble, 1)["steps"].sum())
 times = []
 for _ in range(repeats):
     begun = time.process_time()
-    driver.run_ensemble(ensemble, 1)
+    engine.run_ensemble(ensemble, 1)
     times.append(time.process_time() - begun)
 simulated = float((ensemble.runs["tick"] * ensemble.runs["end"]).sum())
 print(json.dumps({"time": min(times) / simulated, "step": min(times) / steps}))
@@ -49,13 +51,15 @@ print(json.dumps({"time": min(times) / simulated, "step": min(times) / steps}))
 
 @contextmanager
 def _checked_out(commit: str) -> Iterator[Path]:
-    """A folder with the tree of a commit."""
+    """A folder with the tree of a commit, and what it installs."""
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
         subprocess.run(
             ["git", "-C", str(_ROOT), "worktree", "add", "--quiet", "--detach", str(tree), commit], check=True
         )
         try:
+            pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
+            subprocess.run([*pip, "--target", str(tree / _SITE), str(tree)], check=True)
             yield tree
         finally:
             subprocess.run(["git", "-C", str(_ROOT), "worktree", "remove", "--force", str(tree)], check=True)
@@ -63,7 +67,8 @@ def _checked_out(commit: str) -> Iterator[Path]:
 
 def _timed(tree: Path, case: str, size: tuple[int, int, int]) -> dict[str, float] | None:
     """Processor time of a case, per simulated second and per step; None if the tree does not have the case."""
-    environment = os.environ | {"PYTHONPATH": str(tree / "src"), "NUMBA_NUM_THREADS": "1"}
+    site = tree / _SITE
+    environment = os.environ | {"PYTHONPATH": str(site if site.exists() else tree / "src")}
     done = subprocess.run(
         [sys.executable, "-c", _WORKER, str(tree), case, *map(str, size)],
         env=environment, cwd=tree, capture_output=True, text=True, check=False,

@@ -20,7 +20,7 @@ from benchmarks.peers import PEERS, Method, methods
 from benchmarks.report import save, table
 from benchmarks.timing import Timing, measure
 from snapbeam.model import default_values
-from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver import native
 
 __all__ = ["chosen_points", "run"]
 
@@ -36,7 +36,7 @@ def chosen_points(count: int, cycles: int) -> tuple[dict[str, np.ndarray], np.nd
     """Points at equal steps of the share of time in contact, and that share."""
     points = sample(_CANDIDATES)
     ensemble = ensemble_of(_MODES, points, False, cycles)
-    accumulators_of_runs = cpu_engine.run_ensemble(ensemble, 1)
+    accumulators_of_runs = native.run_ensemble(ensemble, 1)
     share = accumulators_of_runs["contact_time"] / (ensemble.runs["tick"] * ensemble.runs["end"])
     order = np.argsort(share)[((np.arange(count) + 0.5) / count * _CANDIDATES).astype(int)]
     return {name: values[order] for name, values in points.items()}, share[order]
@@ -101,7 +101,7 @@ def _snapbeam(cases: list[Case], points: dict[str, np.ndarray], cycles: int, rep
     """All points in one call, on one core, two runs side by side, as a map takes them."""
     errors = [case.error(case.displacement(case.default_plan())) for case in cases]
     ensemble = ensemble_of(_MODES, points, False, cycles)
-    timing = measure(lambda: cpu_engine.run_ensemble(ensemble, 1), repeats)
+    timing = measure(lambda: native.run_ensemble(ensemble, 1), repeats)
     return _record("snapbeam", "level standard, default step", errors, timing)
 
 

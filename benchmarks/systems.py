@@ -12,8 +12,8 @@ import snapbeam as sb
 from benchmarks.report import save, table
 from benchmarks.timing import measure
 from snapbeam.model import default_values
+from snapbeam.solver import native
 from snapbeam.solver.assemble import make_ensemble
-from snapbeam.solver.cpu import driver as cpu_engine
 from snapbeam.solver.ensemble import Ensemble
 
 __all__ = ["MODELS", "run"]
@@ -94,10 +94,7 @@ def _ensemble(parts: Parts, size: int, cycles: int) -> Ensemble:
 
 def _time(ensemble: Ensemble, repeats: int) -> tuple[float, float]:
     """Seconds of simulated time cost, per simulated second and per step."""
-    integrate: Callable[[], Any] = lambda: cpu_engine.run_ensemble(ensemble, 1)  # noqa: E731
-    # the layout of few modes is chosen once so much was asked for
-    for _ in range(1 + int(cpu_engine.FEWEST_STEPS / ensemble.work.sum())):
-        integrate()
+    integrate: Callable[[], Any] = lambda: native.run_ensemble(ensemble, 1)  # noqa: E731
     seconds = measure(integrate, repeats).seconds
     accumulators_of_runs = integrate()
     simulated = float(np.sum(ensemble.runs["tick"] * ensemble.runs["end"]))

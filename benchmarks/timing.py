@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from llvmlite.binding import get_host_cpu_features
+
+from snapbeam import _core
 
 __all__ = ["Timing", "machine", "measure"]
 
-_PACKAGES = ("snapbeam", "numpy", "numba", "llvmlite", "scipy", "numbalsoda", "heyoka", "diffrax", "jax")
+_PACKAGES = ("snapbeam", "numpy", "numba", "scipy", "numbalsoda", "heyoka", "diffrax", "jax")
 
 
 class Timing(NamedTuple):
@@ -71,9 +72,7 @@ def machine() -> dict[str, str | int | float]:
     facts: dict[str, str | int | float] = {
         "processor": _processor(),
         "cores": os.cpu_count() or 1,
-        "vectors": next(
-            (name for name in ("avx512f", "avx2", "neon") if get_host_cpu_features().get(name)), "none"
-        ),
+        "vectors": _core.instruction_sets()[0],
         "python": platform.python_version(),
     }
     facts |= {package: _installed(package) for package in _PACKAGES}

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.cases import POINTS, Case, stepped
+from benchmarks.cases import POINTS, Case
 from benchmarks.charts import work_precision_chart
 from benchmarks.peers import PEERS, methods
 from benchmarks.report import save, table
 from benchmarks.timing import measure
 from snapbeam.model import default_values
-from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver import native
 
 __all__ = ["LIMIT", "run"]
 
@@ -64,10 +64,10 @@ def _snapbeam(case: Case, quick: bool) -> list[dict[str, Any]]:
     settings += [("reference", factor) for factor in (4.0, 2.0, 1.0)]
     records = []
     for level, factor in settings:
-        plan = stepped(case.default_plan(level), factor)
+        plan = case.default_plan(level).scaled(factor)
         ensemble = case.ensemble(plan, _CYCLES)
         timing = measure(
-            lambda ensemble=ensemble: cpu_engine.run_ensemble(ensemble, 1),
+            lambda ensemble=ensemble: native.run_ensemble(ensemble, 1),
             1 if quick else 5,
         )
         setting = f"{1e6 * plan.step:.3g} us" + (", default" if factor == 1.0 else "")

@@ -25,7 +25,7 @@ DEAR = {
     "ex30_experiment",
     "ex42_the_paper",
 }
-"""Figures of the paper, which tests/paper draws too, and others that take seconds or compile their own kernels."""
+"""Figures of the paper, which tests/paper draws too, and others that take seconds."""
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("ex*.py"))
 
 

@@ -7,20 +7,16 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numba import carray, cfunc, types
 from numpy.typing import NDArray
 
 from benchmarks.cases import Case
 from benchmarks.peers import Method, Solver
 from benchmarks.peers.compiled import library
-from benchmarks.rhs import compiled_system
+from benchmarks.peers.rhs import compiled_system
 
 __all__ = ["METHODS"]
 
 _Array = NDArray[np.float64]
-_SIGNATURE = types.void(types.double, *3 * (types.CPointer(types.double),))
-
-
 _LIBRARY = library(Path(__file__).with_suffix(".cpp"), "-std=c++14")
 _LIBRARY.version.restype = ctypes.c_char_p
 _VERSION = _LIBRARY.version().decode().replace("_", ".")
@@ -33,18 +29,12 @@ _SOLVE.argtypes = [
 
 def _prepare(method: int, weight: float, case: Case, tolerance: float) -> Solver:
     system = compiled_system(case, weight)
-    function, size, scratch = system.function, system.initial_state.size, system.memory.size
-
-    @cfunc(_SIGNATURE)
-    def slope(t, u, du, data):  # type: ignore[no-untyped-def]
-        function(t, carray(u, (size,)), carray(du, (size,)), carray(data, (scratch,)))
-
-    address = slope.address
+    size = system.initial_state.size
 
     def solve(times: _Array, out: _Array | None) -> bool:
         when = np.ascontiguousarray(times, dtype=np.float64)
         failed = _SOLVE(
-            method, address, system.memory.ctypes.data, system.initial_state.ctypes.data, size, when.ctypes.data, when.size,
+            method, system.address, system.memory.ctypes.data, system.initial_state.ctypes.data, size, when.ctypes.data, when.size,
             tolerance, None if out is None else out.ctypes.data,
         )  # fmt: skip
         return not failed
@@ -56,7 +46,6 @@ def _prepare(method: int, weight: float, case: Case, tolerance: float) -> Solver
         return np.asarray(system.coordinates(states) @ case.at_contact)
 
     def advance(end: float) -> None:
-        assert slope is not None  # the compiled function must outlive its address
         solve(np.array([0.0, end]), None)
 
     return Solver(sample, advance)

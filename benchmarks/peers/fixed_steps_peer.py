@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from benchmarks.cases import CONTACT, Case
 from benchmarks.peers import Method, Solver
 from benchmarks.peers.compiled import library
-from benchmarks.rhs import equations_of
+from benchmarks.peers.equations import equations_of
 from snapbeam.solver.structure import structure_of
 
 __all__ = ["METHODS", "Program"]

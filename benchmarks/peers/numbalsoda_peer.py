@@ -6,13 +6,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numba import carray, cfunc
-from numbalsoda import dop853, lsoda, lsoda_sig
+from numbalsoda import dop853, lsoda
 from numpy.typing import NDArray
 
 from benchmarks.cases import Case
 from benchmarks.peers import Method, Solver
-from benchmarks.rhs import compiled_system
+from benchmarks.peers.rhs import compiled_system
 
 __all__ = ["METHODS"]
 
@@ -22,17 +21,10 @@ _MOST_STEPS = 10**8
 
 def _prepare(solver: Any, weight: float, case: Case, tolerance: float) -> Solver:
     system = compiled_system(case, weight)
-    function, size, scratch = system.function, system.initial_state.size, system.memory.size
-
-    @cfunc(lsoda_sig)
-    def slope(t, u, du, data):  # type: ignore[no-untyped-def]
-        function(t, carray(u, (size,)), carray(du, (size,)), carray(data, (scratch,)))
-
-    address = slope.address
 
     def solve(times: _Array) -> _Array:
         states, success = solver(
-            address,
+            system.address,
             system.initial_state,
             times,
             system.memory,
@@ -46,7 +38,6 @@ def _prepare(solver: Any, weight: float, case: Case, tolerance: float) -> Solver
         return np.asarray(system.coordinates(solve(times)) @ case.at_contact)
 
     def advance(end: float) -> None:
-        assert slope is not None  # the compiled function must outlive its address
         solve(np.array([0.0, end]))
 
     return Solver(sample, advance)

@@ -12,7 +12,7 @@ from scipy.integrate import odeint, solve_ivp
 
 from benchmarks.cases import Case
 from benchmarks.peers import Method, Solver
-from benchmarks.rhs import compiled_system
+from benchmarks.peers.rhs import compiled_system
 
 __all__ = ["METHODS"]
 
@@ -26,7 +26,7 @@ def _prepare(solver: str, weight: float, case: Case, tolerance: float) -> Solver
     @njit(error_model="numpy")
     def slope(t: float, u: _Array, memory: _Array) -> _Array:
         du = np.empty(u.size)
-        function(t, u, du, memory)
+        function(t, u.ctypes, du.ctypes, memory.ctypes)
         return du
 
     options: dict[str, Any] = {"rtol": tolerance, "atol": tolerance, "args": (system.memory,)}

@@ -11,12 +11,9 @@ from typing import Any
 import lazy_loader
 
 from snapbeam.parts import PARTS, load_part
-from snapbeam.util.compilation_notice import announce_compilation
 
 # The stub __init__.pyi lists the public names; each is loaded when it is first used.
 _load_public_name, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-
-announce_compilation()
 
 
 def __getattr__(name: str) -> Any:

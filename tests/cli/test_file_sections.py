@@ -95,7 +95,7 @@ def test_every_combination_makes_a_system_or_names_the_section(tmp_path, capsys,
 
 
 class ReachedError(Exception):
-    """Raised in place of the first kernel: the command has read, checked and arranged everything."""
+    """Raised in place of the first run: the command has read, checked and arranged everything."""
 
 
 COMMANDS = {
@@ -160,7 +160,7 @@ def file_of(chosen, command):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_commands_before_the_first_kernel(cli, monkeypatch, command):
+def test_commands_before_the_first_run(cli, monkeypatch, command):
     def reached(*_, **__):
         raise ReachedError
 

@@ -99,7 +99,7 @@ def local_forces() -> list[str]:
 
 
 def features_of(seed: int) -> Features:
-    """The parts that a seed draws, the same for a few seeds: their runs need one kernel."""
+    """The parts that a seed draws, the same for a few seeds."""
     rng = np.random.default_rng([seed // SAME, 0])
 
     def some(names: Any, *weights: float) -> tuple[str, ...]:

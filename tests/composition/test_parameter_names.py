@@ -134,7 +134,7 @@ COMMANDS = {
 }
 
 
-@pytest.mark.slow  # each command has its own kernels
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize(
     ("names", "value", "axis"),

@@ -26,7 +26,7 @@ SYSTEMS = {
 }
 
 
-@pytest.mark.slow  # three systems are six kernels to compile
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [1, 3])
 @pytest.mark.parametrize("name", list(SYSTEMS))
 def test_tangents_are_the_derivatives(name: str, modes: int) -> None:

@@ -83,7 +83,7 @@ def test_tutorial(name, tmp_path, monkeypatch, capsys):
     follow(name, capsys)
 
 
-@pytest.mark.slow  # two workers are started twice, each of which loads the kernels
+@pytest.mark.slow  # two workers are started twice
 def test_tutorial_of_a_long_sweep(tmp_path, monkeypatch, capsys):
     """Ctrl-C is pressed once, after the first finished task."""
     monkeypatch.chdir(tmp_path)

@@ -33,7 +33,7 @@ LONG = [
     pytest.param(name, marks=pytest.mark.slow)
     for name in ("base", "both", "load", "struck", "struck under a load")
 ]
-"""Each has two kernels of its own, twenty seconds to compile."""
+"""Systems whose exponents take long."""
 
 
 @pytest.mark.parametrize("name", LONG)

@@ -158,8 +158,6 @@ def random_system(rng: np.random.Generator) -> sb.System:
             sb.LocalSpring(stiffness=float(rng.uniform(1e-4, 1e-2)), location=at, coordinate="rotation"),
             sb.MagneticForce(strength=float(rng.uniform(1e-10, 3e-9)), gap=gap, location=at),
         ]))  # fmt: skip
-    # one order of the laws, so that few kernels are compiled
-    forces.sort(key=lambda each: type(each).__name__)
     if rng.random() < 0.5:
         constant, at = float(rng.normal(0.0, 0.01)), float(rng.uniform(0.2, 0.8))
         forces.append(sb.ExternalForce(history=sb.ConstantForce(force=constant), location=at))

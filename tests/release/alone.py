@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 CONSTRAINTS = ROOT / "constraints.txt"
-EXTRAS = ("lab", "video", "cluster", "explorer", "cuda")
+EXTRAS = ("lab", "video", "cluster", "explorer", "laws")
 """What users install; the others are for working on snapbeam."""
 
 _SYSTEM = (
@@ -36,13 +36,14 @@ _SIGNAL = (
     "np.savetxt('velocity.csv', np.c_[t, 0.02 * ramp * np.sin(2 * np.pi * 100 * t)], delimiter=',', "
     "header='time_s,velocity_m_s', comments='')"
 )
-_CUDA = (
-    f"import numba.cuda; {_SYSTEM}\n"
-    "try:\n"
-    "    print(sb.simulate(system, sb.Integration(cycles=2, engine='cuda')))\n"
-    "except sb.InputError as error:\n"
-    "    assert not numba.cuda.is_available() and 'cuda' in str(error).lower(), error\n"
-    "    print('no device:', error)\n"
+_LAWS = (
+    f"import warnings; warnings.simplefilter('error'); {_SYSTEM}\n"
+    "from snapbeam.solver.statistics import Statistic, register_statistic\n"
+    "def deepest(held, step):\n"
+    "    return max(held, step.penetration[1])\n"
+    "row = Statistic('deepest', 'float64', 'm', 'maximum penetration', lambda reading, held: held, update=deepest)\n"
+    "register_statistic(row)\n"
+    "print(sb.simulate(system, sb.Integration(cycles=2)))\n"
 )
 _GRID = "--frequency-ratio 1:1.5:3 --velocity-amplitude 0.1:0.4:3"
 USES = {
@@ -68,19 +69,18 @@ USES = {
         f"snapbeam map --modes 1 --cycles 4 {_GRID} --checkpoint kept --cluster local:1 -o kept.nc",
     ),
     "explorer": (f"snapbeam map --modes 1 --cycles 4 {_GRID}", "page: snapbeam explore map.nc --no-browser"),
-    "cuda": (("python", "-c", _CUDA),),
+    "laws": (("python", "-c", _LAWS),),
 }  # fmt: skip
 
 
 class Alone:
     """An environment with one archive in it, in a folder of its own, away from the source tree."""
 
-    def __init__(self, folder: Path, code: Path) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._binaries = folder / "env" / ("Scripts" if os.name == "nt" else "bin")
         hidden = ("PYTHONPATH", "VIRTUAL_ENV")
         self._environment = {key: value for key, value in os.environ.items() if key not in hidden}
-        self._environment["NUMBA_CACHE_DIR"] = str(code)  # the same code need not be compiled in each
         venv.create(folder / "env")
 
     def install(self, archive: Path, extra: str) -> None:
@@ -133,10 +133,10 @@ class Alone:
             served.communicate()
 
 
-def try_alone(archive: Path, extra: str = "", code: Path | None = None) -> None:
+def try_alone(archive: Path, extra: str = "") -> None:
     """Install an archive into an empty environment, with an extra or none, and use it."""
     with tempfile.TemporaryDirectory() as folder:
-        here = Alone(Path(folder), Path(folder) / "code" if code is None else code)
+        here = Alone(Path(folder))
         here.install(archive, extra)
         for use in USES[extra]:
             words = list(use) if isinstance(use, tuple) else use.split()
@@ -154,12 +154,11 @@ def main() -> None:
     """Try every archive of a folder; the wheel with each of the extras named, or with all, too."""
     folder, *extras = sys.argv[1:]
     source, wheel = next(Path(folder).glob("snapbeam-*.tar.gz")), next(Path(folder).glob("snapbeam-*.whl"))
-    with tempfile.TemporaryDirectory() as code:
-        for archive, extra in ((source, ""), (wheel, ""), *((wheel, extra) for extra in extras or EXTRAS)):
-            start = time.monotonic()
-            print(f"{archive.name} [{extra}]", flush=True)
-            try_alone(archive, extra, Path(code))
-            print(f"  {time.monotonic() - start:.0f} s", flush=True)
+    for archive, extra in ((source, ""), (wheel, ""), *((wheel, extra) for extra in extras or EXTRAS)):
+        start = time.monotonic()
+        print(f"{archive.name} [{extra}]", flush=True)
+        try_alone(archive, extra)
+        print(f"  {time.monotonic() - start:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -175,19 +175,14 @@ def test_archives_hold_what_they_must(archives):
     assert not [name for name in held if name.startswith((".", "build/"))]
 
 
-@pytest.fixture(scope="module")
-def code(tmp_path_factory):
-    return tmp_path_factory.mktemp("code")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("which", "extra"), [("source", ""), ("wheel", ""), *(("wheel", extra) for extra in alone.EXTRAS)]
 )
-def test_each_runs_alone(which, extra, archives, code):
+def test_each_runs_alone(which, extra, archives):
     """In a fresh environment, from nothing but the archive and what it says it needs."""
     source, wheel = archives
-    alone.try_alone(source if which == "source" else wheel, extra, code)
+    alone.try_alone(source if which == "source" else wheel, extra)
 
 
 @pytest.mark.slow

@@ -78,7 +78,7 @@ def read_only():
 
 @pytest.fixture
 def copied(tmp_path):
-    """A copy of the package without compiled code, in a folder to put on the path."""
+    """A copy of the package, in a folder to put on the path."""
 
     def copy(folder=tmp_path / "site"):
         shutil.copytree(PACKAGE, folder / "snapbeam", ignore=shutil.ignore_patterns("__pycache__"))

@@ -155,7 +155,7 @@ def public() -> dict[str, Any]:
             ):
                 for own in vars(
                     value
-                ):  # static methods are compiled parts of kernels, which take numbers alone
+                ):  # static methods are functions of the solver, which take numbers alone
                     method = inspect.getattr_static(value, own)
                     if not own.startswith("_") and isinstance(method, classmethod):
                         found[f"{where}.{name}.{own}"] = getattr(value, own)
@@ -214,7 +214,7 @@ def _trouble(error: BaseException) -> str:
 def judged(function: Any, fixed: Sequence[Any] = (), named: Mapping[str, Any] | None = None) -> str:
     """Call it: "" for a refusal, a finite result or a status; what is wrong otherwise.
 
-    One that takes long may compile a kernel, once on a machine: it is given time for that, and called again.
+    One that takes long may load libraries: it is given time for that, and called again.
     """
     named = {} if named is None else named
     said = _judged(LONGEST, function, fixed, named)
@@ -317,7 +317,7 @@ def fuzz_calls(
     functions, programs = public(), commands()
     programs = {name: each for name, each in programs.items() if name not in _LONG_COMMANDS}
     names, wrong, made, start = list(functions), collections.defaultdict(list), 0, time.monotonic()
-    for each in (None, [0.1, 0.2]):  # kernels are compiled, or loaded, before anything is timed
+    for each in (None, [0.1, 0.2]):  # libraries are loaded before anything is timed
         sb.simulate(SYSTEM, SHORT) if each is None else sb.sweep(
             SYSTEM, {"drive.velocity_amplitude": each}, SHORT
         )

@@ -145,7 +145,7 @@ def test_rows_say_what_they_are() -> None:
         assert row.name == name and name.isidentifier()
         assert np.dtype(row.dtype)
         assert len(row.long_name) > 5 and row.long_name[0].islower() and not row.long_name.endswith(".")
-        assert row.update is None, "the package's own are columns of every kernel"
+        assert row.update is None, "the package's own are columns of every engine"
     assert ACCUMULATORS == accumulators_dtype()
 
 
@@ -163,8 +163,8 @@ def test_books_begin_empty() -> None:
 # ---------------------------------------------------------------------- rows of somebody
 
 
-def test_a_formula_of_what_is_kept_costs_no_compilation() -> None:
-    """Of the books alone: in runs, maps, outcomes and files at once."""
+def test_a_formula_of_what_is_kept_needs_no_update() -> None:
+    """In runs, maps, outcomes and files at once."""
     row = Statistic(
         "mean_force", "float64", "N", "mean contact force over the time of the run",
         lambda reading: reading.seen("total_impulse") / reading.duration,

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 import time
 
 import pytest
-from rich.console import Console
 
 import snapbeam as sb
-from snapbeam.cli import console
 from snapbeam.model import default_values
-from snapbeam.util.compilation_notice import announce_compilation
 from snapbeam.util.diagnostics import counting, sharing
 from snapbeam.util.work_rate import WorkRate
 
@@ -112,20 +108,6 @@ def test_progress_of_uncertainty(system, capsys):
     how = sb.Integration(cycles=3)
     sb.uncertainty.sensitivity(system, "peak_force", uncertain, samples=4, integration=how, progress=True)
     assert "sensitivity: 8 of 8 runs" in capsys.readouterr().err
-
-
-def test_compilation_is_announced(monkeypatch, capsys):
-    """A script without handlers of its own gets the message on standard error; others get it where they log."""
-    log = logging.getLogger("snapbeam")
-    announce_compilation()
-    for each in (log, logging.getLogger()):
-        monkeypatch.setattr(each, "handlers", [h for h in each.handlers if type(h).__name__ == "_Notice"])
-    log.info("compiling a kernel, once on this machine")
-    log.info("another message")
-    assert capsys.readouterr().err == "snapbeam: compiling a kernel, once on this machine\n"
-    with console.show_compilation(Console(stderr=True)):
-        log.info("compiling a kernel, once on this machine")
-    assert capsys.readouterr().err == "compiling a kernel, once on this machine\n"
 
 
 def test_rate_of_the_later_half(monkeypatch):

@@ -170,7 +170,9 @@ def test_a_file_for_which_there_is_no_memory(tmp_path, pages):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a folder in use can be deleted")
-@pytest.mark.parametrize("words", [["simulate", "--modes", "1", "--cycles", "2"], ["info", "a.nc"]])
+@pytest.mark.parametrize(
+    "words", [["simulate", "--modes", "1", "--cycles", "2", "-o", "a.nc"], ["info", "a.nc"]]
+)
 def test_a_working_folder_that_was_deleted(tmp_path, words):
     gone = tmp_path / "gone"
     gone.mkdir()

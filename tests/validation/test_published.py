@@ -9,7 +9,7 @@ from cases import CASES, Row
 from write_table import TABLE, rows_of
 
 SLOW = ("basin_shares", "mass_on_a_stop", "bouncing_ball", "lyapunov")
-"""Cases whose kernels no other test of the quick run needs, or that take long."""
+"""Cases that take long."""
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import functools
 import inspect
 import io
 import json
-import logging
 import math
 import os
 import sys
@@ -340,16 +339,15 @@ def progress(
 
     *total* is None if it is not known in advance, *task* names the work, *what* names the counted things.  A terminal
     shows a bar; other outputs get a line for each tenth of the work.  The rate leaves out the results that existed
-    before the first call, the time before it, and the compilation of kernels.
+    before the first call, and the time before it.
     """
     console = errors()
     if _OUTPUT_OPTIONS.get().quiet:
-        with show_compilation(console):
-            yield lambda done, all_of_them: None
+        yield lambda done, all_of_them: None
     elif console.is_terminal:
         speed = _RateColumn(what)
         columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), speed)
-        with Progress(*columns, console=console, transient=True) as bar, show_compilation(bar.console):
+        with Progress(*columns, console=console, transient=True) as bar:
             shown = bar.add_task(task, total=total, start=False)
 
             def update(done: int, all_of_them: int) -> None:
@@ -360,40 +358,7 @@ def progress(
 
             yield update
     else:
-        with show_compilation(console):
-            yield _Lines(console, total, what)
-
-
-@contextmanager
-def show_compilation(console: Console) -> Iterator[None]:
-    """Show the messages that the solver logs when it compiles a kernel."""
-    log = logging.getLogger("snapbeam")
-    if _OUTPUT_OPTIONS.get().quiet:
-        silent = logging.NullHandler()  # with a handler, scripts get no message either
-        log.addHandler(silent)
-        try:
-            yield
-        finally:
-            log.removeHandler(silent)
-        return
-    handler = _Handler(console)
-    before = log.level
-    log.addHandler(handler)
-    log.setLevel(min(before, logging.INFO) if before else logging.INFO)
-    try:
-        yield
-    finally:
-        log.removeHandler(handler)
-        log.setLevel(before)
-
-
-class _Handler(logging.Handler):
-    def __init__(self, console: Console) -> None:
-        super().__init__(logging.INFO)
-        self.console = console
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.console.print(record.getMessage(), markup=False)
+        yield _Lines(console, total, what)
 
 
 class _Lines:

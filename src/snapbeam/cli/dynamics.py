@@ -379,7 +379,7 @@ def lyapunov_spectrum(
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """Compute Lyapunov exponents (1/s) by the tangent flow, or a map of the largest exponent.
+    """Compute Lyapunov exponents (1/s) by tangents, or a map of the largest exponent.
 
     For the exponents of a transient set --transient 0.
 

@@ -91,7 +91,7 @@ _WORDS = {
     "contact.radius": "radius of the sphere, m; with the next two options, instead of --contact-stiffness",
     "contact.young_modulus": "Young's moduli of sphere and beam, Pa: E1,E2",
     "contact.poisson_ratio": "Poisson ratios of sphere and beam: nu1,nu2",
-    "contact.coefficient": "coefficient of Newton's restitution law, for one mode (any number with --engine native), instead of Hertz's law",
+    "contact.coefficient": "coefficient of Newton's restitution law, instead of Hertz's law",
     "contact.damping_factor": "damping factor of the Hunt-Crossley law, s/m",
     "contact.restitution": "coefficient of restitution of a free mass; with the next option, instead of --contact-damping-factor",
     "contact.speed": "impact speed of --hunt-crossley-restitution, m/s",

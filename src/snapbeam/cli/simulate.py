@@ -18,7 +18,6 @@ from snapbeam.cli.console import (
     file_line,
     notes,
     out,
-    show_compilation,
 )
 from snapbeam.cli.parameter_options import (
     BEAM,
@@ -118,7 +117,7 @@ def simulate(
         system = system.replace(drive=sb.RecordedMotion.from_dataset(_recorded(recorded_drive)))
     start = time.monotonic()
     run = None
-    with show_compilation(errors()), _share_done() as progress:
+    with _share_done() as progress:
         times = _even(system, integration, samples)
         if output is not None and not stream:
             size = least_file_size(system, integration, None if times is None else len(times))

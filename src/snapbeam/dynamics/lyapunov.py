@@ -62,7 +62,7 @@ def lyapunov_spectrum(
     integration: Integration | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
-    """The largest Lyapunov exponents, by the tangent flow with a QR factorisation at every whole period.
+    """The largest Lyapunov exponents, by tangents with a QR factorisation at every whole period.
 
     The linearised time steps of the run advance k small changes, which are orthonormalised once a period (Benettin,
     Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  Differences of order six between neighbouring states replace

@@ -594,7 +594,7 @@ def periodic_orbit(
     iterations: int = 40,
     deflate: Sequence[PeriodicOrbit] = (),
 ) -> PeriodicOrbit:
-    """Find the periodic orbit near a state, stable or not, by Newton shooting with the tangent flow.
+    """Find the periodic orbit near a state, stable or not, by Newton shooting with tangents by differences.
 
     The tip's mid-position is fixed in space, where it is at the system's start.  Solves P^m(x) = x for the map P over
     one period of the drive.
@@ -607,8 +607,7 @@ def periodic_orbit(
     period : int
         Periods of the drive after which it closes, m.
     integration : Integration, optional
-        ``accuracy="reference"`` by default: a derivative is only as accurate as the steps.  At level
-        ``"standard"`` it is off by up to 2 %, which is warned of.
+        ``accuracy="reference"`` by default: an orbit is only as accurate as the steps.
     phase : float, optional
         Of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that
         is not smooth, where a contact is near that, the phase farthest from all contacts.  ``orbit.flow.phase``

@@ -193,7 +193,7 @@ class LocalForce:
 
     @classmethod
     def numbers_type(cls) -> Any:
-        """The named tuple of the law's constants, as kernels see them; an attribute of the class, ``Numbers``."""
+        """The named tuple of the law's constants, as its functions get them; an attribute of the class, ``Numbers``."""
         return numbers_type(cls, (item.name for item in dataclasses.fields(cls) if item.name not in _PLACES))
 
     @cached_property

@@ -166,7 +166,7 @@ def check_label(label: Any) -> None:
 
 
 # ----------------------------------------------------------------------------------------------------
-# The numbers of a law or a drive, as kernels see them.
+# The numbers of a law or a drive, as its functions get them.
 
 
 _named_tuple: Any = namedtuple

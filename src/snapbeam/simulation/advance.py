@@ -130,7 +130,7 @@ def advance(
 
 
 def tangent_obstacle(system: System) -> str | None:
-    """The part by which the derivatives of the map may jump, and which no tangent flow contains; None without one."""
+    """The part by which the derivatives of the map may jump; None without one."""
     laws = [each.law for each in system.contacts]
     if any(law.is_dissipative or not (law.properties.smooth and law.properties.tangent) for law in laws):
         return "a contact force that jumps, depends on the velocity or has a memory"

@@ -452,7 +452,7 @@ def simulate(
 def _several(
     systems: Sequence[Any], integration: Integration | None, sample_times: ArrayLike | None, progress: Any
 ) -> list[Run]:
-    """Simulate several systems on all cores; kernels release the interpreter lock."""
+    """Simulate several systems on all cores; the core releases the interpreter lock."""
     report = counting(progress, "simulate", "runs")
     for at, system in enumerate(systems):
         if not isinstance(system, System):

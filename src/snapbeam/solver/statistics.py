@@ -1,8 +1,8 @@
-"""The table of outcomes: what kernels keep of a run, and what follows from it.
+"""The table of outcomes: what engines keep of a run, and what follows from it.
 
-Kernels write :data:`ACCUMULATORS`, one record a run; maps, runs and :class:`~snapbeam.RunSummary` hold :data:`STATISTICS`.
+Engines write :data:`ACCUMULATORS`, one record a run; maps, runs and :class:`~snapbeam.RunSummary` hold :data:`STATISTICS`.
 A new statistic is a row: either a formula of what is kept already, or, with ``update``, a scalar function
-that kernels call after every step.
+that engines call after every step.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ SAMPLED = ("energy", "contact", "work", "dissipated", "lost", *WORKS)
 """Columns of the values of a sample; the energies lost in circuits follow."""
 
 
-# What every kernel keeps: name, kind, value at the start.
+# What every engine keeps: name, kind, value at the start.
 _KEPT: tuple[tuple[str, type, float], ...] = (
     ("status", np.int64, int(RunStatus.NOT_RUN)),
     ("time", np.int64, 0),  # ticks integrated
@@ -130,7 +130,7 @@ class Statistic:
         From a :class:`~snapbeam.solver.statistics.Reading` of many runs to an array of shape (runs,).  With
         *update*: from the reading and the array of results of *update*.
     update : callable, optional
-        ``update(held, step) -> held``, a scalar function of numbers that kernels compile; *step* is a
+        ``update(held, step) -> held``, a scalar function of numbers; *step* is a
         :class:`CompletedStep`.
     start : float
         Initial value of *update*.
@@ -421,7 +421,7 @@ STATISTICS: dict[str, Statistic] = NamedTable(_of_one_striker, ((row.name, row) 
 
 
 def updated() -> tuple[Statistic, ...]:
-    """The statistics that kernels update after every step."""
+    """The statistics that engines update after every step."""
     return tuple(row for row in STATISTICS.values() if row.update is not None)
 
 
@@ -476,8 +476,7 @@ CIRCUIT_LOSS, CIRCUIT_LATE_LOSS, CIRCUIT_PEAK = range(3)
 
 
 def accumulators_dtype(others: int = 0, circuits: int = 0) -> np.dtype[Any]:
-    """One record of what kernels keep of a run, with *others* strikers beside the first and so many circuits."""
-    # the columns of every kernel come last: Numba takes a record that begins as another one does for one of its kind
+    """One record of what engines keep of a run, with *others* strikers beside the first and so many circuits."""
     fields: list[Any] = [("others", np.float64, (others, OTHER_WORK + 1))] if others else []
     fields += [("circuits", np.float64, (circuits, CIRCUIT_PEAK + 1))] if circuits else []
     fields += [(f"own_{row.name}", np.float64) for row in updated()]

@@ -21,6 +21,7 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.local_force import LocalForce
 from snapbeam.solver.statistics import CompletedStep, Statistic
 from snapbeam.util.diagnostics import Diagnostic, tell
+from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError
 
 _FAR = 1e300
@@ -72,7 +73,7 @@ def _compile(function: Any, doubles: int, compiled: Any, called: Any) -> tuple[s
     try:
         import numba
     except ImportError:
-        return "Numba is not installed; install numba", None
+        return needs("compiling it", "Numba", "laws"), None
     real = numba.types.float64
     try:
         made = compiled(numba, numba.njit(function), called)

@@ -41,7 +41,7 @@ class CostEstimate:
     runs, max_runs : int
         Estimated number of runs, and the maximum.
     seconds : float
-        Seconds on this machine with the given threads, without compilation.
+        Seconds on this machine with the given threads.
     memory, disk : float
         Bytes, the second in a checkpoint.
     trial_runs : int
@@ -101,7 +101,7 @@ def estimate_cost(
     *arguments, **options
         Its arguments; nothing is written to a checkpoint.
     trial : float
-        Seconds that the trial may take, after compilation; at most 600.  The trial also stops at 100,000 runs.
+        Seconds that the trial may take after its first batch; at most 600.  The trial also stops at 100,000 runs.
 
     Examples
     --------
@@ -253,7 +253,7 @@ def _of_design(
 
 
 def _trial(trials: Trials, point: Point, limit: float) -> tuple[int, float, dict[str, NDArray[Any]]]:
-    """Runs in growing batches until the time is spent; the first batch, in which kernels are made, is not timed."""
+    """Runs in growing batches until the time is spent; the first batch, in which models are reduced and a user's laws compiled, is not timed."""
     size, begun, made, spent = _BATCH, 0, 0, 0.0
     parts: list[dict[str, NDArray[Any]]] = []
     while spent < limit and made < _MOST_RUNS:

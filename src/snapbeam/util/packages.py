@@ -10,7 +10,7 @@ _EXTRAS = {
     "cluster": ("dask", "distributed", "dask_jobqueue"),
     "video": ("imageio_ffmpeg", "PIL"),
     "explorer": ("panel", "bokeh", "tornado", "param"),
-    "cuda": ("numba_cuda",),
+    "laws": ("numba",),
 }
 """Modules that each extra of the distribution installs."""
 

@@ -11,6 +11,7 @@ import enum
 import hashlib
 import json
 import math
+import os
 import platform
 import sys
 from collections.abc import Mapping, Sequence
@@ -46,10 +47,10 @@ def platform_name() -> str:
 
 
 def processor_name() -> str:
-    """Return the type of the processor that code is compiled for; results are bit-identical on one type."""
-    from llvmlite import binding
+    """Return the family of the processor and the instruction set of the native core; one type rounds in one way."""
+    from snapbeam import _core  # ``snapbeam --version`` loads it not
 
-    return str(binding.get_host_cpu_name())
+    return f"{platform.machine()} {os.environ.get('SNAPBEAM_SET') or _core.instruction_sets()[0]}"
 
 
 @cache

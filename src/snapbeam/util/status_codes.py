@@ -1,4 +1,4 @@
-"""Integer labels that kernels, maps and files share, and what they mean in words."""
+"""Integer labels that the core, maps and files share, and what they mean in words."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class LawProperties:
     energy_bound: bool = True
     """Untouched, the beam's energy only falls: which early termination needs."""
     smooth: bool = True
-    """The force is continuous where contact begins and ends, so that the tangent flow is plain."""
+    """The force is continuous where contact begins and ends, so that tangents do not jump."""
     tangent: bool = True
     """Small changes of the state can be carried along."""
 
@@ -161,7 +161,7 @@ class ContactLaw:
 
     @classmethod
     def numbers_type(cls) -> Any:
-        """The named tuple of the law's numbers, as kernels see them; an attribute of the class, ``Numbers``."""
+        """The named tuple of the law's numbers, as its functions get them; an attribute of the class, ``Numbers``."""
         fields = [item.name for item in dataclasses.fields(cls)]  # type: ignore[arg-type]
         return numbers_type(cls, (*fields, cls.memory) if cls.memory else fields)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from snapbeam.model.reduced_model import ReducedModel
 
 _Array = NDArray[np.float64]
-_Scalar = TypeVar("_Scalar", bound=Callable[..., Any])
 
 
 def _sum_named(name: str) -> type[Drive] | None:
@@ -42,17 +41,6 @@ class Scale(NamedTuple):
     """Angular frequency that Omega and V are normalised by, rad/s."""
 
 
-SCALAR: list[Callable[..., Any]] = []
-"""Scalar functions that motions share; kernels compile them unchanged."""
-
-
-def scalar(function: _Scalar) -> _Scalar:
-    """Have kernels compile a function that motions call."""
-    SCALAR.append(function)
-    return function
-
-
-@scalar
 def smooth_rise(x: float) -> tuple[float, float, float]:
     """x^3 (10 - 15 x + 6 x^2), from 0 to 1 with x, and its first two derivatives."""
     return (
@@ -63,17 +51,16 @@ def smooth_rise(x: float) -> tuple[float, float, float]:
 
 
 def sincos(angle: float) -> tuple[float, float]:
-    """Sine and cosine of an angle, rad; kernels have their own, :func:`snapbeam.solver.physics.sincos`."""
+    """Sine and cosine of an angle, rad."""
     return math.sin(angle), math.cos(angle)
 
 
 class Drive:
     """A prescribed motion of the striker's tip about its mid-position: a frozen dataclass in a file of its own.
 
-    Kernels see its motion as a function of one argument that grows by ``omega`` radians a second.  A drive that
-    is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that every engine
-    compiles for itself and that returns displacement (m) and velocity (m/s), and ``acceleration`` in the same
-    way (m/s^2); ``drive`` contains its numbers and ``memory[drive.table:]`` its samples.  :class:`Timed` is the base of
+    Its motion is a function of one argument that grows by ``omega`` radians a second.  A drive that
+    is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that
+    returns displacement (m) and velocity (m/s), and ``acceleration`` in the same way (m/s^2); ``drive`` contains its numbers and ``memory[drive.table:]`` its samples.  :class:`Timed` is the base of
     drives that do not repeat.
 
     The numbers have the names ``number_names``, of which ``omega`` is the first.  ``amplitudes`` names those that the motion is
@@ -104,7 +91,7 @@ class Drive:
     recorded: ClassVar[bool] = False
     """True for a record of a certain ``duration``."""
     integrated_as: ClassVar[type[Drive] | None] = None
-    """The drive whose kernels integrate it, if they are those of another drive."""
+    """The drive whose motion it has, if it is integrated as another one."""
     number_names: ClassVar[tuple[str, ...]] = ("omega",)
     terms: ClassVar[tuple[type[Drive], ...]] = ()
     """The kinds that it is a sum of."""
@@ -145,7 +132,7 @@ class Drive:
 
     @classmethod
     def numbers_type(cls) -> Any:
-        """The named tuple of the drive's numbers, as kernels see them; an attribute of the class, ``Numbers``."""
+        """The named tuple of the drive's numbers, as its motion gets them; an attribute of the class, ``Numbers``."""
         return numbers_type(cls, cls.number_names)
 
     def values(self) -> dict[str, float]:
@@ -191,7 +178,7 @@ class Drive:
         return [Tone(found["amplitude"], found["omega"], columns.get("phase", 0.0), found.get("mean", 0.0))]
 
     def samples(self) -> _Array:
-        """Table of samples for the kernels, one row; empty for a formula."""
+        """Table of samples, one row; empty for a formula."""
         return np.empty(0)
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
@@ -210,7 +197,7 @@ HORIZON = 1 << 24
 class Timed(Drive):
     """A drive whose motion depends on the time since it began; its displacement begins at zero, without a jump.
 
-    Kernels get the argument omega t, where omega is so small that it never turns round; ``fastest`` bounds the angular
+    A motion gets the argument omega t, where omega is so small that it never turns round; ``fastest`` bounds the angular
     frequency of what happens, rad/s.  A subclass brings :meth:`cycle`, :meth:`shape_numbers`, :meth:`bounds`, and
     ``motion`` and ``acceleration``.
     """

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed, scalar, sincos, smooth_rise
+from snapbeam.model.drive.base import Scale, Timed, sincos, smooth_rise
 from snapbeam.model.drive.components import Component, Tone, in_pieces, rising
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.util.validation import InputError
@@ -158,7 +158,6 @@ class Burst(Timed):
         return drive.amplitude * ((bend - e * rate * rate) * sine + 2.0 * slope * rate * cosine) - away
 
 
-@scalar
 def _envelope(drive: Any, t: float) -> tuple[float, float, float]:
     """E and its first two derivatives."""
     if t < drive.risen:
@@ -173,7 +172,6 @@ def _envelope(drive: Any, t: float) -> tuple[float, float, float]:
     return 1.0, 0.0, 0.0
 
 
-@scalar
 def _retreat(drive: Any, t: float) -> tuple[float, float, float]:
     """Distance by which the tip has withdrawn and its first two derivatives."""
     if t <= drive.ended:
@@ -183,7 +181,6 @@ def _retreat(drive: Any, t: float) -> tuple[float, float, float]:
     return drive.retraction * e, drive.retraction * slope / over, drive.retraction * bend / (over * over)
 
 
-@scalar
 def _turn(drive: Any, t: float) -> tuple[float, float]:
     """Sine and cosine of the phase, of which whole turns are left out."""
     cycles = t * drive.rate / 6.283185307179586

@@ -173,10 +173,7 @@ class BandLimitedNoise(Timed):
 
 
 def sums_of_sines(memory: Any, table: int, t: float, low: float, width: float) -> tuple[float, float, float]:
-    """Sums over the sines of sin/omega_j, of its derivative cos and of -omega_j sin, at time *t*.
-
-    Kernels have a version in registers: :mod:`snapbeam.solver.excitation`.
-    """
+    """Sums over the sines of sin/omega_j, of its derivative cos and of -omega_j sin, at time *t*."""
     rates = low + width * memory[table : table + LINES]
     angles = rates * t + memory[table + LINES : table + 2 * LINES]
     sines = np.sin(angles)
