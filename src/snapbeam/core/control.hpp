@@ -115,7 +115,7 @@ template <class L> struct Group {
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             c.law = problem->laws[j];
-            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state, c.memory = law.memory, c.impulsive = law.impulsive; });
+            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state(batch->numbers + long(j) * problem->law_numbers), c.memory = law.memory, c.impulsive = law.impulsive; });
             c.circuit = c.law == CIRCUIT, c.harvests = c.circuit || c.law == LINEAR_DAMPING;
             c.uses = 0;
             for (int i = 0; i < z.signals; ++i)
@@ -545,6 +545,7 @@ template <class L> struct Group {
             e.flip = mine, e.force = FromBits<Marks>::of(0);
             if (c.lossy || c.memory) {  // where the force of a closed contact changes its sign, or its branch
                 const Marks active = c.pressing;
+                if (c.memory) broken = broken | (alive & c.closed & (!(value(yield_of(c)) <= Real(INFINITY))));  // of a user, NaN
                 const Real f1 = value(going_on(c, c.d1, c.r1, c.f));
                 const Marks wrong = alive & c.closed & (f1 < Real(0.0)) & (active | (d1 > Real(0.0)));
                 const Marks cut_before = mine & c.closed & (!differ(e.at_force, Real(1.0)));
@@ -708,7 +709,7 @@ template <class L> struct Group {
     // A contact begins to yield, or turns back: then it keeps a larger indentation, and what it stored and does not give back is lost.
     void turn_back(Channel<L> &c, Marks at) {
         const Marks turns = at & c.pressing;
-        const Number grown = with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.grown(c.d1, c.P); else return Number(0.0); });
+        const Number grown = with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.grown(select(turns, c.d1, Number(0.0)), c.P); else return Number(0.0); });
         const Number growth = select(turns, grown - c.P[c.state], Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(c.d1, c.P); });
         c.P[c.state] += growth, c.offset -= growth, c.d0 -= growth, c.d1 -= growth;
         assign(turns, c.deepest, c.d1);
