@@ -68,6 +68,31 @@ class OwnKelvinVoigt(ContactLaw):  # begins with a jump
 
 
 @dataclass(frozen=True)
+class OwnElasticPlastic(ContactLaw):
+    loading_stiffness: float = quantity("N/m", "stiffness on first loading", low=0.0, scope=RUN)
+    unloading_stiffness: float = quantity("N/m", "stiffness below", low=0.0, scope=RUN)
+    name = "own_elastic_plastic"
+    memory = "indentation"
+    properties = sb.ElasticPlasticContact.properties
+    force = staticmethod(sb.ElasticPlasticContact.force)
+    energy = staticmethod(sb.ElasticPlasticContact.energy)
+    yield_penetration = staticmethod(sb.ElasticPlasticContact.yield_penetration)
+    impact_duration = sb.ElasticPlasticContact.impact_duration
+    time_scale = sb.ElasticPlasticContact.time_scale
+
+    @staticmethod
+    def slope(law, penetration):  # the larger of both, so that the steps are the same
+        return law.unloading_stiffness
+
+    @staticmethod
+    def memory_after(law, deepest):
+        stiffer = law.unloading_stiffness - law.loading_stiffness
+        if deepest * stiffer < law.indentation * law.loading_stiffness * (1.0 - 1e-6):
+            raise ArithmeticError("has not yielded")
+        return (deepest + law.indentation) * (1.0 - law.loading_stiffness / law.unloading_stiffness)
+
+
+@dataclass(frozen=True)
 class Broken(ContactLaw):
     stiffness: float = quantity("N/m^1.5", "stiffness", low=0.0, scope=RUN)
     name = "broken"
@@ -138,6 +163,7 @@ SAME = {
     "hertz": ((HERTZ,), (OwnHertz(STIFFNESS),)),
     "hunt_crossley": ((sb.HuntCrossley(STIFFNESS, 2.0),), (OwnHuntCrossley(STIFFNESS, 2.0),)),
     "kelvin_voigt": ((sb.KelvinVoigt(2e5, 1.0),), (OwnKelvinVoigt(2e5, 1.0),)),
+    "elastic_plastic": ((sb.ElasticPlasticContact(1e5, 4e5),), (OwnElasticPlastic(1e5, 4e5),)),
     "spring": ((HERTZ, sb.LocalSpring(**SPRING)), (HERTZ, OwnSpring(**SPRING))),
     "magnet": ((HERTZ, sb.MagneticForce(**MAGNET)), (HERTZ, OwnMagnet(**MAGNET))),
     "drag": ((HERTZ, sb.QuadraticDamping(**DRAG)), (HERTZ, OwnDrag(**DRAG))),
@@ -177,6 +203,7 @@ def check_same(name: str) -> None:
     for key, wanted in given.summary.items():
         if isinstance(wanted, float | int):
             assert own.summary[key] == pytest.approx(wanted, rel=1e-7, abs=1e-18, nan_ok=True), key
+    np.testing.assert_allclose(own.final_state.indentation, given.final_state.indentation, rtol=1e-9)
     assert given.summary["impacts"] > 0
 
 
@@ -188,7 +215,7 @@ def test_a_users_law_is_the_packages(name, layout, monkeypatch):
 
 
 @pytest.mark.parametrize("layout", ["runs", "modes", "thread"])
-@pytest.mark.parametrize("name", ["hertz", "both"])
+@pytest.mark.parametrize("name", ["hertz", "elastic_plastic", "both"])
 def test_without_numba_python_is_called(name, layout, monkeypatch, without_numba):
     monkeypatch.setenv("SNAPBEAM_LAYOUT", layout)
     monkeypatch.setattr("snapbeam.util.diagnostics._told", set())
@@ -209,6 +236,100 @@ def test_a_sweep_of_a_users_parameter():
     assert len(set(found[1].peak_force.values.tolist())) == 13
     for name in ("peak_force", "impacts", "max_displacement", "status"):
         np.testing.assert_allclose(found[1][name], found[0][name], rtol=1e-9)
+
+
+REFERENCE = sb.Integration(cycles=6, accuracy="reference", engine="native")
+HYSTERESIS = (sb.ElasticPlasticContact, OwnElasticPlastic)
+
+
+@pytest.mark.parametrize("modes", [1, 3])
+def test_a_users_memory(modes):
+    """Impacts that deepen the indentations and impacts that do not, of the package's law and of the same of a user."""
+    given, own = (sb.simulate(made(kind(1e5, 2e5), modes=modes), REFERENCE) for kind in HYSTERESIS)
+    for found, wanted in (
+        (own.final_state.indentation, given.final_state.indentation),
+        (own.impacts.impulse, given.impacts.impulse),
+        (own.impacts.duration, given.impacts.duration),
+        (own.summary.energy_lost_contact, given.summary.energy_lost_contact),
+        (own.dataset.energy_contact, given.dataset.energy_contact),
+    ):
+        np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
+    assert given.impacts.impulse.size > 4 and (given.final_state.indentation > 0.0).all()
+    assert given.summary.energy_lost_contact > 0.0
+
+
+def test_a_users_memory_goes_on():
+    """Cycle by cycle as in one go, and from a state that was kept."""
+    given, own = (made(kind(1e5, 2e5)) for kind in HYSTERESIS)
+    whole = sb.advance(own, periods=4, save_every_period=True)
+    wanted = sb.advance(given, periods=4, save_every_period=True)
+    np.testing.assert_allclose(whole.indentation, wanted.indentation, rtol=1e-9)
+    assert (whole.indentation[-1] > whole.indentation[0]).any() and (whole.indentation[0] > 0.0).any()
+    state = own.start_state
+    for i in range(4):
+        state = sb.advance(own, state)
+        np.testing.assert_allclose(state.indentation, whole[i].indentation, rtol=1e-9)
+        np.testing.assert_allclose(state.amplitude, whole[i].amplitude, rtol=1e-9)
+
+
+def test_a_sweep_of_a_users_memory():
+    """Runs side by side turn back at different times: a function is called where its own run has yielded."""
+    axes = {"velocity_amplitude": np.linspace(0.05, 0.3, 13), "contact.unloading_stiffness": [2e5, 4e5]}
+    given, own = (sb.sweep(made(kind(1e5, 4e5)), axes, REFERENCE) for kind in HYSTERESIS)
+    assert (own.status == sb.RunStatus.OK).all()
+    for name in ("impacts", "impulse", "peak_force", "energy_lost_contact", "max_displacement"):
+        np.testing.assert_allclose(own[name], given[name], rtol=1e-9)
+    assert len(set(own.energy_lost_contact.values.ravel().tolist())) > 13
+
+
+@dataclass(frozen=True)
+class OwnDent(OwnElasticPlastic):  # without energy and slope
+    name = "own_dent"
+    energy = staticmethod(ContactLaw.energy)
+    slope = staticmethod(ContactLaw.slope)
+
+
+def test_a_users_memory_without_energy_and_slope():
+    """They follow by quadrature and differences; the motion needs neither."""
+    given, own = (
+        sb.simulate(made(kind(1e5, 2e5)), REFERENCE) for kind in (sb.ElasticPlasticContact, OwnDent)
+    )
+    np.testing.assert_allclose(own.final_state.indentation, given.final_state.indentation, rtol=1e-7)
+    assert own.summary.energy_lost_contact == pytest.approx(given.summary.energy_lost_contact, rel=1e-3)
+
+
+@pytest.mark.parametrize("hook", ["yield_penetration", "memory_after"])
+def test_an_exception_of_a_memory_is_raised(hook, monkeypatch):
+    def broken(law, deepest=0.0):
+        if law.indentation >= 0.0:
+            raise ArithmeticError("no surface")
+        return 0.0
+
+    monkeypatch.setattr(OwnElasticPlastic, hook, staticmethod(broken))
+    with pytest.raises(InputError, match=r"OwnElasticPlastic\.broken\(.*no surface"):
+        sb.sweep(made(OwnElasticPlastic(1e5, 4e5)), {"velocity_amplitude": [0.1, 0.2]}, NATIVE)
+    monkeypatch.setattr(OwnElasticPlastic, hook, staticmethod(lambda law, deepest=0.0: math.nan))
+    run = sb.simulate(made(OwnElasticPlastic(1e5, 4e5)), NATIVE)
+    assert run.summary.status == sb.RunStatus.DIVERGED
+
+
+@dataclass(frozen=True)
+class OwnLossyDent(OwnElasticPlastic):
+    name = "own_lossy_dent"
+    rate_dependent = True
+
+    @staticmethod
+    def damping_coefficient(law, penetration):
+        return 1e6 * penetration
+
+
+@pytest.mark.filterwarnings("ignore:engine = 'python' is made to be read")
+def test_a_memory_and_a_rate_are_for_the_engine_in_python():
+    system = made(OwnLossyDent(1e5, 4e5))
+    with pytest.raises(InputError, match=r"memory and rate_dependent .* use engine = 'python'"):
+        sb.simulate(system, NATIVE)
+    run = sb.simulate(system, sb.Integration(cycles=1, engine="python"))
+    assert run.summary.status == sb.RunStatus.OK and run.summary.energy_lost_contact > 0.0
 
 
 def check_raised(system):
@@ -258,7 +379,7 @@ def test_values_of_a_force_alone():
     np.testing.assert_allclose(fields["potential"], [kind.energy(law.numbers(), d) for d in x], rtol=1e-12)
     np.testing.assert_allclose(fields["stiffness"], [kind.slope(law.numbers(), d) for d in x], rtol=1e-8)
     for count in (-1.0, 0.5, 3.0, 1e9):
-        numbers[8] = count
+        numbers[10] = count
         with pytest.raises(ValueError, match="numbers of a user's law"):
             _core.law_values(channels.USER_LAWS[own.kind], {"x": x, "y": x, "numbers": numbers, **fields})
 

@@ -113,7 +113,7 @@ def test_impact_on_a_surface_that_yields(own) -> None:
     law = import_module("own_memory").YieldingContact(1e6, 0.5)
     try:
         run = sb.simulate(
-            thrown(lambda _: law, 0.0), sb.Integration(cycles=1, accuracy="reference", engine="python")
+            thrown(lambda _: law, 0.0), sb.Integration(cycles=1, accuracy="reference", engine="native")
         )
         rebound = 0.5 / math.sqrt(1e6 * MASS)
         assert run.dataset.modal_velocity.values[-1, 0] == pytest.approx(rebound, rel=1e-7)

@@ -118,7 +118,7 @@ template <class L> struct Group {
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             c.law = problem->laws[j];
-            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state, c.memory = law.memory, c.impulsive = law.impulsive; });
+            with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state(batch->numbers + long(j) * problem->law_numbers), c.memory = law.memory, c.impulsive = law.impulsive; });
             c.circuit = c.law == CIRCUIT, c.harvests = c.circuit || c.law == LINEAR_DAMPING;
             c.uses = 0;
             for (int i = 0; i < z.signals; ++i)
@@ -567,6 +567,7 @@ template <class L> struct Group {
             e.flip = mine, e.force = FromBits<Marks>::of(0);
             if (c.lossy || c.memory) {  // where the force of a closed contact changes its sign, or its branch
                 const Marks active = c.pressing;
+                if (c.memory) broken = broken | (alive & c.closed & (!(value(yield_of(c)) <= Real(INFINITY))));  // of a user, NaN
                 // the mean force of the last kick has no zero where the contact opens; that at the end of the step, times M, has
                 const bool held = c.impulsive && any(c.closed);
                 const Number end_f = held ? pressed_by(z, c, z.q1, z.p1, z.k1) : c.f, begin_f = held ? c.M[j] * c.first_f : c.first_f;
@@ -733,7 +734,7 @@ template <class L> struct Group {
     // A contact begins to yield, or turns back: then it keeps a larger indentation, and what it stored and does not give back is lost.
     void turn_back(Channel<L> &c, Marks at) {
         const Marks turns = at & c.pressing;
-        const Number grown = with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.grown(c.d1, c.P); else return Number(0.0); });
+        const Number grown = with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.grown(select(turns, c.d1, Number(0.0)), c.P); else return Number(0.0); });
         const Number growth = select(turns, grown - c.P[c.state], Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(c.d1, c.P); });
         c.P[c.state] += growth, c.offset -= growth, c.d0 -= growth, c.d1 -= growth;
         assign(turns, c.deepest, c.d1);

@@ -14,7 +14,7 @@
 //   loss(x, y, f, P)       power lost by the force f (of a force)
 //
 // affine: the force is linear in y;  contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force
-// is the channel's signal;  state: place among the numbers of a state of the law's own, or -1;  rough: bounds may be largest anywhere.
+// is the channel's signal;  state(P): place among the numbers of a state of the law's own, or -1;  rough: bounds may be largest anywhere.
 //
 // A circuit has a state z that changes with time, its x.  A contact with memory has one that stays as it is until
 // the contact turns back from beyond yield(P); then it grows to grown(x, P), and so does what x is measured from.  An impulsive
@@ -28,16 +28,16 @@ enum LawNumber : int {
     HERTZ, POWER_LAW, LAYERED_HERTZ, HUNT_CROSSLEY, KELVIN_VOIGT,
     LOCAL_SPRING, ELECTROSTATIC, MAGNETIC, QUADRATIC_DAMPING, COULOMB_FRICTION, LINEAR_DAMPING,
     EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT, USER_CONTACT, USER_LOSSY_CONTACT, USER_FORCE, USER_LOSSY_FORCE, ELASTIC_PLASTIC,
-    RESTITUTION, LAWS
+    RESTITUTION, USER_MEMORY_CONTACT, LAWS
 };
-constexpr bool of_user(int law) { return law >= USER_CONTACT && law <= USER_LOSSY_FORCE; }
+constexpr bool of_user(int law) { return (law >= USER_CONTACT && law <= USER_LOSSY_FORCE) || law == USER_MEMORY_CONTACT; }
 // Nodes and weights of Gauss's rule of four points on [0, 1].
 constexpr double GAUSS_NODE[4] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262};
 constexpr double GAUSS_SHARE[4] = {0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692};
 
 template <int NUMBERS> struct ContactLaw {
     static constexpr int numbers = NUMBERS;
-    static constexpr int state = -1;
+    static int state(const double *) { return -1; }
     static constexpr bool contact = true, lossy = false, timed = false, affine = true, memory = false, impulsive = false, rough = false;
     template <class T> static SNAPBEAM_FN T yield(const T *) { return T(INFINITY); }
     template <class T> static SNAPBEAM_FN T grown(T, const T *) { return T(0.0); }
@@ -48,7 +48,7 @@ template <int NUMBERS> struct ContactLaw {
 };
 template <int NUMBERS> struct ForceLaw {
     static constexpr int numbers = NUMBERS;
-    static constexpr int state = -1;
+    static int state(const double *) { return -1; }
     static constexpr bool contact = false, lossy = false, timed = false, affine = false, memory = false, impulsive = false, rough = false;
     template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T loss(T, T y, T f, const T *) { return -(f * y); }
@@ -112,7 +112,7 @@ struct KelvinVoigt : ContactLaw<2> {  // f = k d + c d'
 
 // f = min[k_1 (d + D), k_2 d]; P: k_1, k_2, D.  What unloads from d_m beyond the yield leaves D = (d_m + D) (1 - k_1/k_2).
 struct ElasticPlastic : ContactLaw<3> {
-    static constexpr int state = 2;
+    static int state(const double *) { return 2; }
     static constexpr bool memory = true;
     template <class T> static SNAPBEAM_FN T force(T d, T, const T *P) { return min(P[0] * (d + P[2]), P[1] * d); }
     template <class T> static SNAPBEAM_FN T yield(const T *P) {
@@ -189,7 +189,7 @@ struct LinearDamping : ForceLaw<1> {  // f = -c v, as of a circuit without inert
 // A harvester's circuit: f = z, z' = -v - lam z, of which z^2/2 is the energy.  P: lam, then g where it follows the beam, so that
 // f = g (x - v), and 0 elsewhere; z at last (step.hpp).
 struct Circuit : ForceLaw<3> {
-    static constexpr int state = 2;
+    static int state(const double *) { return 2; }
     static constexpr bool lossy = true, affine = true;
     template <class T> static SNAPBEAM_FN auto follows(const T *P) { return P[1] > T(0.0); }
     template <class T> static SNAPBEAM_FN T force(T x, T v, const T *P) { return select(follows(P), P[1] * (x - v), x); }
@@ -205,7 +205,7 @@ struct Timed : ForceLaw<0> {  // the signal of the channel: a force, the acceler
 // Laws of a user: functions of the host, called run by run.  Their addresses are the first numbers, bit for bit; null: none, as in a
 // lane without a run.  Then the range, the step of differences (0: 1e-5 of x, or no elastic part), and how many numbers follow.
 struct User {
-    enum Number : int { ELASTIC, ENERGY, SLOPE, LOSSY, DAMPING, LOW, HIGH, SPAN, COUNT, OWN, MOST = 64 };
+    enum Number : int { ELASTIC, ENERGY, SLOPE, LOSSY, DAMPING, YIELD, GROWN, LOW, HIGH, SPAN, COUNT, OWN, MOST = OWN + 55 };
     typedef double (*Function)(double x, double y, const double *numbers);
 
     static Function function(int which, const double *P) {
@@ -239,6 +239,8 @@ struct User {
     }
     static double whole(double x, double y, const double *P) { return elastic(x, y, P) + call(LOSSY, x, y, P); }
     static double coefficient(double x, double, const double *P) { return call(DAMPING, x, 0.0, P); }
+    static double yield(double, double, const double *P) { return call(YIELD, 1.0, 0.0, P); }  // of no penetration
+    static double grown(double x, double, const double *P) { return call(GROWN, x, 0.0, P); }
     static double greatest_damping(double x, double y, const double *P) {  // for speeds up to |y|
         double most = bound(call(DAMPING, x, 0.0, P));
         for (double part = 1.0; part > 0.05; part *= 0.25)
@@ -273,6 +275,12 @@ struct UserLossyContact : UserContact {  // f = elastic + coefficient d'
         const T lossy = coefficient(d, P), size = abs(lossy);
         return select(size > T(0.0), fma(lossy, y, UserContact::force(d, y, P)) / size, T(1.0));
     }
+};
+struct UserMemoryContact : UserContact {  // its memory is the last of its numbers
+    static constexpr bool memory = true;
+    static int state(const double *P) { return User::OWN + int(P[User::COUNT]) - 1; }
+    template <class T> static SNAPBEAM_FN T yield(const T *P) { return User::each(T(0.0), T(0.0), P, User::yield); }
+    template <class T> static SNAPBEAM_FN T grown(T d, const T *P) { return User::each(d, T(0.0), P, User::grown); }
 };
 struct UserForce : ForceLaw<User::OWN> {
     static constexpr bool rough = true;
@@ -317,6 +325,7 @@ template <class F> SNAPBEAM_FN auto with_law(int number, F function) {
     case CIRCUIT: return function(Circuit());
     case USER_CONTACT: return function(UserContact());
     case USER_LOSSY_CONTACT: return function(UserLossyContact());
+    case USER_MEMORY_CONTACT: return function(UserMemoryContact());
     case USER_FORCE: return function(UserForce());
     case USER_LOSSY_FORCE: return function(UserLossyForce());
     case EXTERNAL_FORCE: case BASE: case AXIAL_LOAD: return function(Timed());

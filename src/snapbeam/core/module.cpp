@@ -186,9 +186,9 @@ struct Shared {  // what threads share
     volatile int stop = 0;
 };
 
-static void check_user(Arguments &a, const double *P, size_t numbers) {
-    const double count = P[plain::User::COUNT];
-    if (!(count >= 0.0 && count <= double(numbers - plain::User::OWN) && count == std::floor(count))) a.refuse("numbers", "has not as many numbers of a user's law as it says");
+static void check_user(Arguments &a, int law, const double *P, size_t numbers) {
+    const double count = P[plain::User::COUNT], least = plain::with_law(law, [](auto each) { return each.memory ? 1.0 : 0.0; });
+    if (!(count >= least && count <= double(numbers - plain::User::OWN) && count == std::floor(count))) a.refuse("numbers", "has not as many numbers of a user's law as it says");
 }
 
 static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
@@ -229,7 +229,10 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
         if (!(b.jumps[i] >= 0.0 && (i % size_t(p.jumps) == 0 || b.jumps[i] >= b.jumps[i - 1]))) a.refuse("jumps", "must be ticks, ascending");
     b.numbers = a.array<double>("numbers", {runs, channels, size_t(p.law_numbers)});
     for (size_t i = 0; i < runs * channels; ++i)
-        if (plain::of_user(p.laws[i % channels])) check_user(a, b.numbers + i * size_t(p.law_numbers), size_t(p.law_numbers));
+        if (const double *P = b.numbers + i * size_t(p.law_numbers); plain::of_user(p.laws[i % channels])) {
+            check_user(a, p.laws[i % channels], P, size_t(p.law_numbers));
+            if (P[plain::User::COUNT] != b.numbers[i % channels * size_t(p.law_numbers) + plain::User::COUNT]) a.refuse("numbers", "has not as many numbers of a user's law in every run");
+        }
     b.offset = a.array<double>("offset", {runs, channels}), b.since = a.array<double>("since", {runs, channels}, false);
     b.rows = a.array<double>("rows", {rows, n});
     b.row_of = a.array<int>("row_of", {runs, channels + 1});
@@ -380,7 +383,7 @@ static void law_values(int law, nb::dict arrays) {
     double *stiffness = a.array<double, true>("stiffness", {count}, false), *damping = a.array<double, true>("damping", {count}, false);
     plain::with_law(law, [&](auto each) {
         if (int(numbers) < each.numbers) a.refuse("numbers", "has fewer numbers than the law");
-        if (plain::of_user(law)) check_user(a, P, numbers);
+        if (plain::of_user(law)) check_user(a, law, P, numbers);
         for (size_t i = 0; i < count; ++i) {
             force[i] = each.force(x[i], y[i], P), potential[i] = each.potential(x[i], P);
             low[i] = each.low(P), high[i] = each.high(P);

@@ -62,7 +62,7 @@ LAWS: dict[type, tuple[int, tuple[str, ...]]] = {
 }
 """Number of each law in ``core/laws.hpp``, and the names of its numbers in their order there."""
 LINEAR_DAMPING, EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT = 10, 11, 12, 13, 14
-USER_LAWS = {"contact": 15, "lossy contact": 16, "force": 17, "lossy force": 18}
+USER_LAWS = {"contact": 15, "lossy contact": 16, "force": 17, "lossy force": 18, "contact with memory": 21}
 """Number of the law that calls a user's, by :attr:`snapbeam.solver.user_laws.UserLaw.kind`."""
 SIGNAL = (
     "mean",

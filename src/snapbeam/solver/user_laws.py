@@ -88,7 +88,7 @@ def _compile(function: Any, doubles: int, compiled: Any, called: Any) -> tuple[s
 
 @functools.cache  # an address stays valid
 def _function(function: Callable[..., float], numbers: Any, arguments: int) -> Function:
-    """A function of a law's numbers, x and perhaps y."""
+    """A function of a law's numbers, and perhaps of x and y."""
     count = len(numbers._fields)
 
     def compiled(numba: Any, physics: Any, called: Any) -> Any:
@@ -97,6 +97,12 @@ def _function(function: Callable[..., float], numbers: Any, arguments: int) -> F
         @numba.njit
         def law(given):
             return numbers(*to_fixed_tuple(numba.carray(given, count), count))
+
+        def of_none(x, y, given):
+            try:
+                return float(physics(law(given)))
+            except Exception:
+                return called(x, y, given)
 
         def of_x(x, y, given):
             try:
@@ -110,7 +116,7 @@ def _function(function: Callable[..., float], numbers: Any, arguments: int) -> F
             except Exception:
                 return called(x, y, given)
 
-        return of_x if arguments == 1 else of_both
+        return (of_none, of_x, of_both)[arguments]
 
     return Function(
         f"{numbers.owner.__name__}.{function.__name__}",
@@ -176,20 +182,25 @@ def contact_law(law: ContactLaw) -> UserLaw:
     Raises
     ------
     InputError
-        If its force depends on the history, or if it has more constants than the core takes.
+        If it acts by impulses, if its force depends on both the history and the rate, or if it has more constants than the
+        core takes.
     """
     kind: Any = type(law)
-    if kind.impulsive or kind.memory:
-        way = "a law without impulses" if kind.impulsive else "engine = 'python'"
+    if kind.impulsive:
         raise InputError(
-            f"{kind.__name__}: a law of one's own with a memory or of impulses is not integrated by engine = 'native'; use {way}"
+            f"{kind.__name__}: a law of one's own of impulses is not integrated; use a law without impulses"
+        )
+    if kind.memory and kind.rate_dependent:
+        raise InputError(
+            f"{kind.__name__}: a law of one's own with memory and rate_dependent is not integrated by engine = 'native'; use "
+            "engine = 'python'"
         )
     missing = kind.missing_hooks()
     hooks = [None if name in missing else (getattr(kind, name), 1) for name in ("force", "energy", "slope")]
     damping = (kind.damping_coefficient, 1) if kind.rate_dependent else None
-    return _law_of(
-        kind, "lossy contact" if damping else "contact", [*hooks, None, damping], (0.0, math.inf), 0.0
-    )
+    memory = [(kind.yield_penetration, 0), (kind.memory_after, 1)] if kind.memory else [None, None]
+    core = "contact with memory" if kind.memory else "lossy contact" if damping else "contact"
+    return _law_of(kind, core, [*hooks, None, damping, *memory], (0.0, math.inf), 0.0)
 
 
 def local_force(force: LocalForce, largest: float) -> UserLaw:
@@ -202,7 +213,7 @@ def local_force(force: LocalForce, largest: float) -> UserLaw:
     return _law_of(
         kind,
         core,
-        [*elastic, None, *lossy],
+        [*elastic, None, *lossy, None, None],
         limits,
         span if force.is_conservative else 0.0,
         kind.is_limited(),
