@@ -24,6 +24,8 @@ def law_values(law: int, arrays: Mapping[str, Any]) -> None:
 def instruction_sets() -> list[str]:
     """Return the instruction sets that this build and this processor have, best first."""
 
+SOURCES: str
+"""SHA-256 of the sources of the core."""
 LOSSY: list[int]
 """Numbers of the laws whose force depends on a velocity."""
 RUN_NUMBERS: int

@@ -394,6 +394,7 @@ static void law_values(int law, nb::dict arrays) {
 
 NB_MODULE(_core, m) {
     m.doc() = "The native core: integration of damped modes and scalar channels.";
+    m.attr("SOURCES") = SNAPBEAM_SOURCES;
     m.attr("STATISTICS") = int(snapbeam::STATISTICS), m.attr("OF_CHANNEL") = int(snapbeam::OF_CHANNEL), m.attr("RUN_NUMBERS") = int(snapbeam::RUN_NUMBERS);
     std::vector<int> lossy;
     for (int law = 0; law < plain::LAWS; ++law)

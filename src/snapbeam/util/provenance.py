@@ -56,8 +56,10 @@ def processor_name() -> str:
 @cache
 def code_hash() -> str:
     """Return the SHA-256 of every file of the package that a number depends on, in 16 hexadecimal digits."""
+    from snapbeam import _core
+
     package = Path(__file__).parents[1]
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(_core.SOURCES.encode())
     for name in ("util", "model", "solver", "simulation", "sweeps"):
         for path in sorted((package / name).rglob("*.py")):
             digest.update(path.relative_to(package).as_posix().encode() + b"\0")
