@@ -24,6 +24,8 @@ def law_values(law: int, arrays: Mapping[str, Any]) -> None:
 def instruction_sets() -> list[str]:
     """Return the instruction sets that this build and this processor have, best first."""
 
+COMPOSITIONS: list[tuple[list[float], list[float]]]
+"""Weights of the flows and of the kicks of a step, by the number of a composition."""
 SOURCES: str
 """SHA-256 of the sources of the core."""
 LOSSY: list[int]

@@ -9,22 +9,19 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
+from snapbeam import _core
 from snapbeam.model import default_values
-from snapbeam.solver.splitting import COMPOSITIONS, GENERAL, TURNS, slot_length
+from snapbeam.solver.step_size import composition_of
 
 
-@pytest.mark.parametrize("order", [4, 6])
-def test_coefficients(order: int) -> None:
-    flow, kick, elapsed, distinct = COMPOSITIONS[order]
+@pytest.mark.parametrize("number", range(3))
+def test_coefficients(number: int) -> None:
+    flow, kick = (np.array(weights) for weights in _core.COMPOSITIONS[number])
     assert kick.size == flow.size + 1
     assert flow.sum() == pytest.approx(1.0, abs=1e-15)
     assert kick.sum() == pytest.approx(1.0, abs=1e-15)
     np.testing.assert_array_equal(flow, flow[::-1])
     np.testing.assert_array_equal(kick, kick[::-1])
-    assert elapsed.size == TURNS
-    np.testing.assert_allclose(elapsed[: kick.size], np.concatenate(([0.0], np.cumsum(flow))), atol=1e-15)
-    np.testing.assert_array_equal(flow, flow[distinct])
-    assert slot_length(order, 8) == (flow.size + 1) // 2 * 32 + 2 * TURNS
 
 
 def state_after(model: sb.ReducedModel, accuracy: str, steps: int) -> np.ndarray:
@@ -83,17 +80,16 @@ def test_measured_order_with_contact(modes: int, pair: tuple[float, float]) -> N
 @pytest.mark.parametrize(("order", "counts"), [(4, (10, 20, 40)), (6, (6, 12, 24))])
 def test_order_with_kicks_that_depend_on_velocity(order: int, counts: tuple[int, ...]) -> None:
     """q'' = -q - q^3 - 0.3 q', the last two terms in the kick, whose flow is exact at a fixed place."""
-    table = GENERAL[order]
-    stages = int(np.flatnonzero(table.elapsed == 1.0)[0])
+    flow, kick = _core.COMPOSITIONS[composition_of(order, general=True)]
 
     def end(count: int) -> float:
         h, q, p = 3.0 / count, 1.0, 0.3
         for _ in range(count):
-            for i in range(stages + 1):
-                lost = np.exp(-0.3 * table.kick[i] * h)
+            for i, weight in enumerate(kick):
+                lost = np.exp(-0.3 * weight * h)
                 p = p * lost - q**3 * (1.0 - lost) / 0.3
-                if i < stages:
-                    c, s = np.cos(table.flow[i] * h), np.sin(table.flow[i] * h)
+                if i < len(flow):
+                    c, s = np.cos(flow[i] * h), np.sin(flow[i] * h)
                     q, p = q * c + p * s, p * c - q * s
         return float(q)
 

@@ -23,6 +23,7 @@
 
 #include "api.hpp"
 #include "laws.hpp"
+#include "structure.hpp"
 
 namespace nb = nanobind;
 using snapbeam::Batch;
@@ -400,6 +401,15 @@ NB_MODULE(_core, m) {
     for (int law = 0; law < plain::LAWS; ++law)
         if (plain::with_law(law, [](auto each) { return bool(each.lossy); })) lossy.push_back(law);
     m.attr("LOSSY") = nb::cast(lossy);
+    nb::list compositions;
+    for (int number = 0; number < 3; ++number) {
+        const auto c = plain::composition_of(number);
+        nb::list flows, kicks;
+        for (int i = 0; i < c.flows; ++i) flows.append(c.flow[c.which_flow(i)]);
+        for (int i = 0; i <= c.flows; ++i) kicks.append(c.kick_weight(i));
+        compositions.append(nb::make_tuple(flows, kicks));
+    }
+    m.attr("COMPOSITIONS") = compositions;
     m.def("integrate", &integrate, nb::arg("problem"), nb::arg("batch"), nb::arg("layout"), nb::arg("set"), nb::arg("threads"), nb::arg("progress").none());
     m.def("record", &record, nb::arg("problem"), nb::arg("batch"), nb::arg("recorder"), nb::arg("layout"), nb::arg("set"));
     m.def("law_values", &law_values, nb::arg("law"), nb::arg("arrays"));

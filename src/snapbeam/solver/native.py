@@ -36,7 +36,7 @@ from snapbeam.solver.statistics import (
     empty_accumulators,
     updated,
 )
-from snapbeam.solver.step_size import PARTS, TRIED, barrier_of
+from snapbeam.solver.step_size import PARTS, TRIED, barrier_of, composition_of
 from snapbeam.solver.user_laws import updates_of
 from snapbeam.util.status_codes import RunStatus
 
@@ -135,7 +135,7 @@ class _Arrays:
             "beam": row(np.arange(structure.omega.size) < modes),
             "lift": float(wells.lift) if has_two and wells is not None else 0.0,
             "block_sizes": sizes,
-            "composition": 0 if ensemble.order == 4 else 2 if lossy else 1,
+            "composition": composition_of(ensemble.order, lossy),
             "laws": channels.laws,
             "signals": channels.signals.shape[1],
             "uses": channels.uses,

@@ -19,7 +19,6 @@ from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import ACCURACIES, Integration
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
-from snapbeam.solver.splitting import COMPOSITIONS, GENERAL
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, Severity
@@ -59,6 +58,13 @@ _LIMIT = {"standard": 2.5e-7, "reference": 2e-11}
 _LIMIT_OF_HITS = {"standard": 1e-9, "reference": 1e-13}
 """Error limit of impacts of zero duration: there are no contact steps to share the error, and only one mode."""
 _ORDER = {"standard": 4, "reference": 6}
+
+
+def composition_of(order: int, general: bool = False) -> int:
+    """Number of a composition in ``core/structure.hpp``; a *general* one is for kicks that depend on velocities too."""
+    return 0 if order == 4 else 2 if general else 1
+
+
 _FREE_TURN = 4.0
 """Maximum phase of the fastest mode in a flight step of level "reference", rad."""
 _MOST_DECAY = 1.8
@@ -154,7 +160,11 @@ def _with_coupled_damping(
 
     The error is the norm of the difference from the exact flow of the linear modes, in the coordinates omega q and p.
     """
-    coefficients, rows, composition = structure.damping_coefficients, structure.damping_rows, GENERAL[order]
+    coefficients, rows, composition = (
+        structure.damping_coefficients,
+        structure.damping_rows,
+        _core.COMPOSITIONS[composition_of(order, True)],
+    )
     if not coefficients.size:
         return step
     n, sigma = structure.omega.size, structure.damping_ratio * structure.omega
@@ -167,15 +177,15 @@ def _with_coupled_damping(
 
     def error(h: float) -> float:
         steps, found = math.ceil(period / h), np.eye(2 * n)
-        flows = {weight: expm(weight * h * alone) for weight in set(composition.flow.tolist())}
-        for i, weight in enumerate(composition.kick.tolist()):
+        flows = {weight: expm(weight * h * alone) for weight in set(composition[0])}
+        for i, weight in enumerate(composition[1]):
             decay = float(np.abs(weight * h * coefficients).sum())
             parts = min(max(round(decay * per_decay + 0.5), fewest), 256)
             x = -weight * h * coefficients / parts  # by Runge and Kutta, as the core kicks
             gain = (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0)))) ** parts - 1.0
             found[n:] += (rows.T * gain) @ (rows @ found[n:])
-            if i < composition.flow.size:
-                flow = flows[composition.flow[i]][..., None]
+            if i < len(composition[0]):
+                flow = flows[composition[0][i]][..., None]
                 q, p = found[:n], found[n:]
                 found = np.concatenate([flow[:, k, 0] * q + flow[:, k, 1] * p for k in (0, 1)])
         exact = expm(h * matrix)
@@ -202,16 +212,16 @@ def growth(structure: Structure, order: int, step: float) -> float:
     stretch = structure.nonlinear_stiffness * structure.stretch
     if stretch <= 0.0 or (omega <= 0.0).any():
         return 0.0
-    composition = COMPOSITIONS[order]
+    composition = _core.COMPOSITIONS[composition_of(order)]
     root = np.sqrt((omega**2 - damping**2).astype(np.complex128))
     # in the coordinates omega q and p, in which the flow of a mode is a turn
     state = np.tile(np.eye(2 * n), (_TENSIONS.size, 1, 1))
     q, p = state[:, :n], state[:, n:]
     pull = -stretch * (coupling / omega) * _TENSIONS[:, None, None]
-    for i, kick in enumerate(composition.kick):
+    for i, kick in enumerate(composition[1]):
         p = p + kick * step * (pull @ q)
-        if i < composition.flow.size:
-            time = composition.flow[i] * step
+        if i < len(composition[0]):
+            time = composition[0][i] * step
             sine, cosine, decay = (
                 (np.sin(root * time) / root).real,
                 np.cos(root * time).real,
@@ -298,7 +308,7 @@ class _Bench:
         """
         steps = _PERIODS * self.period / counts
         batch = _free_runs(self.rest, velocity, steps, counts)
-        problem = self._problem | {"composition": 0 if order == 4 else 1}
+        problem = self._problem | {"composition": composition_of(order)}
         _core.integrate(problem, batch, "runs", "", usable_cores(), None)
         found: _Array = batch["states"][:, 0, : self.omega.size]
         return found @ self.rows.T
