@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,8 +26,6 @@ _PERMITTIVITY = 8.8541878188e-12
 """Permittivity of vacuum, F/m (CODATA 2022)."""
 _NEAREST = 0.1
 """Share of the way to the end of the range of a law, from which on the steps of a run do not follow its stiffness."""
-_BESIDE, _FAR = 1e-6, 16.0
-"""Share of the way to the end of a range up to which, and multiple of the motion within which, extrema are sought."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,53 +232,23 @@ class LocalForce:
         well = abs(float(self.row(model) @ model.well_amplitude))
         return 2.0 * max(well, model.length_scale * float(shape.max() / max(center.max(), 1e-300)))
 
-    def displacements(self, largest: float, count: int, beside: float = _NEAREST) -> _Array:
+    def displacements(self, largest: float, count: int) -> _Array:
         """Displacements at which the law is valid, up to *largest* from the straight beam, ascending; shape (count,).
 
-        The share *beside* of the way to an end of the range is left out.  A range without the straight beam counts from its
+        A tenth of the way to an end of the range is left out.  A range without the straight beam counts from its
         nearest end.
         """
         low, high = self.displacement_range(self.numbers)
         near = min(max(0.0, low), high)
         first, last = max(low, near - largest), min(high, near + largest)
         middle = near if low < near < high else 0.5 * (first + last)
-        ends = (middle + (1.0 - beside) * (end - middle) for end in (low, high))
+        ends = (middle + (1.0 - _NEAREST) * (end - middle) for end in (low, high))
         return np.linspace(max(first, next(ends)), min(last, next(ends)), count)
 
     def greatest_stiffness(self, largest: float) -> float:
         """Maximum slope of the conservative force over displacements up to *largest*, by differences; N/m."""
         at = self.displacements(largest, 401)
         return float(np.abs(np.diff(self.force_at(at)) / np.diff(at)).max())
-
-    def extrema(self, largest: float) -> tuple[_Array, tuple[float, float]]:
-        """Displacements of the minima and maxima of the conservative force, and between which all of them are given.
-
-        They are sought between 8,000 displacements, of which a half is within *largest* and the others up to 16 times as far.
-        Where the force is not finite it counts as an extremum.
-        """
-        from scipy.optimize import minimize_scalar
-
-        if not self.is_conservative:
-            return np.empty(0), (-math.inf, math.inf)
-        parts = [self.displacements(share * largest, 4001, _BESIDE) for share in (1.0, _FAR)]
-        at = np.unique(np.concatenate(parts))
-        with np.errstate(all="ignore"):
-            forces = self.force_at(at)
-            change = np.sign(np.diff(forces))
-        found = [*at[~np.isfinite(forces)].tolist()]
-        # over equal values the direction is that before them
-        moves = np.flatnonzero(change != 0.0)
-        for one, other in itertools.pairwise(moves[np.isfinite(change[moves])].tolist()):
-            if change[one] != change[other]:
-                sign = float(change[one])
-                within = minimize_scalar(
-                    lambda u, sign=sign: -sign * self.force_at(float(u)),
-                    bounds=(float(at[one]), float(at[other + 1])),
-                    method="bounded",
-                    options={"xatol": 1e-9 * float(at[other + 1] - at[one])},
-                )
-                found.append(float(within.x))
-        return np.array(sorted(found)), (float(at[0]), float(at[-1]))
 
     def greatest_damping(self, largest: float, fastest: float) -> float:
         """Maximum damping coefficient over displacements and velocities up to *largest* and *fastest*; N s/m."""

@@ -74,7 +74,6 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("zero_crossings_last_quarter", np.int64, 0),
     ("impacts", np.int64, 0),
     ("steps", np.int64, 0),
-    ("samples", np.int64, 0),
     ("last_zero_crossing", np.float64, math.nan),
     ("min_displacement", np.float64, 0.0),
     ("max_displacement", np.float64, 0.0),
@@ -88,10 +87,6 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("square_midspan_velocity", np.float64, 0.0),
     ("energy_time", np.float64, 0.0),  # integral of the modal energy, sampled
     ("high_energy_time", np.float64, 0.0),  # of the modes above a frequency
-    ("modal_energy", np.float64, 0.0),  # where the energy was last looked at, and its rate of change
-    ("high_energy", np.float64, 0.0),
-    ("modal_power", np.float64, 0.0),
-    ("high_power", np.float64, 0.0),
     ("peak_force", np.float64, 0.0),
     ("contact_time", np.float64, 0.0),
     ("total_impulse", np.float64, 0.0),
@@ -104,8 +99,6 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("energy", np.float64, 0.0),  # at the end, contact included
     ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
     ("center", np.float64, 0.0),
-    ("deepest", np.float64, 0.0),  # maximum penetration of the present contact
-    ("impulse", np.float64, 0.0),  # of the present contact
     ("early_stop_time", np.float64, math.nan),
 )
 

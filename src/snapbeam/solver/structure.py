@@ -53,8 +53,6 @@ class LocalForceRow:
     """u in the well."""
     law: Any
     """Constants of the law."""
-    extrema: _Array
-    """Ends of the displacements in which the extrema of the force are known, then u and F of each; shape (2 + 2 extrema,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,13 +341,10 @@ def structure_of(
 
 def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalForce) -> LocalForceRow:
     shape = local_force.row(model)
-    places, ends = local_force.extrema(local_force.largest_displacement(model))
-    extrema = np.column_stack((places, local_force.force_at(places))).ravel()
     return LocalForceRow(
         model.linear_modes.T @ shape,
         float(shape @ equilibrium),
         local_force.numbers,
-        np.concatenate((ends, extrema)),
     )
 
 

@@ -103,8 +103,6 @@ class ContactLaw:
     """True if the force also depends on the rate of penetration."""
     memory: ClassVar[str] = ""
     """Name of a residual indentation that is a part of the state; it is the last of the law's numbers."""
-    vectorizable: ClassVar[bool] = False
-    """True if the force needs only arithmetic and square roots, without branches: eight runs are computed at once."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -156,7 +154,7 @@ class ContactLaw:
 
     @classmethod
     def missing_hooks(cls) -> list[str]:
-        """Hooks that the law leaves to numerical defaults, which only the Python engine can call."""
+        """Hooks that the law leaves to numerical defaults."""
         return [hook for hook in ("energy", "slope") if getattr(cls, hook) is getattr(ContactLaw, hook)]
 
     @classmethod

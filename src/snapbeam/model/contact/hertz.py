@@ -40,7 +40,6 @@ class HertzContact(ContactLaw):
     )  # fmt: skip
 
     name = "hertz"
-    vectorizable = True
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:
