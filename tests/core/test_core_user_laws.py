@@ -284,7 +284,6 @@ def test_a_sweep_of_a_users_memory():
 
 @dataclass(frozen=True)
 class OwnDent(OwnElasticPlastic):  # without energy and slope
-    name = "own_dent"
     energy = staticmethod(ContactLaw.energy)
     slope = staticmethod(ContactLaw.slope)
 
@@ -315,7 +314,6 @@ def test_an_exception_of_a_memory_is_raised(hook, monkeypatch):
 
 @dataclass(frozen=True)
 class OwnLossyDent(OwnElasticPlastic):
-    name = "own_lossy_dent"
     rate_dependent = True
 
     @staticmethod
