@@ -170,6 +170,22 @@ def test_a_named_jump_is_there():
     assert abs(w) < 1e-9 * B and after == 0.0 and speed == 0.0
 
 
+@EVERY
+def test_bounds_are_not_exceeded(drive):
+    columns = drive.columns()
+    w, v, a = motion_of(drive, SCALE, 0.2)(np.linspace(0.0, 0.2, 20_001))
+    tight = 1.0 + 1e-9
+    if drive.name.endswith("_force"):
+        assert np.abs(w).max() <= drive.peak_acceleration(columns, SCALE)[0] * tight
+        return
+    highest, fastest = drive.bounds(columns, SCALE)
+    assert w.max() <= highest[0] * tight + 1e-15
+    assert -w.min() <= drive.mirrored_bounds(columns, SCALE)[0] * tight + 1e-15
+    assert np.abs(v).max() <= fastest[0] * tight
+    if type(drive).can_excite_base():
+        assert np.abs(a).max() <= drive.peak_acceleration(columns, SCALE)[0] * tight
+
+
 def test_runs_have_their_own_components():
     """Every kind of component, with numbers that all runs share and numbers of each: as each run alone."""
     runs = np.arange(3)

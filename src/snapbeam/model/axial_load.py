@@ -147,6 +147,10 @@ class LoadRamp(LoadMotion, Timed):
         found = self.shape_numbers(columns, scale)
         return np.maximum(found["change"], 0.0), STEEPEST * np.abs(found["change"]) / found["duration"]
 
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Maximum decrease, N."""
+        return np.maximum(-columns["change"], 0.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class AxialLoadModulation:

@@ -99,6 +99,13 @@ class TwoTone(Timed):
         a, b = found["amplitude"], found["second_amplitude"]
         return a + b * (1.0 - np.sin(found["second_phase"])), a * found["rate"] + b * found["second_rate"]
 
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Both at their depths at once."""
+        found = self.shape_numbers(columns, scale)
+        return np.asarray(
+            found["amplitude"] + found["second_amplitude"] * (1.0 + np.sin(found["second_phase"]))
+        )
+
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Both at their hardest at once."""
         found = self.shape_numbers(columns, scale)
