@@ -16,6 +16,7 @@ from snapbeam.model.base_excitation import rigid_mass
 from snapbeam.model.drive.base import Scale
 from snapbeam.model.drive.random_vibration import SPECTRA, mean_square
 from snapbeam.model.drive.shock import GRAVITY
+from snapbeam.solver.excitation import motion_of
 from snapbeam.util.validation import InputError
 
 SHAPE = [(20.0, 0.01), (50.0, 0.04), (100.0, 0.04), (200.0, 0.01)]
@@ -84,15 +85,16 @@ def test_motion_of_a_striker_has_no_drift() -> None:
     """With a rise the displacement begins at rest and stays within the bound of its spectrum."""
     scale, columns = Scale(1e-3, 500.0), {"rms_g": np.array([1.0])}
     motion = sb.RecordedAcceleration.from_psd(SHAPE, duration_s=5.0, seed=4, ramp_up_s=0.2)
-    rows = motion.samples().reshape(-1, 4)
+    times = np.arange(motion.record.size) / motion.sampling_frequency
+    moved, speed, _ = motion_of(motion, scale, times[-1])(times)
     exact = GRAVITY * math.sqrt(
         quad(lambda f: density(SHAPE, f) / (2 * math.pi * f) ** 4, 20.0, 200.0, points=[50.0, 100.0])[0]
     )
-    late = rows[rows.shape[0] // 4 :, 3]
+    late = moved[moved.size // 4 :]
     assert late.std() == pytest.approx(exact, rel=0.15)
     assert abs(late.mean()) < 0.05 * exact
-    assert abs(rows[0, 2]) < 1e-3 * rows[:, 2].std()
-    assert np.abs(rows[:, 3]).max() * motion.gain(columns)[0] <= max(
+    assert abs(speed[0]) < 1e-3 * speed.std()
+    assert np.abs(moved).max() * motion.gain(columns)[0] <= max(
         motion.bounds(columns, scale)[0][0], motion.mirrored_bounds(columns, scale)[0]
     )
     again = sb.RecordedAcceleration.from_psd(SHAPE, duration_s=5.0, seed=4, ramp_up_s=0.2)
@@ -263,10 +265,11 @@ def test_motion_of_a_striker_is_that_of_its_samples() -> None:
     motion = sb.RecordedAcceleration.from_psd(
         [(40.0, 1e-3), (300.0, 1e-3)], duration_s=0.5, rms_g=3.0, ramp_up_s=0.1
     )
-    rows = motion.samples().reshape(-1, 4) * motion.gain({"rms_g": np.array([3.0])})[0]
+    times = np.arange(motion.record.size) / motion.sampling_frequency
+    moved, speed, _ = motion_of(motion, Scale(1e-3, 500.0), times[-1])(times)
     record = sb.RecordedMotion(
-        displacement=rows[:, 3],
-        velocity=rows[:, 2],
+        displacement=moved,
+        velocity=speed,
         sampling_frequency=motion.sampling_frequency,
         frequency=80.0,
     )

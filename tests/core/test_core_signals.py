@@ -12,10 +12,11 @@ from core_systems import arrays, beam, stop
 import snapbeam as sb
 from snapbeam import _core
 from snapbeam.model import default_values
-from snapbeam.model.drive.base import DRIVES, Timed
+from snapbeam.model.drive.base import DRIVES, Drive, Timed
 from snapbeam.model.drive.components import Tone, fitted, in_pieces
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.solver import native
+from snapbeam.solver.excitation import motion_of
 from snapbeam.util.validation import InputError
 
 TIMES = np.arange(4000) / 1e4
@@ -69,18 +70,7 @@ def test_bounds_cover_the_motion(drive):
     system = driven(drive)
     found, scale = arrays(system, 2).batch["signals"][0], system.scale
     value, slope = found[:, 6].sum(), found[:, 7].sum()
-    columns = {name: np.array([each]) for name, each in drive.values().items()} or {"": np.zeros(1)}
-    numbers, kind = drive.numbers(columns, scale), drive.integrated_as or type(drive)
-    table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
-    memory, phase = drive.samples(), float(getattr(drive, "phase", 0.0))
-    pairs = []
-    for t in np.linspace(0.0, 0.05, 4001):
-        at = float(numbers["omega"][0]) * t + phase
-        if kind.harmonic:
-            pairs.append((table.amplitude * math.sin(at), table.amplitude * table.omega * math.cos(at)))
-        else:
-            pairs.append(kind.motion(table, memory, at))
-    moved, speed = np.abs(pairs).max(axis=0)
+    moved, speed, _ = np.abs(motion_of(drive, scale, 0.05)(np.linspace(0.0, 0.05, 4001))).max(axis=1)
     assert value >= moved * (1.0 - 1e-12)
     assert speed * (1.0 - 1e-12) <= slope
 
@@ -117,7 +107,6 @@ class OwnPulse(Timed):
 
     height: float = quantity("m", "height", low=0.0, scope=RUN)
     name = "own_pulse"
-    number_names = ("omega", "fastest", "amplitude", "duration")
     discontinuities = ("duration",)
 
     def cycle(self, columns, scale):
@@ -131,15 +120,10 @@ class OwnPulse(Timed):
         return columns["height"], columns["height"] * scale.omega / 1.3
 
     @staticmethod
-    def motion(drive, memory, argument):
-        t = argument / drive.omega
+    def motion(drive, t):
         if t >= drive.duration:
             return 0.0, 0.0
         return drive.amplitude * math.sin(drive.fastest * t), drive.amplitude * drive.fastest * math.cos(drive.fastest * t)  # fmt: skip
-
-    @staticmethod
-    def acceleration(drive, memory, argument):
-        return 0.0
 
 
 del DRIVES["own_pulse"]
@@ -161,12 +145,86 @@ def test_a_users_motion_without_components_is_approximated(monkeypatch):
         {"drive.height": [5e-5, 1e-4, 4e-4]},
     )
     found = sb.sweep(system, axes, how)
+    monkeypatch.delattr(OwnPulse, "motion")
     monkeypatch.setattr(OwnPulse, "components", components)
     wanted = sb.sweep(system, axes, how)
     for name in ("peak_force", "max_displacement", "work", "impulse"):
         if name in wanted:
             np.testing.assert_allclose(found[name], wanted[name], rtol=1e-6)
     assert (found.impacts > 0).all()
+
+
+@pytest.mark.filterwarnings("ignore:engine = .python.")
+def test_a_users_motion_is_one_for_every_engine_and_in_a_sum(monkeypatch):
+    """As the half-sine of the package: on a striker by both engines, in a sum, and as a motion at given times."""
+    monkeypatch.setitem(DRIVES, "own_pulse", OwnPulse)
+    model = beam(2)
+    height = 0.3 * model.length_scale
+    own, known = OwnPulse(height=height), sb.HalfSine(displacement_amplitude=0.3, duration=0.65)
+    scale, times = driven(known).scale, np.linspace(0.0, 0.03, 301)
+    found, wanted = motion_of(own, scale, 0.03)(times), motion_of(known, scale, 0.03)(times)
+    for each, of, close in zip(found, wanted, (1e-9, 1e-6, 1e-3), strict=True):
+        np.testing.assert_allclose(each, of, rtol=0.0, atol=close * np.abs(of).max())
+    for one, other in ((own, known), (SINE + own, SINE + known)):
+        for engine in ("native", "python"):
+            how = sb.Integration(cycles=1, engine=engine, accuracy="reference")
+            runs = [sb.simulate(driven(drive, 2), how).summary for drive in (one, other)]
+            assert runs[0].impacts == runs[1].impacts > 0
+            assert runs[0].peak_force == pytest.approx(runs[1].peak_force, rel=1e-6)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnCycle(Drive):
+    """A motion that repeats, by its phase: a sine with an overtone."""
+
+    height: float = quantity("m", "height", low=0.0, scope=RUN)
+    phase: float = quantity("rad", "phase at the start", default=0.0, scope=RUN)
+    name = "own_cycle"
+
+    def numbers(self, columns, scale):
+        return {"omega": np.full(columns["height"].size, 1.1 * scale.omega), "amplitude": columns["height"]}
+
+    def cycle(self, columns, scale):
+        return 2.0 * math.pi / self.numbers(columns, scale)["omega"]
+
+    def bounds(self, columns, scale):
+        return 1.2 * columns["height"], 1.4 * columns["height"] * 1.1 * scale.omega
+
+    @staticmethod
+    def motion(drive, t):
+        x, a = drive.omega * t, drive.amplitude
+        return a * (math.sin(x) + 0.2 * math.sin(2.0 * x)), a * drive.omega * (
+            math.cos(x) + 0.4 * math.cos(2.0 * x)
+        )
+
+
+del DRIVES["own_cycle"]
+
+
+@pytest.mark.filterwarnings("ignore:engine = .python.")
+@pytest.mark.parametrize("engine", ["native", "python"])
+@pytest.mark.parametrize("beside", [False, True], ids=["alone", "beside another motion"])
+def test_a_users_motion_begins_at_its_phase(monkeypatch, engine, beside):
+    """Displacement of the tip over time: a later phase is the motion some time later, whatever else moves."""
+    monkeypatch.setitem(DRIVES, "own_cycle", OwnCycle)
+    load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1e-3))
+    parts = {"axial_load": load} if beside else {}
+    system = driven(OwnCycle(height=1e-6, phase=0.8), 1, **parts)
+    times = np.linspace(0.0, 0.9, 40) * 2.0 * math.pi / (1.1 * system.scale.omega)
+    run = sb.simulate(system, sb.Integration(cycles=1, engine=engine), sample_times=times).dataset
+    x = 1.1 * system.scale.omega * times + 0.8
+    wanted = 1e-6 * (np.sin(x) + 0.2 * np.sin(2.0 * x))
+    moved = run.striker_displacement.values * system.scale.length
+    np.testing.assert_allclose(moved - moved[0], wanted - wanted[0], rtol=0.0, atol=1e-13)
+
+
+def test_a_discontinuity_that_no_number_has_is_refused(monkeypatch):
+    monkeypatch.setitem(DRIVES, "own_pulse", OwnPulse)
+    monkeypatch.setattr(OwnPulse, "discontinuities", ("later",))
+    with pytest.raises(
+        InputError, match=r"later is not among the numbers omega, fastest, amplitude, duration"
+    ):
+        sb.simulate(driven(OwnPulse(height=1e-4)), sb.Integration(cycles=1))
 
 
 @pytest.mark.parametrize(

@@ -284,6 +284,7 @@ def test_a_sweep_of_a_users_memory():
 
 @dataclass(frozen=True)
 class OwnDent(OwnElasticPlastic):  # without energy and slope
+    name = ""  # listed under no name
     energy = staticmethod(ContactLaw.energy)
     slope = staticmethod(ContactLaw.slope)
 
@@ -314,6 +315,7 @@ def test_an_exception_of_a_memory_is_raised(hook, monkeypatch):
 
 @dataclass(frozen=True)
 class OwnLossyDent(OwnElasticPlastic):
+    name = ""
     rate_dependent = True
 
     @staticmethod

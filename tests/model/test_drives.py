@@ -9,6 +9,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model.drive.base import HORIZON, Scale
+from snapbeam.solver.excitation import motion_of
 from snapbeam.util.validation import InputError
 
 SCALE = Scale(0.335e-3, 514.0)
@@ -35,13 +36,10 @@ DRIVES = {
 
 def sampled(drive: sb.Drive, count: int = 40001, cycles: float = 10.0):
     columns = {name: np.array([value]) for name, value in drive.values().items()}
-    numbers = drive.numbers(columns, SCALE)
-    row = drive.numbers_type()(*(float(numbers[name][0]) for name in drive.number_names))
     times = np.linspace(0.0, cycles * float(drive.cycle(columns, SCALE)[0]), count)
-    motion = np.array([drive.motion(row, drive.samples(), row.omega * t) for t in times])
-    bent = np.array([drive.acceleration(row, drive.samples(), row.omega * t) for t in times])
+    moved, speed, bent = motion_of(drive, SCALE, times[-1])(times)
     bounds = [float(each[0]) for each in drive.bounds(columns, SCALE)]
-    return times, motion[:, 0], motion[:, 1], bent, bounds
+    return times, moved, speed, bent, bounds
 
 
 @pytest.mark.parametrize("name", DRIVES)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Drive, Scale, Timed, smooth_rise
-from snapbeam.model.drive.components import Component, in_pieces, rising
+from snapbeam.model.drive.base import Drive, Scale, Timed
+from snapbeam.model.drive.components import STEEPEST, Component, in_pieces, rising
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import InputTypeError, shown
 
@@ -19,12 +19,10 @@ _Array = NDArray[np.float64]
 
 LOADS: dict[str, type[Drive]] = {}
 """Every way in which a load changes, by the name it has in parameter files."""
-_STEEPEST = 1.875
-"""Maximum slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
 
 
 class LoadMotion(Drive):
-    """Change of the axial load about the value of the beam, N: a drive whose *motion* is a force."""
+    """Change of the axial load about the value of the beam, N: a drive whose displacement is a force."""
 
     registry: ClassVar[dict[str, type[Drive]]] = LOADS
 
@@ -67,7 +65,6 @@ class HarmonicLoad(LoadMotion):
     )  # fmt: skip
     name = "sine"
     harmonic = True
-    number_names = ("omega", "amplitude")
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """Angular frequency (rad/s) and amplitude (N)."""
@@ -118,8 +115,6 @@ class LoadRamp(LoadMotion, Timed):
         scope=RUN, short="load_hold",
     )  # fmt: skip
     name = "ramp"
-    number_names = ("omega", "fastest", "change", "duration", "hold_periods")
-    amplitudes = ("change",)
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""
@@ -150,22 +145,11 @@ class LoadRamp(LoadMotion, Timed):
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """Maximum change, N, and maximum rate, N/s."""
         found = self.shape_numbers(columns, scale)
-        return np.maximum(found["change"], 0.0), _STEEPEST * np.abs(found["change"]) / found["duration"]
+        return np.maximum(found["change"], 0.0), STEEPEST * np.abs(found["change"]) / found["duration"]
 
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """Change of the load and its rate."""
-        t = argument / drive.omega
-        way = 1.0
-        if t > drive.duration + drive.hold_periods:
-            t, way = 2.0 * drive.duration + drive.hold_periods - t, -1.0
-        share, rate, _ = smooth_rise(min(max(t / drive.duration, 0.0), 1.0))
-        return drive.change * share, way * drive.change * rate / drive.duration
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """Acceleration, which no caller needs."""
-        return 0.0
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Maximum decrease, N."""
+        return np.maximum(-columns["change"], 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

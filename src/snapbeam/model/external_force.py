@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Drive, Scale, Timed, sincos
+from snapbeam.model.drive.base import Drive, Scale, Timed
 from snapbeam.model.drive.components import Component, Tone, hermite, sampled
 from snapbeam.model.drive.sampled import FileKeys, Sampled, require_unit
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, quantity
@@ -24,7 +25,7 @@ FORCES: dict[str, type[Drive]] = {}
 
 
 class ForceHistory(Drive):
-    """A force as a function of time, N: a drive whose *motion* is the force and its rate, and whose *acceleration* is the force.
+    """A force as a function of time, N: a drive whose displacement is the force.
 
     ``constant_part`` is the part of it that lasts, under which a run begins at rest; ``peak_acceleration`` returns the
     maximum of the force, N.
@@ -85,8 +86,6 @@ class HarmonicForce(ForceHistory):
         short="force_phase",
     )  # fmt: skip
     name = "harmonic_force"
-    number_names = ("omega", "amplitude", "mean")
-    amplitudes = ("amplitude", "mean")
 
     @property
     def constant_part(self) -> float:
@@ -117,18 +116,6 @@ class HarmonicForce(ForceHistory):
         """Maximum force, N."""
         return np.asarray(columns["amplitude"] + np.abs(columns["mean"]))
 
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """Force and its rate."""
-        sine, cosine = sincos(argument)
-        return drive.mean + drive.amplitude * sine, drive.amplitude * drive.omega * cosine
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The force."""
-        sine, _ = sincos(argument)
-        return drive.mean + drive.amplitude * sine
-
 
 @dataclass(frozen=True, kw_only=True)
 class ConstantForce(ForceHistory, Timed):
@@ -150,8 +137,6 @@ class ConstantForce(ForceHistory, Timed):
 
     force: float = quantity("N", "constant force", scope=RUN, short="constant_force")
     name = "constant_force"
-    number_names = ("omega", "fastest", "force")
-    amplitudes = ("force",)
 
     @property
     def constant_part(self) -> float:
@@ -178,16 +163,6 @@ class ConstantForce(ForceHistory, Timed):
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Peak force, N."""
         return np.abs(columns["force"])
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """Force and its rate."""
-        return drive.force, 0.0
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The force."""
-        return drive.force
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -224,44 +199,21 @@ class RecordedForce(FileKeys, ForceHistory, Sampled):
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A bound on the spline: between two samples it is at most both, and 4/27 of an interval times each slope."""
-        pairs = self.samples().reshape(-1, 2)
-        most = np.abs(pairs[:, 0]).max() + 8.0 / 27.0 * np.abs(pairs[:, 1]).max() / self.sampling_frequency
+        most = np.abs(self.record).max() + 8.0 / 27.0 * np.abs(self._rates).max() / self.sampling_frequency
         return np.full(next(iter(columns.values())).size, float(most))
 
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """The cubics between samples."""
-        pairs, interval = self.samples().reshape(-1, 2), 1.0 / self.sampling_frequency
-        return [sampled(hermite(pairs[:, 0], pairs[:, 1], interval), interval)]
+        interval = 1.0 / self.sampling_frequency
+        return [sampled(hermite(self.record, self._rates, interval), interval)]
 
-    def samples(self) -> _Array:
-        """Force and slope of the spline, sample after sample."""
+    @cached_property
+    def _rates(self) -> _Array:
+        """Slope of the cubic spline at the samples, N/s."""
         from scipy.interpolate import CubicSpline
 
         times = np.arange(self.record.size) / self.sampling_frequency
-        return np.column_stack((self.record, CubicSpline(times, self.record)(times, 1))).ravel()
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """Force and its rate; the last sample after the end."""
-        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
-        i = min(int(at), int(drive.samples) - 2)
-        row = int(drive.table) + 2 * i
-        s, interval = at - i, drive.interval
-        f0, rise = memory[row], memory[row + 2] - memory[row]
-        a, b = memory[row + 1] * interval, memory[row + 3] * interval
-        c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
-        return f0 + s * (a + s * (c2 + s * c3)), (a + s * (2.0 * c2 + s * 3.0 * c3)) / interval
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The force."""
-        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
-        i = min(int(at), int(drive.samples) - 2)
-        row = int(drive.table) + 2 * i
-        s, interval = at - i, drive.interval
-        f0, rise = memory[row], memory[row + 2] - memory[row]
-        a, b = memory[row + 1] * interval, memory[row + 3] * interval
-        return f0 + s * (a + s * (3.0 * rise - 2.0 * a - b + s * (a + b - 2.0 * rise)))
+        return np.asarray(CubicSpline(times, self.record)(times, 1))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,6 +11,7 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
 from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.constant_velocity import ConstantVelocity
 from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.harvester import ElectromagneticHarvester, PiezoelectricHarvester
@@ -26,6 +27,7 @@ from snapbeam.plot.style import (
     figure_style,
     new_figure,
 )
+from snapbeam.solver.excitation import motion_of
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.validation import InputError, checked, instance
 
@@ -43,9 +45,9 @@ def draw_tips(ax: Axes, system: System, tips: list[tuple[int, Any]]) -> None:
     """Displacements of tips from their mid-positions over the first cycles of the first one, each towards the beam."""
     scale = system.scale
     lead = tips[0][1]
-    times = np.linspace(0.0, _CYCLES * float(lead.cycle(_columns(lead), scale)[0]), 1601)
+    times = np.linspace(0.0, _CYCLES * float(lead.cycle(lead.columns(), scale)[0]), 1601)
     for (number, drive), line in zip(tips, _LINES, strict=False):
-        moved = motion_of(drive, scale, times)
+        moved = _moved(drive, system, times)
         ax.plot(times / times[-1] * _CYCLES, moved / scale.length, label=f"striker {number}", **line)
     ax.set_xlabel("Cycles of the drive")
     ax.set_ylabel(_MOTIONS["drive"][1])
@@ -53,20 +55,11 @@ def draw_tips(ax: Axes, system: System, tips: list[tuple[int, Any]]) -> None:
     ax.legend(ncols=2, loc="lower center", bbox_to_anchor=(0.45, 1.0), frameon=False, columnspacing=1.0)
 
 
-def _columns(drive: Any) -> dict[str, _Array]:
-    return {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
-
-
-def motion_of(drive: Any, scale: Any, times: _Array) -> _Array:
-    """Displacement of a tip from its mid-position at instants, m, or the change of a load, N."""
-    columns = _columns(drive)
-    found = drive.numbers(columns, scale)
-    if drive.harmonic:
-        phase = float(columns.get("phase", np.zeros(1))[0])
-        return np.asarray(found["amplitude"][0] * np.sin(found["omega"][0] * times + phase))
-    numbers = drive.numbers_type()(*(float(found[name][0]) for name in drive.number_names))
-    samples = drive.samples()
-    return np.array([drive.motion(numbers, samples, numbers.omega * t)[0] for t in times])
+def _moved(drive: Drive, system: System, times: _Array) -> _Array:
+    """Displacement of a tip from its mid-position at instants, m, or the change of a load, N; after a record its end."""
+    if drive.recorded:
+        times = np.minimum(times, drive.duration)  # type: ignore[attr-defined]
+    return motion_of(drive, system.scale, float(times[-1]))(times)[0]
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -418,9 +411,9 @@ def _damper(ax: Axes, x: float, one: float, other: float) -> None:
 def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     """Draw the motion of the tip without contact, the base motion, or the change of the axial load."""
     scale = system.scale
-    period = float(drive.cycle(_columns(drive), scale)[0])
+    period = float(drive.cycle(drive.columns(), scale)[0])
     cycles = np.linspace(0.0, 2.0 if isinstance(drive, ConstantVelocity) else _CYCLES, 1601)
-    moved = motion_of(drive, scale, cycles * period)
+    moved = _moved(drive, system, cycles * period)
     section = numbered(section)[0]
     per = 1.0 if section in ("axial_load", "force") else scale.length
     base = system.base_excitation if section == "base_excitation" else None

@@ -22,7 +22,7 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.solver.channels import channels_of
 from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
-from snapbeam.solver.excitation import displacements, motion_of
+from snapbeam.solver.excitation import displacements, motion_of, side_of, started
 from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
@@ -63,8 +63,7 @@ def others_of(
         own_rows = np.array([structure.row(shape, j + 1, sign) for shape in shapes])
         rows += list(own_rows)
         at_rest[:, j] = sign * structure.sign * structure.rests(shapes)[which]
-        phase = columns.get(f"{moving}.phase", np.zeros(runs))
-        begun = displacements(striker.drive, _own(columns, moving, runs), system.scale, phase)
+        begun = displacements(striker.drive, _own(columns, moving, runs), system.scale, np.zeros(runs))
         gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
         rest = _reach_at_rest(system, structure, which, own_rows)
         offset[:, j] = rest + np.where(np.isnan(gap), -begun, -gap)
@@ -156,12 +155,8 @@ def _begun_at(system: System, columns: Mapping[str, _Array], clock: _Array, phas
         motions.append(("base_excitation", base.motion, -side if base.direction == "up" else side))
     found = np.zeros(runs)
     for section, drive, share in motions:
-        own = _own(columns, section, runs)
-        arguments = phase
-        if len(system.moving) > 1:
-            rate = drive.numbers(own, system.scale)["omega"]
-            arguments = phase / clock * rate + columns.get(f"{section}.phase", np.zeros(runs))
-        found = found + share * displacements(drive, own, system.scale, arguments)
+        own, times = started(system, _own(columns, section, runs), phase, clock)
+        found = found + share * displacements(drive, own, system.scale, times)
     return found
 
 
@@ -193,7 +188,7 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
             and system.base_excitation.direction == "down"
             else 1.0
         )
-        found[section] = sign * pairs[:, 0], sign * pairs[:, 1]
+        found[section] = sign * pairs[0], sign * pairs[1]
     return found
 
 
@@ -204,18 +199,15 @@ def tip_of(ensemble: Ensemble, system: System, number: int, times: _Array) -> _A
     run, which may begin in the middle of its drives.
     """
     drive = system.contacts[number - 1].striker.drive
-    return _motion_at(ensemble, system, section_of("drive", number), drive, times)[:, 0]
+    return _motion_at(ensemble, system, section_of("drive", number), drive, times)[0]
 
 
 def _motion_at(ensemble: Ensemble, system: System, section: str, drive: Drive, times: _Array) -> _Array:
-    """Displacement and velocity of one motion of the one run of an ensemble, shape (times, 2)."""
-    begun, later = float(ensemble.runs["phase"][0]), 0.0
-    if len(system.moving) > 1:
-        begun, later = float(getattr(drive, "phase", 0.0)), begun / float(ensemble.clock[0])
-    kind, number = numbered(section)
-    above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
-    motion, _ = motion_of(drive, system.scale, begun, later, -1.0 if above else 1.0)
-    return np.array([motion(at)[:2] for at in times.tolist()]).reshape(-1, 2)
+    """Displacement, velocity and acceleration of one motion of the one run of an ensemble, shape (3, times)."""
+    own, begun = started(system, drive.columns(), ensemble.runs["phase"], ensemble.clock)
+    at = begun[0] + times
+    motion = motion_of(drive, system.scale, at.max(initial=0.0), own)
+    return side_of(system, section, drive) * motion(at)
 
 
 def _is_around(section: str) -> bool:

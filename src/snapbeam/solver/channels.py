@@ -25,10 +25,8 @@ from snapbeam.model.contact.layered_hertz import LayeredHertz
 from snapbeam.model.contact.power_law import PowerLaw
 from snapbeam.model.contact.restitution import Restitution
 from snapbeam.model.drive.base import Drive
-from snapbeam.model.drive.components import Component, Pieces, Sweep, Tone, fitted, side_by_side
+from snapbeam.model.drive.components import Pieces, Sweep, Tone
 from snapbeam.model.drive.fixed_stop import FixedStop
-from snapbeam.model.drive.sum import SumDrive
-from snapbeam.model.extension import overrides
 from snapbeam.model.external_force import ForceHistory
 from snapbeam.model.local_force import (
     CoulombFriction,
@@ -38,9 +36,10 @@ from snapbeam.model.local_force import (
     MagneticForce,
     QuadraticDamping,
 )
-from snapbeam.model.quantity import numbered, section_of, split_name
+from snapbeam.model.quantity import section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
+from snapbeam.solver.excitation import side_of, started
 from snapbeam.solver.structure import Structure
 from snapbeam.solver.user_laws import UserLaw, contact_law, local_force
 
@@ -338,13 +337,10 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
     runs, table = ensemble.size, ensemble.runs
     if isinstance(drive, FixedStop):
         return
-    own = _own(columns, section, runs)
-    alone = len(system.moving) < 2
-    begun = table["phase"] / ensemble.clock
-    kind, number = numbered(section)
-    above = drive.recorded and kind == "drive" and system.contacts[number - 1].striker.side == "above"
+    own, begun = started(system, _own(columns, section, runs), table["phase"], ensemble.clock)
+    repeats = len(system.moving) < 2 and drive.is_periodic
     bounds = _bounds(drive, own, system)
-    components = _components(drive, own, system, begun + table["end"] * table["tick"])
+    components = drive.components_until(own, system.scale, begun + table["end"] * table["tick"])
     windows: dict[int, int] = {}
     for each in components:
         signal = np.zeros((runs, len(SIGNAL)))
@@ -353,8 +349,8 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
             size, rate = np.abs(each.amplitude), each.rate
             signal[:, 0], signal[:, 1], signal[:, 2] = each.mean, each.amplitude, rate
             signal[:, 3] = each.phase + np.fmod(rate * begun, 2.0 * math.pi)
-            if alone and len(components) == 1 and drive.is_periodic:
-                signal[:, 3], signal[:, 4] = table["phase"], table["period"]
+            if repeats and len(components) == 1:
+                signal[:, 4] = table["period"]
             if each.window is None:
                 most = np.stack((size + np.abs(each.mean), size * rate, size * rate**2), axis=1)
             else:
@@ -367,45 +363,12 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
             signal[:, 4], signal[:, 5] = each.duration, float(each.exponential)
             kind_of = 2
         else:
-            built.add_pieces(section, each, begun, most, -1.0 if above else 1.0)
+            built.add_pieces(section, each, begun, most, side_of(system, section, drive))
             bounds = np.zeros((runs, 3))
             continue
         if most is bounds:  # those of the whole motion, stated once; a tone alone has its own
             bounds = np.zeros((runs, 3))
         signal[:, 6:] = most
         built.add_signal(section, kind_of, signal, window)
-    for name, times in _jumps(drive, own, system).items():
+    for name, times in drive.jumps(own, system.scale).items():
         built.jumps[f"{section} {name}"] = times - begun
-
-
-def _components(drive: Drive, own: Mapping[str, _Array], system: System, until: _Array) -> list[Component]:
-    """The components of a motion, up to a time (s); one of a user that has none is approximated."""
-    kind: Any = type(drive)
-    if drive.harmonic or isinstance(drive, SumDrive) or overrides(kind, Drive, "components"):
-        return drive.components(own, system.scale)
-    numbers, jumps = drive.numbers(own, system.scale), _jumps(drive, own, system)
-    names, memory = drive.numbers_type()._fields, drive.samples()
-    columns = [np.broadcast_to(numbers.get(name, 0.0), until.size) for name in names]
-    rows, which = np.unique(np.stack([*columns, *jumps.values(), until], axis=1), axis=0, return_inverse=True)
-    found = []
-    for row in rows.tolist():
-        of = drive.numbers_type()(*row[: len(names)])
-        turn = math.tau if drive.is_periodic else math.inf
-        longest = 1.5 / max(getattr(of, "fastest", of.omega), 1e-300)
-        motion = lambda t, of=of, turn=turn: kind.motion(of, memory, math.fmod(of.omega * t, turn))  # noqa: E731
-        found.append(fitted(kind.__name__, motion, row[-1], longest, row[len(names) : -1]))
-    return [side_by_side(found, which.reshape(-1))]
-
-
-def _jumps(drive: Drive, own: Mapping[str, _Array], system: System) -> dict[str, _Array]:
-    """Times at which a derivative of a motion jumps, s since it began."""
-    if isinstance(drive, SumDrive):
-        return {
-            f"{i} {name}": times
-            for i, term, columns in drive.each_term(own)
-            for name, times in _jumps(term, columns, system).items()
-        }
-    if not drive.discontinuities:
-        return {}
-    numbers = drive.numbers(own, system.scale)
-    return {name: numbers[name] for name in drive.discontinuities}

@@ -11,7 +11,7 @@ local forces and circuits, V^T phi at their locations.  With w_j the drive of a 
     d_j = d_j0 + w_j(t) - r_j.q - D_j,     f_j = max[0, F_j(d_j) + c_j(d_j) d_j']  for d_j > 0,     z_k' = -t_k.q' - lambda_k z_k.
 
 A striker with a mass is a mode of its own in q, -1/sqrt(m) in its row; so is the charge z_k + t_k.q of a circuit, and D_j.  Laws
-and drives are the system's own objects, whose Python functions are called: nothing is compiled.  Works and losses are integrals
+are the system's own objects, whose Python functions are called, and motions the sums of their components: nothing is compiled.  Works and losses are integrals
 beside the state.  This is slow: it is for reading, changing and checking.
 """
 
@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,9 +27,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from snapbeam.model.drive.base import Drive
-from snapbeam.model.drive.sum import SumDrive
+from snapbeam.model.quantity import section_of
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.excitation import Motion, motion_of
+from snapbeam.solver.excitation import motion_of, side_of, started
 from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records, nodes_of
 from snapbeam.solver.statistics import WORKS, OutputStates, Recorded
 from snapbeam.solver.step_size import seconds_of
@@ -36,6 +37,8 @@ from snapbeam.util.diagnostics import Diagnostic, Severity, tell
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
+Motion = Callable[[float], tuple[float, float, float]]
+"""Displacement (m), velocity (m/s) and acceleration (m/s^2) at a time, s."""
 _Event = Callable[[float, _Array], float]
 _RTOL = {4: 1e-9, 6: 2e-12}
 """Relative error of a step by the order of the accuracy level."""
@@ -76,21 +79,27 @@ class Equations:
         self.g, self.G, self.gamma = structure.well, structure.coupling, structure.nonlinear_stiffness
         self.b: Any = structure.base_load
         self.breaks: list[float] = []
-        alone, begun, omega = len(system.moving) < 2, float(table["phase"]), float(ensemble.clock[run])
+        phase, clock = ensemble.runs["phase"][run : run + 1], ensemble.clock[run : run + 1]
+        end = float(table["end"] * table["tick"])
 
-        def moves(drive: Drive, sign: float = 1.0) -> Motion:
-            # one motion alone goes on at its phase, several share a clock
-            own = (getattr(drive, "phase", 0.0), begun / omega)
-            own = (begun, 0.0) if alone and not isinstance(drive, SumDrive) else own
-            motion, jumps = motion_of(drive, system.scale, *own, sign)
-            self.breaks += jumps
-            return motion
+        def moves(section: str, drive: Drive) -> Motion:
+            own, begun = started(system, drive.columns(), phase, clock)
+            (later,), sign = begun.tolist(), side_of(system, section, drive)
+            motion = motion_of(drive, system.scale, later + end, own)
+            self.breaks += [float(at[0]) - later for at in drive.jumps(own, system.scale).values()]
+
+            @lru_cache(maxsize=16)  # a derivative of the state asks for the same time again and again
+            def moved(t: float) -> tuple[float, float, float]:
+                w, v, a = motion(t + later).tolist()
+                return sign * w, sign * v, sign * a
+
+            return moved
 
         base, others = system.base_excitation, ensemble.others
-        self.base = None if base is None else moves(base.motion)
+        self.base = None if base is None else moves("base_excitation", base.motion)
         self.up = -1.0 if base is not None and base.direction == "down" else 1.0
-        self.load = None if system.axial_load is None else moves(system.axial_load.motion)
-        histories = [moves(each.history) for each in system.external_forces]
+        self.load = None if system.axial_load is None else moves("axial_load", system.axial_load.motion)
+        histories = [moves("force", each.history) for each in system.external_forces]
         self.external = list(zip(structure.force_rows, histories, strict=True))
         self.local: list[Any] = [(each, type(each.law).owner) for each in structure.local_forces]
         rates = ensemble.circuit_rates[run] if ensemble.circuits else []
@@ -110,7 +119,7 @@ class Equations:
                 assert others is not None
                 row = others.rows[others.places[run, j - 1]]
                 offset, since = others.offset[run, j - 1], others.since[run, j - 1]
-            motion = moves(each.striker.drive, side if each.striker.drive.recorded else 1.0)
+            motion = moves(section_of("drive", j + 1), each.striker.drive)
             follows = 0.0 if base is None or base.striker_on_base else -side * self.up
             self.contacts.append(
                 Contact(each.law, row, offset, motion, follows, structure.mode_of_indentation(j))

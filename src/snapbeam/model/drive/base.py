@@ -5,14 +5,15 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.components import Component, Tone
+from snapbeam.model.drive.components import Component, Tone, fitted, side_by_side
 from snapbeam.model.extension import check_defined, check_names, overrides
-from snapbeam.model.quantity import check_fields, numbers_type
+from snapbeam.model.quantity import check_fields
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, NamedTable
 
@@ -41,31 +42,18 @@ class Scale(NamedTuple):
     """Angular frequency that Omega and V are normalised by, rad/s."""
 
 
-def smooth_rise(x: float) -> tuple[float, float, float]:
-    """x^3 (10 - 15 x + 6 x^2), from 0 to 1 with x, and its first two derivatives."""
-    return (
-        x * x * x * (10.0 + x * (6.0 * x - 15.0)),
-        30.0 * x * x * (1.0 - x) * (1.0 - x),
-        60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
-    )
-
-
-def sincos(angle: float) -> tuple[float, float]:
-    """Sine and cosine of an angle, rad."""
-    return math.sin(angle), math.cos(angle)
-
-
 class Drive:
     """A prescribed motion of the striker's tip about its mid-position: a frozen dataclass in a file of its own.
 
-    Its motion is a function of one argument that grows by ``omega`` radians a second.  A drive that
-    is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that
-    returns displacement (m) and velocity (m/s), and ``acceleration`` in the same way (m/s^2); ``drive`` contains its numbers and ``memory[drive.table:]`` its samples.  :class:`Timed` is the base of
-    drives that do not repeat.
+    The motion is the sum of its ``components``: tones, polynomials in pieces and sweeps of the time since the drive began
+    (:mod:`snapbeam.model.drive.components`).  A drive that is none of these brings ``motion(drive, t)`` instead, a scalar
+    function that returns displacement (m) and velocity (m/s) at the time t (s); ``drive`` has the numbers of the run by name.
+    It is approximated by quintics within 1e-9 of its maximum.  :class:`Timed` is the base of drives that do not repeat.
 
-    The numbers have the names ``number_names``, of which ``omega`` is the first.  ``amplitudes`` names those that the motion is
-    proportional to, and ``discontinuities`` those that are times at which a derivative of the motion jumps.  A name that none
-    of the hooks has is refused when the class is defined; names of your own begin with an underscore.
+    ``numbers`` returns the numbers, of which ``omega`` is the rate of the phase (rad/s).  A drive with a field ``phase`` begins
+    at that phase, which is among the *columns*; the phase of a state replaces it.  ``discontinuities`` names the numbers that
+    are times at which the motion or one of its derivatives jumps.  A name that none of the hooks has is refused when the class
+    is defined; names of your own begin with an underscore.
 
     Examples
     --------
@@ -75,9 +63,8 @@ class Drive:
     """
 
     hooks: ClassVar[tuple[str, ...]] = (
-        "name", "number_names", "amplitudes", "discontinuities", "numbers", "cycle", "frequencies", "bounds",
-        "mirrored_bounds", "peak_acceleration", "motion", "acceleration", "samples", "components", "diagnostics",
-        "file_keys", "file_gives",
+        "name", "discontinuities", "numbers", "cycle", "frequencies", "bounds", "mirrored_bounds", "peak_acceleration",
+        "components", "motion", "diagnostics", "file_keys", "file_gives",
     )  # fmt: skip
     """Names that are read of a drive of one's own."""
     required: ClassVar[tuple[str, ...]] = ("numbers", "cycle", "bounds")
@@ -85,18 +72,11 @@ class Drive:
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
     harmonic: ClassVar[bool] = False
-    """True for the sine, which is built into the solver."""
+    """True for a sine, whose tone has the numbers ``omega`` and ``amplitude``."""
     is_periodic: ClassVar[bool] = True
-    """True if the motion repeats after one turn of its argument; otherwise one turn is longer than any run."""
+    """True if the motion repeats after one turn of its phase; otherwise one turn is longer than any run."""
     recorded: ClassVar[bool] = False
     """True for a record of a certain ``duration``."""
-    integrated_as: ClassVar[type[Drive] | None] = None
-    """The drive whose motion it has, if it is integrated as another one."""
-    number_names: ClassVar[tuple[str, ...]] = ("omega",)
-    terms: ClassVar[tuple[type[Drive], ...]] = ()
-    """The kinds that it is a sum of."""
-    amplitudes: ClassVar[tuple[str, ...]] = ("amplitude",)
-    """Numbers that the motion is proportional to, all together."""
     discontinuities: ClassVar[tuple[str, ...]] = ()
     """Numbers that are times at which the velocity or one of its derivatives jumps, s since the drive began: steps end there."""
     registry: ClassVar[dict[str, type[Drive]]] = DRIVES
@@ -106,19 +86,15 @@ class Drive:
         super().__init_subclass__(**options)
         check_names(cls)
         if cls.name:
-            moving = ["motion", "acceleration"]
-            check_defined(cls, Drive, [*cls.required, *([] if cls.harmonic else moving)])
-            unread = [each for each in moving if cls.harmonic and overrides(cls, Drive, each)]
-            if unread:
-                raise InputError(f"{cls.__name__}.{unread[0]}: is not read of a sine; set harmonic = False")
-            for hook in ("discontinuities", "amplitudes"):
-                strange = set(getattr(cls, hook)) - set(cls.number_names)
-                # a drive that does not name its amplitudes has the default
-                if strange and (hook == "discontinuities" or cls.amplitudes is not Drive.amplitudes):
-                    raise InputError(
-                        f"{cls.__name__}.{hook} = {getattr(cls, hook)}: {', '.join(sorted(strange))} is not among the numbers "
-                        f"{', '.join(cls.number_names)}; name it in number_names, or leave it out of {hook}"
-                    )
+            check_defined(cls, Drive, cls.required)
+            moving = [each for each in ("components", "motion") if overrides(cls, Drive, each)]
+            if cls.harmonic and moving:
+                raise InputError(f"{cls.__name__}.{moving[0]}: is not read of a sine; set harmonic = False")
+            if not cls.harmonic and len(moving) != 1:
+                raise InputError(
+                    f"{cls.__name__}: has {' and '.join(moving) or 'no components and no motion'}; see the docstring of Drive "
+                    "and define one of components and motion"
+                )
             cls.registry[cls.name] = cls
 
     def __post_init__(self) -> None:
@@ -130,16 +106,15 @@ class Drive:
 
         return SumDrive.of(self, other)
 
-    @classmethod
-    def numbers_type(cls) -> Any:
-        """The named tuple of the drive's numbers, as its motion gets them; an attribute of the class, ``Numbers``."""
-        return numbers_type(cls, cls.number_names)
-
     def values(self) -> dict[str, float]:
         """The fields that are plain numbers, by name."""
         fields = dataclasses.fields(self)  # type: ignore[arg-type]
         found = {item.name: getattr(self, item.name) for item in fields}
         return {name: value for name, value in found.items() if isinstance(value, float)}
+
+    def columns(self) -> dict[str, _Array]:
+        """:meth:`values` as columns of one run."""
+        return {name: np.array([value]) for name, value in self.values().items()} or {"": np.zeros(1)}
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The numbers of many runs, arrays of shape (runs,), from its fields as such arrays."""
@@ -177,9 +152,47 @@ class Drive:
         found = self.numbers(columns, scale)
         return [Tone(found["amplitude"], found["omega"], columns.get("phase", 0.0), found.get("mean", 0.0))]
 
-    def samples(self) -> _Array:
-        """Table of samples, one row; empty for a formula."""
-        return np.empty(0)
+    def jumps(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Times of the discontinuities since the drive began, s, by name; arrays of shape (runs,).
+
+        Raises
+        ------
+        InputError
+            For a discontinuity that is not among the numbers.
+        """
+        if not self.discontinuities:
+            return {}
+        found = self.numbers(columns, scale)
+        for name in self.discontinuities:
+            if name not in found:
+                raise InputError(
+                    f"{type(self).__name__}.discontinuities = {self.discontinuities}: {name} is not among the numbers "
+                    f"{', '.join(found)}; return it from numbers or shape_numbers, or leave it out of discontinuities"
+                )
+        later = columns.get("phase", 0.0) / found["omega"]
+        return {name: found[name] - later for name in self.discontinuities}
+
+    def components_until(self, columns: Mapping[str, _Array], scale: Scale, until: _Array) -> list[Component]:
+        """The components, valid up to a time of each run (s), shape (runs,); of a :meth:`motion` quintics that approximate it."""
+        if not overrides(type(self), Drive, "motion"):
+            return self.components(columns, scale)
+        kind: Any = type(self)
+        numbers, jumps = self.numbers(columns, scale), self.jumps(columns, scale)
+        phase, until = columns.get("phase", 0.0), np.maximum(until, self.cycle(columns, scale))
+        parts = np.broadcast_arrays(*numbers.values(), phase, *jumps.values(), until)
+        rows, which = np.unique(np.stack(parts, axis=1), axis=0, return_inverse=True)
+        turn = math.tau if self.is_periodic else math.inf
+        found = []
+        for row in rows.tolist():
+            drive, begun = SimpleNamespace(**dict(zip(numbers, row, strict=False))), row[len(numbers)]
+
+            def moved(t: float, drive: Any = drive, begun: float = begun) -> tuple[float, float]:
+                w, v = kind.motion(drive, math.fmod(drive.omega * t + begun, turn) / drive.omega)
+                return w, v
+
+            longest = 1.5 / max(getattr(drive, "fastest", drive.omega), 1e-300)
+            found.append(fitted(kind.__name__, moved, row[-1], longest, row[len(numbers) + 1 : -1]))
+        return [side_by_side(found, which.reshape(-1))]
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
         """Diagnostics of values that are implausible for a model; none by default."""
@@ -191,15 +204,14 @@ class Drive:
 
 
 HORIZON = 1 << 24
-"""Cycles in which the argument of such a drive makes its one turn: more than a run may last."""
+"""Cycles in which the phase of such a drive makes its one turn: more than a run may last."""
 
 
 class Timed(Drive):
     """A drive whose motion depends on the time since it began; its displacement begins at zero, without a jump.
 
-    A motion gets the argument omega t, where omega is so small that it never turns round; ``fastest`` bounds the angular
-    frequency of what happens, rad/s.  A subclass brings :meth:`cycle`, :meth:`shape_numbers`, :meth:`bounds`, and
-    ``motion`` and ``acceleration``.
+    Its phase is omega t, where omega is so small that it never turns round; ``fastest`` bounds the angular frequency of what
+    happens, rad/s.  A subclass brings :meth:`cycle`, :meth:`shape_numbers`, :meth:`bounds`, and ``components`` or ``motion``.
     """
 
     is_periodic = False
@@ -211,7 +223,7 @@ class Timed(Drive):
         raise NotImplementedError
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """The rate of the argument, and what the subclass needs."""
+        """The rate of the phase, and what the subclass needs."""
         return {"omega": 2.0 * math.pi / (HORIZON * self.cycle(columns, scale))} | self.shape_numbers(
             columns, scale
         )

@@ -5,21 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed, sincos, smooth_rise
-from snapbeam.model.drive.components import Component, Tone, in_pieces, rising
+from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.components import SHARPEST, STEEPEST, Component, Tone, in_pieces, rising
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
-_STEEPEST = 1.875
-"""Maximum slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
-_SHARPEST = 5.7736
-"""Maximum curvature of that polynomial, 10/sqrt(3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,11 +62,7 @@ class Burst(Timed):
     )  # fmt: skip
 
     name = "burst"
-    number_names = (
-        "omega", "fastest", "rate", "amplitude", "retraction", "risen", "falling", "ended", "retracted"
-    )  # fmt: skip
     discontinuities = ("risen", "falling", "ended", "retracted")
-    amplitudes = ("amplitude", "retraction")
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -119,9 +110,9 @@ class Burst(Timed):
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """The amplitude, and the speed with the steepest envelope."""
         found = self.shape_numbers(columns, scale)
-        steepest = _STEEPEST / np.minimum(found["risen"], found["ended"] - found["falling"])
+        steepest = STEEPEST / np.minimum(found["risen"], found["ended"] - found["falling"])
         speed = found["amplitude"] * (found["rate"] + steepest)
-        speed = speed + found["retraction"] * _STEEPEST / (found["retracted"] - found["ended"])
+        speed = speed + found["retraction"] * STEEPEST / (found["retracted"] - found["ended"])
         return found["amplitude"], speed
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
@@ -133,55 +124,6 @@ class Burst(Timed):
         """Bound of the acceleration: the sine with the steepest envelope, plus the retraction."""
         found = self.shape_numbers(columns, scale)
         rate, shortest = found["rate"], np.minimum(found["risen"], found["ended"] - found["falling"])
-        shape = rate**2 + 2.0 * rate * _STEEPEST / shortest + _SHARPEST / shortest**2
-        retreat = found["retraction"] * _SHARPEST / (found["retracted"] - found["ended"]) ** 2
+        shape = rate**2 + 2.0 * rate * STEEPEST / shortest + SHARPEST / shortest**2
+        retreat = found["retraction"] * SHARPEST / (found["retracted"] - found["ended"]) ** 2
         return np.asarray(found["amplitude"] * shape + retreat)
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """E w and its derivative."""
-        t = argument / drive.omega
-        e, slope, _ = _envelope(drive, t)
-        away, speed, _ = _retreat(drive, t)
-        sine, cosine = _turn(drive, t)
-        return drive.amplitude * e * sine - away, drive.amplitude * (
-            slope * sine + e * drive.rate * cosine
-        ) - speed
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The second derivative."""
-        t, rate = argument / drive.omega, drive.rate
-        e, slope, bend = _envelope(drive, t)
-        _, _, away = _retreat(drive, t)
-        sine, cosine = _turn(drive, t)
-        return drive.amplitude * ((bend - e * rate * rate) * sine + 2.0 * slope * rate * cosine) - away
-
-
-def _envelope(drive: Any, t: float) -> tuple[float, float, float]:
-    """E and its first two derivatives."""
-    if t < drive.risen:
-        e, slope, bend = smooth_rise(t / drive.risen)
-        return e, slope / drive.risen, bend / (drive.risen * drive.risen)
-    if t >= drive.ended:
-        return 0.0, 0.0, 0.0
-    if t > drive.falling:
-        over = drive.ended - drive.falling
-        e, slope, bend = smooth_rise((drive.ended - t) / over)
-        return e, -slope / over, bend / (over * over)
-    return 1.0, 0.0, 0.0
-
-
-def _retreat(drive: Any, t: float) -> tuple[float, float, float]:
-    """Distance by which the tip has withdrawn and its first two derivatives."""
-    if t <= drive.ended:
-        return 0.0, 0.0, 0.0
-    over = drive.retracted - drive.ended
-    e, slope, bend = smooth_rise(min((t - drive.ended) / over, 1.0))
-    return drive.retraction * e, drive.retraction * slope / over, drive.retraction * bend / (over * over)
-
-
-def _turn(drive: Any, t: float) -> tuple[float, float]:
-    """Sine and cosine of the phase, of which whole turns are left out."""
-    cycles = t * drive.rate / 6.283185307179586
-    return sincos(6.283185307179586 * (cycles - math.floor(cycles)))

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed, sincos
+from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.drive.components import Component, Sweep
 from snapbeam.model.quantity import RUN, STRUCTURE, quantity
 
@@ -56,8 +55,6 @@ class Chirp(Timed):
     )  # fmt: skip
 
     name = "chirp"
-    number_names = ("omega", "fastest", "first", "last", "speed", "duration", "logarithmic")
-    amplitudes = ("speed",)
     discontinuities = ("duration",)
 
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
@@ -80,7 +77,6 @@ class Chirp(Timed):
             "last": last,
             "speed": columns["velocity_amplitude"] * scale.length * scale.omega,
             "duration": columns["sweep_cycles"] * self.cycle(columns, scale),
-            "logarithmic": np.full(first.size, float(self.sweep_type == "log")),
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
@@ -100,46 +96,3 @@ class Chirp(Timed):
         logarithmic = np.abs(np.log(found["last"] / found["first"])) / found["duration"] * fastest
         change = np.maximum(linear, logarithmic) / slowest
         return np.asarray(found["speed"] * (fastest + 3.0 * change + 3.0 * change**2 / slowest))
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """The sine of the turned angle over the present frequency, and its derivative."""
-        t, length = argument / drive.omega, drive.duration
-        s = min(t, length)
-        if drive.logarithmic > 0.5 and drive.last != drive.first:
-            grows = math.log(drive.last / drive.first) / length
-            now = drive.first * math.exp(grows * s)
-            angle, change = (now - drive.first) / grows, grows * now
-        else:
-            change = (drive.last - drive.first) / length
-            now = drive.first + change * s
-            angle = s * (drive.first + 0.5 * change * s)
-        angle += drive.last * (t - s)
-        if t >= length:
-            now, change = drive.last, 0.0
-        a = drive.speed / now
-        sine, cosine = sincos(angle)
-        return a * sine, drive.speed * cosine - a * change / now * sine
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The second derivative."""
-        t, length = argument / drive.omega, drive.duration
-        s = min(t, length)
-        bend = 0.0
-        if drive.logarithmic > 0.5 and drive.last != drive.first:
-            grows = math.log(drive.last / drive.first) / length
-            now = drive.first * math.exp(grows * s)
-            angle, change, bend = (now - drive.first) / grows, grows * now, grows * grows * now
-        else:
-            change = (drive.last - drive.first) / length
-            now = drive.first + change * s
-            angle = s * (drive.first + 0.5 * change * s)
-        angle += drive.last * (t - s)
-        if t >= length:
-            now, change, bend = drive.last, 0.0, 0.0
-        a = drive.speed / now
-        falls = -a * change / now
-        curves = a * (2.0 * change * change / (now * now) - bend / now)
-        sine, cosine = sincos(angle)
-        return curves * sine + 2.0 * falls * now * cosine + a * change * cosine - a * now * now * sine

@@ -1,11 +1,11 @@
-"""Components of a motion: tones, polynomials in pieces and sweeps, of which the native core's signals consist.
+"""Components of a motion: tones, polynomials in pieces and sweeps, of which the native core makes its signals.
 
     tone     mean + amplitude sin(rate t + phase), times a window
     pieces   gain sum_k c_k (t - begin)^k, a polynomial of degree five from each begin to the next
     sweep    speed/w(t) sin(integral of w), with w from first to last in a duration
 
 The motion of a drive is the sum of its components; t is the time since the drive began, s.  Every array has shape (runs,), or
-begins with that axis, or with one of length 1 that all runs share.
+begins with that axis, or with one of length 1 that all runs share.  :class:`Motion` evaluates them in Python.
 """
 
 from __future__ import annotations
@@ -13,16 +13,21 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
 RISE = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 """x^3 (10 - 15 x + 6 x^2): from 0 to 1, without a jump of the first two derivatives."""
+STEEPEST = 1.875
+"""Maximum slope of that polynomial on [0, 1]."""
+SHARPEST = 5.7736
+"""Maximum curvature of that polynomial on [0, 1], 10/sqrt(3)."""
 
 
 class Pieces(NamedTuple):
@@ -59,6 +64,115 @@ class Sweep(NamedTuple):
 
 
 Component = Tone | Pieces | Sweep
+
+
+class Motion:
+    """Sum of components: value, rate and acceleration at times.
+
+    Parameters
+    ----------
+    components : sequence of Component
+    runs : int or array of int, shape (times,)
+        Run whose parameters count, or the run of each time.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> Motion([Tone(np.array([2.0]), np.array([3.0]))])(0.0)
+    array([0., 6., 0.])
+    """
+
+    def __init__(self, components: Sequence[Component], runs: int | NDArray[np.int64] = 0) -> None:
+        own = partial(_of_runs, runs=runs)
+        self._sweeps = [
+            Sweep(own(each.speed), own(each.first), own(each.last), own(each.duration), each.exponential)
+            for each in components
+            if isinstance(each, Sweep)
+        ]
+        self._pieces, self._runs = [each for each in components if isinstance(each, Pieces)], runs
+        together: dict[int, list[Tone]] = {}
+        for each in components:
+            if isinstance(each, Tone):
+                together.setdefault(id(each.window), []).append(each)
+        self._tones = []
+        for tones in together.values():
+            numbers = [
+                np.stack(np.broadcast_arrays(*map(own, each)))
+                for each in zip(*(tone[:4] for tone in tones), strict=True)
+            ]
+            self._tones.append(
+                ([each if each.ndim > 1 else each[:, None] for each in numbers], tones[0].window)
+            )
+
+    def __call__(self, times: ArrayLike) -> _Array:
+        """Value, rate and acceleration at *times* (s); shape (3, ...) of times of shape (...)."""
+        given = np.asarray(times, dtype=np.float64)
+        t = given.reshape(-1)
+        found = np.zeros((3, t.size))
+        for pieces in self._pieces:
+            found += _in_pieces(pieces, t, self._runs)
+        for (amplitude, rate, phase, mean), window in self._tones:
+            angle = rate * t + phase
+            sine = amplitude * np.sin(angle)
+            tones = np.stack((
+                np.sum(mean + sine, axis=0), np.sum(rate * amplitude * np.cos(angle), axis=0), -np.sum(rate * rate * sine, axis=0)
+            ))  # fmt: skip
+            found += tones if window is None else _product(_in_pieces(window, t, self._runs), tones)
+        for sweep in self._sweeps:
+            found += _swept(t, sweep)
+        return found.reshape(3, *given.shape)
+
+
+def _of_runs(values: _Array | float, runs: int | NDArray[np.int64]) -> _Array:
+    """Numbers of some runs, from one for all or one for each."""
+    array = np.asarray(values, dtype=np.float64)
+    return array if array.ndim == 0 else array[np.zeros_like(runs) if len(array) == 1 else runs]
+
+
+def _in_pieces(pieces: Pieces, t: _Array, runs: int | NDArray[np.int64]) -> _Array:
+    """Value and derivatives of pieces of some runs."""
+    begins, coefficients, _ = pieces
+    which = runs if len(begins) > 1 else 0
+    if isinstance(which, int):
+        at = np.searchsorted(begins[which], t, side="right") - 1
+    else:
+        at = np.sum(begins[which] <= t[:, None], axis=1) - 1
+    at = np.maximum(at, 0)
+    x, c = t - begins[which, at], coefficients[which, at].T
+    value, slope, bend = c[5], 0.0 * x, 0.0 * x
+    for k in range(4, -1, -1):
+        value, slope, bend = value * x + c[k], slope * x + value, bend * x + slope
+    return np.asarray(_of_runs(pieces.gain, runs) * np.stack((value, slope, 2.0 * bend)))
+
+
+def _product(one: _Array, other: _Array) -> _Array:
+    """Value and derivatives of a product."""
+    (a, da, dda), (b, db, ddb) = one, other
+    return np.stack((a * b, da * b + a * db, dda * b + 2.0 * da * db + a * ddb))
+
+
+def _swept(t: _Array, sweep: Sweep) -> _Array:
+    """Value and derivatives of a sweep."""
+    speed, first, last, duration, exponential = sweep
+    s = np.minimum(t, duration)
+    if exponential:
+        grows = np.log(last / first) / duration
+        now, still = first * np.exp(grows * s), grows == 0.0
+        angle = np.where(still, first * s, (now - first) / np.where(still, 1.0, grows))
+        change, bend = grows * now, grows * grows * now
+    else:
+        change = (last - first) / duration
+        now, bend = first + change * s, np.zeros(1)
+        angle = s * (first + 0.5 * change * s)
+    angle, over = angle + last * (t - s), t >= duration
+    now, change, bend = np.where(over, last, now), np.where(over, 0.0, change), np.where(over, 0.0, bend)
+    sine, cosine, a = np.sin(angle), np.cos(angle), speed / now
+    falls = -a * change / now
+    curves = a * (2.0 * change * change / (now * now) - bend / now)
+    return np.stack((
+        a * sine, speed * cosine + falls * sine,
+        (curves - a * now * now) * sine + (2.0 * falls * now + a * change) * cosine,
+    ))  # fmt: skip
 
 
 def in_pieces(*pieces: tuple[_Array, dict[int, _Array] | _Array], gain: _Array | float = 1.0) -> Pieces:
@@ -160,8 +274,8 @@ def fitted(
             parts += [(middle, b, low, high), (a, middle, low, high)]
         else:
             raise InputError(
-                f"{name}.motion at {a:g} s: is not finite or not smooth, or has more than {_PIECES} parts, so that engine = 'native' "
-                "cannot approximate it; name the times of its jumps in discontinuities, or define components"
+                f"{name}.motion at {a:g} s: is not finite or not smooth, or has more than {_PIECES} parts, and cannot be "
+                "approximated; name the times of its jumps in discontinuities, or define components"
             )
     return Pieces(np.array(begins)[None], np.array(coefficients)[None])
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +39,6 @@ class ConstantVelocity(Timed):
     )
 
     name = "constant_velocity"
-    number_names = ("omega", "fastest", "speed")
-    amplitudes = ("speed",)
 
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """v t."""
@@ -60,13 +57,3 @@ class ConstantVelocity(Timed):
         """Bounds of displacement and velocity: the displacement is unbounded."""
         speed = columns["speed"] * scale.length * scale.omega
         return np.where(speed > 0.0, np.inf, 0.0), speed
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """v t and v."""
-        return drive.speed * (argument / drive.omega), drive.speed
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """None."""
-        return 0.0

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale
-from snapbeam.model.drive.sine import Sine
 
 _Array = NDArray[np.float64]
 
@@ -28,8 +26,6 @@ class FixedStop(Drive):
 
     name = "fixed"
     harmonic = True
-    number_names = ("omega", "amplitude")
-    integrated_as: ClassVar[type[Drive] | None] = Sine
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The first natural frequency and no amplitude."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed, sincos
+from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.drive.components import Component, Tone, in_pieces
 from snapbeam.model.quantity import RUN, quantity
 
@@ -52,7 +51,6 @@ class HalfSine(Timed):
     )
 
     name = "half_sine"
-    number_names = ("omega", "fastest", "amplitude", "duration")
     discontinuities = ("duration",)
 
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
@@ -75,21 +73,3 @@ class HalfSine(Timed):
         """Amplitudes of displacement and velocity."""
         found = self.shape_numbers(columns, scale)
         return found["amplitude"], found["amplitude"] * found["fastest"]
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """Half a sine, then nothing."""
-        t = argument / drive.omega
-        if t >= drive.duration:
-            return 0.0, 0.0
-        sine, cosine = sincos(drive.fastest * t)
-        return drive.amplitude * sine, drive.amplitude * drive.fastest * cosine
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """Acceleration of half a sine, then zero."""
-        t = argument / drive.omega
-        if t >= drive.duration:
-            return 0.0
-        sine, _ = sincos(drive.fastest * t)
-        return -drive.amplitude * drive.fastest * drive.fastest * sine

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed, smooth_rise
-from snapbeam.model.drive.components import Component, Tone, in_pieces, rising
+from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.components import SHARPEST, STEEPEST, Component, Tone, in_pieces, rising
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 from snapbeam.util.validation import InputError
 
@@ -19,9 +19,6 @@ _Array = NDArray[np.float64]
 LINES = 32
 """Sines that the noise is made of, one in each equal part of the band, at a random place in it."""
 _LOW_BITS = np.uint64(0xFFFFFFFF)
-_STEEPEST = 1.875
-_SHARPEST = 5.7736
-"""Maximum curvature of x^3 (10 - 15 x + 6 x^2) on [0, 1], 10/sqrt(3)."""
 
 
 def seed_of_noise() -> Any:
@@ -86,9 +83,7 @@ class BandLimitedNoise(Timed):
     ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
 
     name = "band_limited_noise"
-    number_names = ("omega", "fastest", "low", "high", "strength", "risen", "table")
     discontinuities = ("risen",)
-    amplitudes = ("strength",)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -99,7 +94,7 @@ class BandLimitedNoise(Timed):
 
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """The tones in one window."""
-        found, table = self.shape_numbers(columns, scale), self.samples()
+        found, table = self.shape_numbers(columns, scale), self._sines()
         window = in_pieces((np.zeros(1), rising(found["risen"])), (found["risen"], {0: np.ones(1)}))
         rates = [found["low"] + place * (found["high"] - found["low"]) / LINES for place in table[:LINES]]
         return [
@@ -120,7 +115,6 @@ class BandLimitedNoise(Timed):
             "high": high,
             "strength": columns["velocity_rms"] * scale.length * scale.omega * math.sqrt(2.0 / LINES),
             "risen": columns["ramp_up_cycles"] * self.cycle(columns, scale),
-            "table": np.zeros(low.size),
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
@@ -129,7 +123,7 @@ class BandLimitedNoise(Timed):
         parts = (np.arange(LINES) / LINES)[:, None]
         lowest = found["low"] + parts * (found["high"] - found["low"])
         highest = found["strength"] * np.sum(1.0 / lowest, axis=0)
-        return highest, LINES * found["strength"] + highest * _STEEPEST / found["risen"]
+        return highest, LINES * found["strength"] + highest * STEEPEST / found["risen"]
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Bound of the acceleration: the sum of all amplitudes, plus the effect of the envelope."""
@@ -137,10 +131,10 @@ class BandLimitedNoise(Timed):
         parts = ((np.arange(LINES) + 1) / LINES)[:, None]
         fastest = found["low"] + parts * (found["high"] - found["low"])
         own = found["strength"] * np.sum(fastest, axis=0)
-        rising = 2.0 * _STEEPEST * LINES * found["strength"] / found["risen"]
-        return np.asarray(own + rising + _SHARPEST * self.bounds(columns, scale)[0] / found["risen"] ** 2)
+        rising = 2.0 * STEEPEST * LINES * found["strength"] / found["risen"]
+        return np.asarray(own + rising + SHARPEST * self.bounds(columns, scale)[0] / found["risen"] ** 2)
 
-    def samples(self) -> _Array:
+    def _sines(self) -> _Array:
         """Place of each sine in the band, in units of its part, then the phases."""
         counter = np.arange(2 * LINES, dtype=np.uint64)
         # a 32-bit integer mixed with its neighbours: every bit of seed and counter touches every bit of it
@@ -151,30 +145,3 @@ class BandLimitedNoise(Timed):
         mixed = ((mixed ^ (mixed >> 15)) * 2221713035) & _LOW_BITS
         shares = (mixed ^ (mixed >> 16)) / 4294967296.0
         return np.concatenate((np.arange(LINES) + shares[::2], 2.0 * math.pi * shares[1::2]))
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """The sum under the envelope, and its derivative."""
-        t = argument / drive.omega
-        width = (drive.high - drive.low) / LINES
-        moved, speed, _ = sums_of_sines(memory, int(drive.table), t, drive.low, width)
-        e, slope, _ = smooth_rise(min(t / drive.risen, 1.0))
-        return e * drive.strength * moved, drive.strength * (e * speed + slope / drive.risen * moved)
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The second derivative."""
-        t = argument / drive.omega
-        width = (drive.high - drive.low) / LINES
-        moved, speed, bent = sums_of_sines(memory, int(drive.table), t, drive.low, width)
-        e, slope, bend = smooth_rise(min(t / drive.risen, 1.0))
-        first, second = slope / drive.risen, bend / (drive.risen * drive.risen)
-        return drive.strength * (e * bent + 2.0 * first * speed + second * moved)
-
-
-def sums_of_sines(memory: Any, table: int, t: float, low: float, width: float) -> tuple[float, float, float]:
-    """Sums over the sines of sin/omega_j, of its derivative cos and of -omega_j sin, at time *t*."""
-    rates = low + width * memory[table : table + LINES]
-    angles = rates * t + memory[table + LINES : table + 2 * LINES]
-    sines = np.sin(angles)
-    return float(np.sum(sines / rates)), float(np.sum(np.cos(angles))), -float(np.sum(sines * rates))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.model.drive.base import smooth_rise
+from snapbeam.model.drive.components import RISE
 from snapbeam.model.drive.noise import seed_of_noise
 from snapbeam.model.drive.recorded_acceleration import SampledAcceleration
 from snapbeam.model.drive.shock import GRAVITY
@@ -268,7 +268,7 @@ class RandomVibration(SampledAcceleration):
         acceleration, velocity, moved = (irfft(each, whole)[:count] for each in (a, v, x))
         if self.ramp_up_s > 0.0:
             t = np.minimum(np.arange(count) / rate / self.ramp_up_s, 1.0)
-            e, slope, bend = smooth_rise(t)  # type: ignore[arg-type]  # a polynomial
+            e, slope, bend = (np.polynomial.Polynomial(RISE).deriv(k)(t) for k in range(3))
             slope, bend = slope / self.ramp_up_s, bend / self.ramp_up_s**2
             acceleration = e * acceleration + 2.0 * slope * velocity + bend * moved
             velocity = e * velocity + slope * moved

@@ -33,15 +33,9 @@ _LONGEST_DRIFT = 1.0
 class SampledAcceleration(Sampled):
     """A motion by samples of its acceleration, m/s^2: the cubic spline through all of them, times a gain, and its integrals."""
 
-    number_names = (*Sampled.number_names, "gain")
-
     def gain(self, columns: Mapping[str, _Array]) -> _Array:
         """Factor on the samples, shape (runs,)."""
         return np.ones(next(iter(columns.values())).size)
-
-    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """Those of the samples, and the factor on them."""
-        return super().shape_numbers(columns, scale) | {"gain": self.gain(columns)}
 
     @cached_property
     def _rows(self) -> _Array:
@@ -82,10 +76,6 @@ class SampledAcceleration(Sampled):
         found[:, 0], found[:, 1] = rows[:-1, 3], rows[:-1, 2]
         found[:, 2:] = cubics[:, :4] / np.array([2.0, 6.0, 12.0, 20.0])
         return [sampled(found, interval, self.gain(columns))]
-
-    def samples(self) -> _Array:
-        """Acceleration, its rate, velocity and displacement, sample after sample."""
-        return self._rows.ravel()
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A bound on the spline: between two samples it is at most both, and 4/27 of an interval times each slope."""
@@ -174,32 +164,6 @@ class SampledAcceleration(Sampled):
     def _density(self, frequency: _Array) -> _Array | None:
         """The density that the samples were drawn from, g^2/Hz; None of a record."""
         return None
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """Displacement and velocity: the integrals of the cubic between two samples."""
-        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
-        i = min(int(at), int(drive.samples) - 2)
-        row = int(drive.table) + 4 * i
-        s, interval = at - i, drive.interval
-        a0, rise = memory[row], memory[row + 4] - memory[row]
-        a, b = memory[row + 1] * interval, memory[row + 5] * interval
-        c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
-        gained = interval * s * (a0 + s * (a / 2.0 + s * (c2 / 3.0 + s * c3 / 4.0)))
-        moved = interval * interval * s * s * (a0 / 2.0 + s * (a / 6.0 + s * (c2 / 12.0 + s * c3 / 20.0)))
-        moved = memory[row + 3] + memory[row + 2] * interval * s + moved
-        return drive.gain * moved, drive.gain * (memory[row + 2] + gained)
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The cubic between two samples."""
-        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
-        i = min(int(at), int(drive.samples) - 2)
-        row = int(drive.table) + 4 * i
-        s, interval = at - i, drive.interval
-        a0, rise = memory[row], memory[row + 4] - memory[row]
-        a, b = memory[row + 1] * interval, memory[row + 5] * interval
-        return drive.gain * (a0 + s * (a + s * (3.0 * rise - 2.0 * a - b + s * (a + b - 2.0 * rise))))
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
         """A drift of the displacement by an offset of the record."""

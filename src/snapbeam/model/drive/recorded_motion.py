@@ -62,8 +62,6 @@ class RecordedMotion(FileKeys, Drive):
     name = "recorded_motion"
     file_gives = ("displacement", "velocity", "sampling_frequency")
     recorded = True
-    number_names = ("omega", "table", "samples", "interval")
-    amplitudes = ()
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -141,14 +139,7 @@ class RecordedMotion(FileKeys, Drive):
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The argument of a record makes one turn over the whole of it."""
-        runs = next(iter(columns.values())).size
-        fixed = {
-            "omega": 2.0 * math.pi / self.duration,
-            "table": 0.0,
-            "samples": float(self.displacement.size),
-            "interval": 1.0 / self.sampling_frequency,
-        }
-        return {name: np.full(runs, value) for name, value in fixed.items()}
+        return {"omega": np.full(next(iter(columns.values())).size, 2.0 * math.pi / self.duration)}
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """One nominal period."""
@@ -176,35 +167,6 @@ class RecordedMotion(FileKeys, Drive):
         """The cubics between samples."""
         interval = 1.0 / self.sampling_frequency
         return [sampled(hermite(self.displacement - self.displacement[0], self.velocity, interval), interval)]
-
-    def samples(self) -> _Array:
-        """Displacement from the first sample and velocity, sample after sample."""
-        return np.column_stack((self.displacement - self.displacement[0], self.velocity)).ravel()
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """The cubic between two samples that matches both displacements and both velocities, and its derivative."""
-        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
-        i = min(int(at), int(drive.samples) - 2)
-        row = int(drive.table) + 2 * i
-        s, interval = at - i, drive.interval
-        w0, rise = memory[row], memory[row + 2] - memory[row]
-        a, b = memory[row + 1] * interval, memory[row + 3] * interval
-        c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
-        displacement = w0 + s * (a + s * (c2 + s * c3))
-        return displacement, (a + s * (2.0 * c2 + s * 3.0 * c3)) / interval
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The second derivative of the cubic."""
-        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
-        i = min(int(at), int(drive.samples) - 2)
-        row = int(drive.table) + 2 * i
-        s, interval = at - i, drive.interval
-        rise = memory[row + 2] - memory[row]
-        a, b = memory[row + 1] * interval, memory[row + 3] * interval
-        c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
-        return (2.0 * c2 + 6.0 * c3 * s) / (interval * interval)
 
 
 def checked_record(displacement: ArrayLike, velocity: ArrayLike, rate: float) -> tuple[_Array, _Array]:

@@ -25,8 +25,6 @@ class Sampled(Timed):
     """A history by its ``record`` at ``sampling_frequency``, which ends with the record.  A cycle is a period of the first mode."""
 
     recorded = True
-    number_names: ClassVar[tuple[str, ...]] = ("omega", "fastest", "table", "samples", "interval")
-    amplitudes = ()
     record: Any
     sampling_frequency: Any
 
@@ -59,15 +57,12 @@ class Sampled(Timed):
         return np.full(next(iter(columns.values())).size, 2.0 * math.pi / scale.omega)
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """Location and number of the samples, and their interval, s."""
-        runs = next(iter(columns.values())).size
-        fixed = {
-            "fastest": 2.0 * math.pi * self.sampling_frequency / _KNOTS,
-            "table": 0.0,
-            "samples": float(self.record.size),
-            "interval": 1.0 / self.sampling_frequency,
+        """A rate that the steps resolve, rad/s."""
+        return {
+            "fastest": np.full(
+                next(iter(columns.values())).size, 2.0 * math.pi * self.sampling_frequency / _KNOTS
+            )
         }
-        return {name: np.full(runs, value) for name, value in fixed.items()}
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +69,6 @@ class Shock(Timed):
     )  # fmt: skip
 
     name = "shock"
-    number_names = ("omega", "fastest", "peak", "duration", "rise", "fall", "form")
-    amplitudes = ("peak",)
     discontinuities = ("rise", "fall", "duration")
 
     @classmethod
@@ -124,7 +121,7 @@ class Shock(Timed):
         return np.full(next(iter(columns.values())).size, 2.0 * math.pi / scale.omega)
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """The peak in m/s^2; duration, end of the rise and begin of the fall in s; the shape."""
+        """The peak in m/s^2; duration, end of the rise and begin of the fall in s."""
         peak, duration = GRAVITY * columns["acceleration_g"], 1e-3 * columns["duration_ms"]
         fastest, rise = math.pi / duration, 0.5 * duration
         if self.shape == "haversine":
@@ -138,7 +135,6 @@ class Shock(Timed):
             "duration": duration,
             "rise": rise,
             "fall": duration - rise,
-            "form": np.full(duration.size, float(SHAPES.index(self.shape))),
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
@@ -156,40 +152,3 @@ class Shock(Timed):
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """The peak."""
         return self.shape_numbers(columns, scale)["peak"]
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """Twice and once the integral of the acceleration."""
-        t, d, a = argument / drive.omega, drive.duration, drive.peak
-        s, turn = min(t, d), 3.141592653589793 / d
-        if drive.form < 0.5:
-            speed = a / turn * (1.0 - math.cos(turn * s))
-            moved = a / turn * (s - math.sin(turn * s) / turn)
-        elif drive.form < 1.5:
-            turn = 2.0 * turn
-            speed = 0.5 * a * (s - math.sin(turn * s) / turn)
-            moved = 0.5 * a * (0.5 * s * s - (1.0 - math.cos(turn * s)) / (turn * turn))
-        else:
-            r = drive.rise
-            if s < r:
-                speed, moved = a * s * s / (2.0 * r), a * s * s * s / (6.0 * r)
-            elif s < drive.fall:
-                u = s - r
-                speed, moved = a * (0.5 * r + u), a * (r * r / 6.0 + 0.5 * r * u + 0.5 * u * u)
-            else:
-                u, last = d - s, a * drive.fall
-                speed = last - a * u * u / (2.0 * r)
-                moved = 0.5 * last * d - last * u + a * u * u * u / (6.0 * r)
-        return moved + speed * (t - s), speed
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The pulse, then none."""
-        t, d = argument / drive.omega, drive.duration
-        if t <= 0.0 or t >= d:
-            return 0.0
-        if drive.form < 0.5:
-            return drive.peak * math.sin(3.141592653589793 * t / d)
-        if drive.form < 1.5:
-            return 0.5 * drive.peak * (1.0 - math.cos(6.283185307179586 * t / d))
-        return drive.peak * min(t / drive.rise, 1.0, (d - t) / drive.rise)

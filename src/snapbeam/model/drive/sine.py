@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,6 @@ class Sine(Drive):
 
     name = "sine"
     harmonic = True
-    number_names = ("omega", "amplitude")
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """Angular frequency (rad/s) and amplitude of the displacement (m)."""
@@ -110,14 +109,12 @@ class Sine(Drive):
 
 @dataclass(frozen=True, kw_only=True)
 class _OwnAmplitude(Drive):
-    """A sine whose amplitude is given otherwise; it is integrated as a :class:`Sine`."""
+    """A sine whose amplitude is given otherwise."""
 
     frequency_ratio: float = quantity(
         "1", "excitation frequency over the first natural frequency", low=0.0, scope=RUN, symbol=r"\Omega"
     )
     harmonic = True
-    number_names = ("omega", "amplitude")
-    integrated_as: ClassVar[type[Drive] | None] = Sine
 
     def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         raise NotImplementedError

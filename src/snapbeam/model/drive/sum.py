@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -44,7 +43,9 @@ class SumDrive(Timed):
     True
     """
 
+    hooks = (*Timed.hooks, "terms")
     terms: ClassVar[tuple[type[Drive], ...]] = ()
+    """Kinds of its terms."""
 
     @classmethod
     def of(cls, *drives: Drive) -> SumDrive:
@@ -110,34 +111,28 @@ class SumDrive(Timed):
         return np.asarray(drive.numbers(own, scale)["amplitude"] * np.sin(own["phase"]))
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """The numbers of every term, its phase and where it begins."""
-        found: dict[str, _Array] = {}
-        fastest, table = np.zeros(next(iter(columns.values())).size), 0
-        for i, drive, own in self.each_term(columns):
-            numbers = drive.numbers(own, scale)
-            if "table" in numbers:
-                numbers["table"] = numbers["table"] + table
-            table += drive.samples().size
-            found |= {f"t{i}_{name}": values for name, values in numbers.items()}
-            found[f"t{i}_phase"] = own.get("phase", np.zeros(fastest.size))
-            found[f"t{i}_start"] = self._begun(drive, own, scale)
-            fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
-        return found | {"fastest": fastest}
+        """Highest rate of the terms, rad/s."""
+        every = [drive.numbers(own, scale) for _, drive, own in self.each_term(columns)]
+        return {"fastest": np.maximum.reduce([each.get("fastest", each["omega"]) for each in every])}
 
-    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+    def jumps(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Those of every term, whose number begins the name."""
+        return {
+            f"{i} {name}": times
+            for i, drive, own in self.each_term(columns)
+            for name, times in drive.jumps(own, scale).items()
+        }
+
+    def components_until(self, columns: Mapping[str, _Array], scale: Scale, until: _Array) -> list[Component]:
         """Those of every term, each less where it begins."""
         found: list[Component] = []
         for _, drive, own in self.each_term(columns):
             begun = self._begun(drive, own, scale)
             found += [
                 each._replace(mean=each.mean - begun) if isinstance(each, Tone) and drive.harmonic else each
-                for each in drive.components(own, scale)
+                for each in drive.components_until(own, scale, until)
             ]
         return found
-
-    def samples(self) -> _Array:
-        """Samples of every term, in their order."""
-        return np.concatenate([drive.samples() for drive in self.parts_of_sum])
 
     def frequencies(self, columns: Mapping[str, _Array], scale: Scale) -> list[_Array] | None:
         """Frequencies of every term; None if one of them is not periodic."""
@@ -173,20 +168,6 @@ class SumDrive(Timed):
             sum(drive.peak_acceleration(own, scale) for _, drive, own in self.each_term(columns))
         )
 
-    @classmethod
-    def motion(cls, drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """Displacement from the start (m) and velocity (m/s)."""
-        moved, speed = 0.0, 0.0
-        for i, kind in enumerate(cls.terms, 1):
-            at = argument / drive.omega * getattr(drive, f"t{i}_omega") + getattr(drive, f"t{i}_phase")
-            numbers = kind.numbers_type()(*(getattr(drive, f"t{i}_{name}") for name in kind.number_names))
-            if kind.harmonic:
-                w = numbers.amplitude * math.sin(at), numbers.amplitude * numbers.omega * math.cos(at)
-            else:
-                w = kind.motion(numbers, memory, at)  # type: ignore[attr-defined]
-            moved, speed = moved + w[0] - getattr(drive, f"t{i}_start"), speed + w[1]
-        return moved, speed
-
 
 def _names(kind: type[Drive]) -> list[str]:
     return [item.name for item in dataclasses.fields(kind)]  # type: ignore[arg-type]
@@ -217,7 +198,6 @@ def mixture(kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
 
 def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
     fields: list[tuple[str, Any, Any]] = []
-    numbers = ["omega", "fastest"]
     for i, kind in enumerate(kinds, 1):
         for item in dataclasses.fields(kind):  # type: ignore[arg-type]
             own = item.metadata["quantity"]
@@ -226,16 +206,11 @@ def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
             )
             made = dataclasses.field(default=item.default, metadata={"quantity": more})
             fields.append((f"{item.name}_{i}", item.type, made))
-        numbers += [f"t{i}_{each}" for each in (*kind.number_names, "phase", "start")]
     body = {
         "__module__": __name__,
         "__qualname__": name,
         "__doc__": f"The sum of {', '.join(kind.name for kind in kinds)}.",
         "terms": kinds,
-        "number_names": tuple(numbers),
-        "amplitudes": tuple(
-            f"t{i}_{each}" for i, kind in enumerate(kinds, 1) for each in (*kind.amplitudes, "start")
-        ),
     }
     found: Any = dataclasses.make_dataclass(
         name, fields, bases=(SumDrive,), namespace=body, frozen=True, kw_only=True

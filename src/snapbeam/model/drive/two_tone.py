@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed, sincos
+from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.drive.components import Component, Tone
 from snapbeam.model.quantity import RUN, quantity
 
@@ -63,16 +62,6 @@ class TwoTone(Timed):
     )
 
     name = "two_tone"
-    number_names = (
-        "omega",
-        "fastest",
-        "rate",
-        "amplitude",
-        "second_rate",
-        "second_amplitude",
-        "second_phase",
-    )
-    amplitudes = ("amplitude", "second_amplitude")
 
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """Two tones; the second begins at zero."""
@@ -110,28 +99,15 @@ class TwoTone(Timed):
         a, b = found["amplitude"], found["second_amplitude"]
         return a + b * (1.0 - np.sin(found["second_phase"])), a * found["rate"] + b * found["second_rate"]
 
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Both at their depths at once."""
+        found = self.shape_numbers(columns, scale)
+        return np.asarray(
+            found["amplitude"] + found["second_amplitude"] * (1.0 + np.sin(found["second_phase"]))
+        )
+
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Both at their hardest at once."""
         found = self.shape_numbers(columns, scale)
         first = found["amplitude"] * found["rate"] ** 2
         return np.asarray(first + found["second_amplitude"] * found["second_rate"] ** 2)
-
-    @staticmethod
-    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """The sum, and its derivative."""
-        t = argument / drive.omega
-        one, two = drive.rate * t, drive.second_rate * t + drive.second_phase
-        a, b = drive.amplitude, drive.second_amplitude
-        (sine, cosine), (second_sine, second_cosine) = sincos(one), sincos(two)
-        start, _ = sincos(drive.second_phase)
-        moved = a * sine + b * (second_sine - start)
-        return moved, a * drive.rate * cosine + b * drive.second_rate * second_cosine
-
-    @staticmethod
-    def acceleration(drive: Any, memory: Any, argument: float) -> float:
-        """The second derivative."""
-        t = argument / drive.omega
-        one, two = drive.rate * t, drive.second_rate * t + drive.second_phase
-        (sine, _), (second_sine, _) = sincos(one), sincos(two)
-        first = drive.amplitude * drive.rate * drive.rate * sine
-        return -first - drive.second_amplitude * drive.second_rate * drive.second_rate * second_sine
