@@ -7,13 +7,14 @@ import time
 from pathlib import Path
 from typing import Any
 
+from snapbeam.solver.splitting import COMPOSITIONS
+
 from benchmarks.cases import Case
 from benchmarks.charts import scaling_chart
 from benchmarks.ensemble import ensemble_of, sample
 from benchmarks.report import save, table
 from benchmarks.timing import measure
 from snapbeam.solver import native
-from snapbeam.solver.splitting import COMPOSITIONS
 
 __all__ = ["run"]
 
