@@ -22,7 +22,7 @@ from snapbeam.model.contact.base import LAWS
 from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.quantity import quantities
 
-__all__ = ["Composition", "Features", "composed", "features_of", "native_features"]
+__all__ = ["Composition", "Features", "composed", "features_of"]
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
@@ -36,14 +36,10 @@ BASES = (
 )  # fmt: skip
 FORCES = ("harmonic_force", "constant_force", "recorded_force")
 LOADS = ("sine", "ramp")
-CIRCUITS = ("piezo", "coil", "coil with inductance")
-NATIVE_CIRCUITS = (*CIRCUITS, "any piezo", "any coil")
-"""Those of any time constant, and of stronger couplings, too."""
-SAME = 4
-"""Seeds that have the same parts and other numbers."""
+CIRCUITS = ("piezo", "coil", "coil with inductance", "any piezo", "any coil")
+"""Of any time constant, and of stronger couplings, too."""
 SEPARATE = frozenset(name for name, law in LAWS.items() if law.impulsive or law.memory)
 """Laws with solutions of their own: Newton's (``test_surrounded_bounces``) and those with a memory."""
-"""Laws without a force, which the reference does not contain."""
 KNOWN_FORCES = ("local_spring", "rotation", "magnetic_force", "electrostatic_force", "quadratic_damping")
 ATTRACTIVE = ("electrostatic_force", "attracting_magnet", "softening_spring")
 """Local forces with a negative potential energy."""
@@ -99,8 +95,8 @@ def local_forces() -> list[str]:
 
 
 def features_of(seed: int) -> Features:
-    """The parts that a seed draws, the same for a few seeds."""
-    rng = np.random.default_rng([seed // SAME, 0])
+    """The parts that a seed draws."""
+    rng = np.random.default_rng([seed, 0])
 
     def some(names: Any, *weights: float) -> tuple[str, ...]:
         count = int(rng.choice(len(weights), p=np.array(weights) / sum(weights)))
@@ -125,7 +121,7 @@ def features_of(seed: int) -> Features:
         uneven=bool(rng.random() < 0.35),
         started=not contacts or bool(rng.random() < 0.2),
     )
-    if seed // SAME % 2 == 1:
+    if seed % 2 == 1:
         # a circuit and a negative energy together, in every second system
         attractive, tapped = str(rng.choice(ATTRACTIVE)), features.circuits or (str(rng.choice(CIRCUITS)),)
         features = dataclasses.replace(features, local=(*features.local, attractive), circuits=tapped)
@@ -133,40 +129,6 @@ def features_of(seed: int) -> Features:
     if not (moves or features.started):
         return dataclasses.replace(features, started=True)
     return features
-
-
-NATIVE_LAWS = ("hertz", "power", "layer", "hunt_crossley", "kelvin_voigt")
-NATIVE_LOCAL = (*KNOWN_FORCES, "coulomb_friction")
-
-
-def native_features(seed: int) -> Features:
-    """The parts that a seed draws of those that the native core has; nothing is compiled, so that no seeds share them."""
-    rng = np.random.default_rng([seed, 77])
-
-    def some(names: Any, *weights: float) -> tuple[str, ...]:
-        count = int(rng.choice(len(weights), p=np.array(weights) / sum(weights)))
-        return tuple(str(name) for name in rng.choice(list(names), count))
-
-    modes = int(rng.integers(1, 7)) if rng.random() < 0.9 else int(rng.choice([8, 12, 20, 32]))
-    count = int(rng.choice(5, p=[0.1, 0.4, 0.25, 0.15, 0.1]))
-    contacts = tuple(
-        (str(rng.choice(NATIVE_LAWS)), str(rng.choice(DRIVES)), bool(rng.random() < 0.15))
-        for _ in range(count)
-    )
-    moves = any(drive != "fixed" for _, drive, _ in contacts)
-    base = str(rng.choice(BASES)) if rng.random() < 0.35 else None
-    return Features(
-        modes=modes,
-        contacts=contacts,
-        base=base,
-        carried=bool(rng.random() < 0.7) or base in ("chirp", "shock", "recorded_acceleration"),
-        external=some(FORCES, 0.6, 0.3, 0.1),
-        local=some(NATIVE_LOCAL, 0.5, 0.25, 0.15, 0.1),
-        load=str(rng.choice(LOADS)) if rng.random() < 0.25 else None,
-        uneven=bool(rng.random() < 0.3),
-        started=bool(rng.random() < 0.2) or not moves,
-        circuits=some(NATIVE_CIRCUITS, 0.6, 0.28, 0.12),
-    )
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from composition_reference import Singular, Solution
-from generator import Composition, Features, composed, features_of
+from generator import BASES, DRIVES, FORCES, LOADS, Composition, Features, composed, features_of
 from numpy.typing import NDArray
 
 import snapbeam as sb
@@ -30,10 +30,6 @@ PHYSICAL = {
     "kink of a chirp": r"striker_on_base = False with a chirp",
 }
 """Refusals with a physical reason, or for data that are missing."""
-NOT_YET = {
-    "Newton's law": r"sticking under Newton's law",
-}
-"""Refusals by limits of the solver, which are to go."""
 QUICK = (
     Features(2, (("hertz", "sine", False),), base="acceleration_sine", local=("local_spring",), uneven=True),
     Features(
@@ -86,7 +82,7 @@ class Report:
 
 def reason(error: InputError) -> str:
     """The name of a refusal; raises what is not in the lists."""
-    for name, words in (*PHYSICAL.items(), *NOT_YET.items()):
+    for name, words in PHYSICAL.items():
         if re.search(words, str(error)):
             return name
     raise error
@@ -303,10 +299,39 @@ def points(composition: Composition, how: sb.Integration, run: sb.Run) -> list[s
     return found
 
 
+MOTIONS = [
+    *(
+        Features(
+            2,
+            (("hertz", drive, False),),
+            base="acceleration_sine" if drive == "recorded_motion" else None,
+            started=drive == "fixed",
+        )
+        for drive in sorted(set(DRIVES))
+    ),
+    *(Features(2, (("hertz", "fixed", False),), base=base) for base in BASES),
+    *(Features(2, external=(force,), started=True) for force in FORCES),
+    *(Features(2, load=load, started=True) for load in LOADS),
+]
+
+
 @pytest.mark.parametrize(
-    "kind",
-    [pytest.param(kind, marks=[pytest.mark.slow] if kind != 2 else []) for kind in range(len(QUICK))],
+    "features",
+    MOTIONS,
+    ids=lambda each: str(each.contacts[:1] or each.external or each.load)[:40] + str(each.base or ""),
 )
+def test_every_motion(features: Features) -> None:
+    judge([checked(5, features, ("reference", "standard"))])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_random_system(seed: int) -> None:
+    """Any parts with any numbers, at both levels."""
+    judge([checked(seed, levels=("reference", "standard"))])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", range(len(QUICK)))
 def test_twenty_systems_of_the_same_parts(kind: int) -> None:
     """The numbers of twenty seeds."""
     judge([checked(seed, QUICK[kind]) for seed in range(20)])
