@@ -1,6 +1,6 @@
 """Background jobs of a page: newest first, cancelled by a new request.
 
-Kernels let go of Python's lock, so that threads are enough.  A job hears that it is cancelled where it reports its
+The native core lets go of Python's lock, so that threads are enough.  A job hears that it is cancelled where it reports its
 progress; a window's next batch waits while a run, which a person waits for, is computed.
 """
 

@@ -33,7 +33,7 @@ class LocalForce:
     """A law of a force that acts on one point: derive a frozen dataclass from it, with the law's constants as fields.
 
     The law depends on the displacement u of the point from the straight beam, or on its rotation, and on the
-    rate v of that.  Its physics are scalar functions, which the solver compiles into the time step.  ``law``
+    rate v of that.  Its physics are scalar functions, which the solver calls in the time step.  ``law``
     contains the constants, by the names of the fields:
 
     - ``force(law, displacement)``: conservative force on the beam, N, or moment, N m; positive in the direction of u;

@@ -1,1 +1,1 @@
-"""The solver: step, events, statistics and the layouts that compile them."""
+"""The solver: from a system to the arrays of the native core, the core, and the equations in Python."""
