@@ -1,9 +1,9 @@
 """Recorded statistics of random runs of every system, with tolerances from the conditioning of each run.
 
 A change of the solver may change last digits, which an impacting beam multiplies.  Each run is therefore recorded at level
-reference with three neighbours: the same at level standard, and two whose drive differs by a relative 1e-9.  A number may differ
-from the record by a multiple of what these differ by; a run in which they differ by more than a hundredth is left out.  After an
-intended change of numbers::
+reference with four neighbours: the same at level standard and with half the steps, and two whose drive differs by a relative 1e-9.
+A number may differ from the record by a multiple of what these differ by; a run in which they differ by more than a hundredth is
+left out.  After an intended change of numbers::
 
     python tests/conformance/reference_corpus.py
 """
@@ -45,12 +45,12 @@ class Case(NamedTuple):
     modes: int
     seed: int
 
-    def statistics(self, accuracy: str, change: float = 0.0) -> _Table:
+    def statistics(self, accuracy: str, change: float = 0.0, step_factor: float = 1.0) -> _Table:
         """Statistics of the runs by name, arrays of shape (runs,)."""
         system = self.entry.system(self.modes)
         points = self.entry.points(RUNS, self.seed)
         how = sb.Integration(cycles=min(CYCLES, self.entry.cycles), accuracy=accuracy)
-        ensemble = make_ensemble(system, how, points)
+        ensemble = make_ensemble(system, how, points, step_factor=step_factor)
         if change:
             ensemble = _perturbed(ensemble, system, change)
         found = statistics_of(ensemble, run_ensemble(ensemble, 1))
@@ -72,6 +72,7 @@ def record(case: Case) -> dict[str, NDArray[np.float64]]:
     """Values and allowed differences of a case, arrays of shape (statistics, runs)."""
     value, standard = case.statistics("reference"), case.statistics("standard")
     beside = [case.statistics("reference", sign * NEIGHBOUR) for sign in (1.0, -1.0)]
+    beside.append(case.statistics("reference", step_factor=0.5))
     found: dict[str, list[NDArray[np.float64]]] = {"values": [], "reference": [], "standard": []}
     for name, own in value.items():
         scale = max(float(np.nanmax(np.abs(own), initial=0.0)), 1e-300)

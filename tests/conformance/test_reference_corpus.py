@@ -23,8 +23,8 @@ def test_a_difference_is_named() -> None:
     number, case = CASES[0]
 
     class Off(rc.Case):
-        def statistics(self, accuracy: str, change: float = 0.0) -> dict[str, np.ndarray]:
-            found = super().statistics(accuracy, change)
+        def statistics(self, accuracy: str, *more: float, **named: float) -> dict[str, np.ndarray]:
+            found = super().statistics(accuracy, *more, **named)
             return found | {"peak_force": found["peak_force"] * (1.0 + 1e-4)}
 
     lines, _ = rc.differences(Off(*case), number, "reference")

@@ -1,8 +1,9 @@
 // The controller, once for every layout: propose a step, take it, inspect it, accept it or take a shorter one.
 //
-// In free flight a step is the flight step, halved where the beam is stretched far beyond its wells, and a contact step where its energy
-// is beyond what the flight step was tried with.  In contact, steps grow from the onset and shrink towards the release.  By a force of
-// stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN; towards the end of the range of a law a step covers NEARER of the way.
+// In free flight a step is the flight step, halved where the beam is stretched far beyond its wells, or once for every factor of
+// four by which the energy of the beam alone exceeds what the flight step was tried with.  In contact, steps grow from the onset
+// and shrink towards the release.  By a force of stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN; towards the end of
+// the range of a law a step covers NEARER of the way.
 //
 // A step inside which a contact closes or opens, or a lossy contact begins or ceases to press, is cut to end there.  The cut is
 // corrected on the true motion, up to CORRECTIONS times: a zero of the gap to a tick, one of the force to 1e-9 of a flight step.  If
@@ -220,8 +221,9 @@ template <class L> struct Group {
         advance_jump(l);
         // flows of the steps of every length
         const int n = s->cells, distinct = s->composition.distinct;
+        double length = of_run(i, STEP), next = shorter_than_flight(length, of_run(i, CONTACT_STEP));
         for (int level = 0; level < problem->levels; ++level) {
-            const double h = (level ? of_run(i, CONTACT_STEP) / double(1l << (level - 1)) : of_run(i, STEP)) * of_run(i, TICK);
+            const double h = length * of_run(i, TICK);
             for (int f = 0; f < distinct; ++f)
                 for (int m = 0; m < n; ++m) {
                     Plain *to = tables + ((long(level) * distinct + f) * n + m) * 4;
@@ -231,6 +233,8 @@ template <class L> struct Group {
                         if constexpr (L::runs > 1) set_lane(to[x], l, a[x]);
                         else to[x] = a[x];
                 }
+            const double after = shorter(next, of_run(i, CONTACT_STEP));
+            length = next, next = after;
         }
         return true;
     }
@@ -299,8 +303,8 @@ template <class L> struct Group {
                 if (closed) set_lane(c.deepest, l, depth > 0.0 ? depth : 0.0);
             }
         }
-        assign(which, energy, totals.energy(z, true));
-        if (!continued) totals.start(z, which, energy);
+        assign(which, energy, totals.energy(z, true, true));
+        if (!continued) totals.start(z, which, totals.energy(z, true));
         const bool saved = batch->recorder && batch->recorder->marks[4];
         for (int j = 0; j < z.channels; ++j) {  // in touch and closing
             Channel<L> &c = z.channel[j];
@@ -319,6 +323,12 @@ template <class L> struct Group {
     }
 
     // --- propose --------------------------------------------------------------------------------------------------------
+    // Lengths of steps: halves of the flight step down to the contact step (of order 6 none between them), then halves of that.
+    template <class T> SNAPBEAM_FN T shorter_than_flight(T flight, T contact) const { return problem->composition ? contact : max(T(0.5) * flight, contact); }
+    template <class T> SNAPBEAM_FN static T shorter(T length, T contact) {
+        const T half = T(0.5) * length;
+        return select(length > contact, max(half, contact), half);
+    }
     SNAPBEAM_FN void propose() {
         const Marks fresh = alive & (!again);
         const int n = s->size();
@@ -343,7 +353,13 @@ template <class L> struct Group {
             want = select(far, Real(0.5) * want, want), reach += reach;
             far = far & (abs(stretch) > reach);
         }
-        want = select(energy > calm, min(want, contact_step), want);
+        Real most = calm, by_energy = step;
+        Marks strong = energy > most;
+        for (int i = 0; i < problem->levels && any(strong); ++i) {
+            by_energy = select(strong, Real(0.5) * by_energy, by_energy), most = Real(4.0) * most;
+            strong = strong & (energy > most);
+        }
+        want = min(want, by_energy);
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
             if (c.timed || c.circuit || (c.contact && !any(c.closed))) continue;
@@ -361,11 +377,12 @@ template <class L> struct Group {
             own = select(r < Real(0.0), min(own, Real(-RELEASE) * max(d, Real(0.0)) / (r * z.tick)), own);
             want = select(c.closed, min(want, own), want);
         }
-        Real level = Real(0.0), length = step, next = contact_step;
+        Real level = Real(0.0), length = step, next = shorter_than_flight(step, contact_step);
         for (int i = 0; i < problem->levels - 1; ++i) {
             const Marks more = ((length > want) | half_resolved(length)) & (level <= halvings);
             if (!any(more)) break;
-            length = select(more, next, length), next = select(more, Real(0.5) * next, next), level += select(more, Real(1.0), Real(0.0));
+            const Real after = shorter(next, contact_step);
+            length = select(more, next, length), next = select(more, after, next), level += select(more, Real(1.0), Real(0.0));
         }
         limit = min(limit_of_outputs(), end);
         landing = fresh & (z.t + length >= min(limit, jump));
@@ -718,7 +735,7 @@ template <class L> struct Group {
                 if (c.contact) assign(jumped, c.r0, signal_slope(z, c) - dot<L>(c.row, z.p, n)), assign(jumped, c.safe, z.t);
             }
         if (any(changed)) {
-            assign(changed, energy, totals.energy(z, true));
+            assign(changed, energy, totals.energy(z, true, true));
             for (int j = 0; j < z.channels; ++j) assign(changed, z.channel[j].safe, z.t);
         }
         totals.add_modes(z, ok, value(z.h));

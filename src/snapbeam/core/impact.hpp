@@ -97,7 +97,7 @@ template <class L> void jumped_velocity(Group<L> &runs, typename L::Marks which)
     assign(which, totals.point.v, dot<L>(totals.row, z.p, n)), assign(which, totals.center.v, dot<L>(z.s->center, z.p, n));
     assign(which, totals.sum[PEAK_VELOCITY], max(totals.sum[PEAK_VELOCITY], Real(abs(value(totals.point.v)))));
     assign(which, totals.sum[PEAK_CENTER_VELOCITY], max(totals.sum[PEAK_CENTER_VELOCITY], Real(abs(value(totals.center.v)))));
-    assign(which, runs.energy, totals.energy(z, true));
+    assign(which, runs.energy, totals.energy(z, true, true));
     totals.enter_well(z, which);
 }
 

@@ -6,6 +6,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -209,7 +210,10 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
         if (!(run[WELL_SIGN] == 1.0 || run[WELL_SIGN] == -1.0)) a.refuse("run", "must begin about one of the wells");
         if (!(run[HALVINGS] >= 0.0 && run[HALVINGS] <= p.levels - 2)) a.refuse("run", "must have 0 <= halvings <= levels - 2");
         if (!(run[CONTACT_STEP] >= 1.0 && run[CONTACT_STEP] <= run[STEP])) a.refuse("run", "must have contact steps of 1 tick to a flight step");
-        if (std::fmod(run[CONTACT_STEP], std::ldexp(1.0, int(run[HALVINGS]))) != 0.0) a.refuse("run", "must have contact steps that halve to whole ticks");
+        int halves = 1;  // of the flight step, down to the contact step
+        for (double length = 0.5 * run[STEP]; length > run[CONTACT_STEP] && !p.composition; ++halves) length *= 0.5;
+        const double of_flight = std::ldexp(1.0, halves - 1), of_contact = std::ldexp(1.0, int(run[HALVINGS]) + 1 - halves);
+        if (halves > run[HALVINGS] + 1.0 || std::fmod(run[STEP], of_flight) != 0.0 || std::fmod(run[CONTACT_STEP], of_contact) != 0.0) a.refuse("run", "must have steps that halve to whole ticks");
         if (!(run[MAX_STEPS] >= 1.0)) a.refuse("run", "must be allowed a step");
         if (!(run[STRETCH] >= 0.0)) a.refuse("run", "must not have a negative stretch");
         if (!(run[CALM_ENERGY] >= 0.0)) a.refuse("run", "must not have a negative energy of calm motion");

@@ -94,13 +94,13 @@ template <class L> struct Totals {
         enter_well(z, which);
     }
 
-    // Energy of the state q, p; of the beam with local forces, and of what contacts store.
-    Real energy(Runs<L> &z, bool contacts) {
+    // Energy of the state q, p; with what contacts store, or of the beam alone, without its strikers and local forces.
+    Real energy(Runs<L> &z, bool contacts, bool beam = false) {
         const int n = s->size();
         Cell sum_of = Cell(0.0);
         for (int i = 0; i < n; ++i) {
-            const Cell oq = s->omega[i] * z.q[i];
-            sum_of = fma(z.p[i], z.p[i], fma(oq, oq, sum_of));
+            const Cell own = Cell(beam ? s->beam[i] : typename L::Coef(1.0)), oq = s->omega[i] * z.q[i];
+            sum_of = fma(own * z.p[i], z.p[i], fma(own * oq, oq, sum_of));
         }
         const Number gq = z.gq, qr = z.qr, along_g = z.along_g, along_r = z.along_r;
         tension(z, z.q, dot_cells<L>(s->g, z.q, n));
@@ -108,7 +108,7 @@ template <class L> struct Totals {
         z.gq = gq, z.qr = qr, z.along_g = along_g, z.along_r = along_r;
         const Number there = Number(Real(0.5) * (Real(1.0) - z.sign));
         if (s->problem->far_force) all += there * (Number(s->problem->lift) - dot<L>(s->far_force, z.q, n));
-        for (int j = 0; j < z.channels; ++j) {
+        for (int j = 0; j < z.channels && !beam; ++j) {
             const Channel<L> &c = z.channel[j];
             if (c.timed || (c.contact && !contacts)) continue;
             const Number x = c.contact ? max(c.d0, Number(0.0)) : along(z, c, z.q);

@@ -146,7 +146,6 @@ class _Arrays:
             "center": row(structure.center),
             "center_rest": float(structure.center_rest),
             "dividing_height": float(structure.dividing_height),
-            "levels": int(halvings.max()) + 2,
             "fewest_parts": fewest,
             "parts_per_decay": per_decay,
             "update": np.array([each.address for each in self.updates], np.int64),
@@ -169,7 +168,11 @@ class _Arrays:
         least = 2.0**halvings
         contact = np.minimum(table["contact_step"] / (table["tick"] / finer), run[:, RUN.index("step")])
         run[:, RUN.index("contact_step")] = least * np.maximum(np.floor(contact / least), 1.0)
+        between = np.ceil(np.log2(run[:, RUN.index("step")] / run[:, RUN.index("contact_step")]) - 1e-9) - 1.0
+        if ensemble.order == 4:  # halves of the flight step that are longer than the contact step
+            halvings = halvings + np.maximum(between, 0.0)
         run[:, RUN.index("halvings")] = halvings
+        self.problem["levels"] = int(halvings.max()) + 2
         run[:, RUN.index("max_steps")] = ensemble.max_steps
         run[:, RUN.index("stretch")] = structure.stretch
         run[:, RUN.index("calm_energy")] = TRIED * barrier_of(structure) or math.inf
