@@ -205,11 +205,13 @@ def is_ours(path: str | os.PathLike[str], begin: str = "") -> bool:
 
 
 def _attribute(path: Path, name: str) -> object:
-    """An attribute of the root of a NetCDF file; None if it has none."""
-    import h5py
+    """An attribute of the root of a NetCDF file; None if it has none that can be read."""
+    from snapbeam.util.hdf5 import open_hdf5
 
-    with h5py.File(path, "r") as file:
-        return file.attrs.get(name)
+    with suppress(Exception):  # of damaged bytes the library makes errors of every kind
+        with open_hdf5(path, in_parts=True) as file:
+            return file.attrs.get(name)
+    return None
 
 
 def check_writable(
