@@ -28,6 +28,7 @@ from snapbeam._version import __version__
 from snapbeam.cli.short_help import wants_all
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
+from snapbeam.util.memory_limit import limit, not_sufficient, sufficient
 from snapbeam.util.packages import extra_of, needs
 from snapbeam.util.validation import InputError, printable, text
 from snapbeam.util.work_rate import WorkRate
@@ -222,13 +223,15 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
             errors().print(f"[bold red]error:[/] {escape(printable(_folder_gone() or str(error)))}")
             raise typer.Exit(FAILED) from None
         except MemoryError as error:
-            said = f" ({error})" if str(error) else ""
-            errors().print(f"[bold red]error:[/] the memory is not sufficient{escape(printable(said))}")
+            errors().print(f"[bold red]error:[/] {escape(not_sufficient(printable(str(error))))}")
             raise typer.Exit(FAILED) from None
         except RuntimeError as error:
             if "start new thread" not in str(error):
                 raise
-            errors().print("[bold red]error:[/] the system starts no further threads; end other programs")
+            words = "the system starts no further threads; end other programs"
+            if limit() < sufficient():
+                words = not_sufficient("no further threads")
+            errors().print(f"[bold red]error:[/] {escape(words)}")
             raise typer.Exit(FAILED) from None
         except KeyboardInterrupt:
             errors().print(WORDS)

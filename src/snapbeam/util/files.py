@@ -17,6 +17,7 @@ from importlib import import_module
 from pathlib import Path
 
 from snapbeam._version import __version__
+from snapbeam.util.memory_limit import limit
 from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError, file_path
 
@@ -262,6 +263,8 @@ def check_writable(
         module, extra = _NEEDED[target.suffix.lower()]
         with needing(f"{name} = {str(path)!r}: a file {target.suffix}", extra):
             import_module(module)
+    if target.suffix.lower() == ".nc" and limit() < float("inf"):
+        import_module("h5netcdf")  # whose libraries must fit the memory before the work, too
     try:
         with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{target.stem[:40]}.") as tried:
             tried.write(bytes(_TRIED))  # a full disk still makes empty files
