@@ -42,6 +42,43 @@ def test_a_descent_from_nowhere_ends(bad):
                 ask(np.array([0.0, bad]))
 
 
+POTENTIALS = [sb.System(MODEL).potential, SYSTEM.potential]
+
+
+@pytest.mark.parametrize("potential", POTENTIALS, ids=["beam", "magnet"])
+def test_forces_and_energies_of_amplitudes(potential):
+    here = np.array([1e-5, -2e-5])
+    for name in ("energy", "gradient", "terms", "tangent", "holds", "descent", "settles"):
+        ask = getattr(potential, name)
+        for bad in BAD:
+            for given in ([bad, 0.0], [[0.0, 0.0], [0.0, bad]]):
+                with pytest.raises(sb.InputError, match=r"alpha\[.*must be finite"):
+                    ask(given)
+        for wrong in (0.1, [], [0.1], np.zeros(3), np.zeros((2, 3))):
+            with pytest.raises(sb.InputError, match=r"alpha of shape .*2 modes"):
+                ask(wrong)
+        with pytest.raises(sb.InputTypeError, match="alpha"):
+            ask("ab")
+    for name in ("energy", "gradient", "terms", "tangent"):
+        with pytest.raises(sb.InputError, match="alpha = .* not finite"):
+            getattr(potential, name)([1e200, 0.0])
+        several = getattr(potential, name)([here, here])
+        one = getattr(potential, name)(list(here))
+        assert np.isfinite(one).all()
+        np.testing.assert_allclose(np.moveaxis(several, 1 if name == "terms" else 0, 0)[1], one, rtol=1e-12)
+
+
+def test_a_matrix_in_modes():
+    potential = SYSTEM.potential
+    for bad in BAD:
+        with pytest.raises(sb.InputError, match=r"matrix\[1, 0\].*must be finite"):
+            potential.in_modes([[1.0, 0.0], [bad, 1.0]])
+    for wrong in (1.0, [1.0, 2.0], np.eye(3), np.zeros((2, 2, 3))):
+        with pytest.raises(sb.InputError, match=r"matrix of shape .*2 rows"):
+            potential.in_modes(wrong)
+    np.testing.assert_allclose(potential.in_modes(MODEL.mass), np.eye(2), atol=1e-12)
+
+
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 @pytest.mark.parametrize("bad", BAD)
 def test_mass_and_velocity_of_an_impact(law, bad):
