@@ -9,7 +9,7 @@ import os
 import platform
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -35,6 +35,7 @@ __all__ = [
     "refuse_foreign",
     "request_hash",
     "require_room",
+    "require_room_of",
     "set_request",
 ]
 
@@ -303,8 +304,25 @@ def require_room(path: str | os.PathLike[str], size: float, name: str = "output"
     ------
     InputError
     """
-    if words := missing_room(path, size, name):
-        raise InputError(f"{words}: make room or name a file on another disk")
+    require_room_of({name: (path, size)})
+
+
+def require_room_of(outputs: Mapping[str, tuple[str | os.PathLike[str], float]]) -> None:
+    """Refuse outputs, paths and least sizes in bytes by name, for which together a disk has no room.
+
+    Raises
+    ------
+    InputError
+    """
+    disks: dict[int, list[str]] = {}
+    for name, (path, _) in outputs.items():
+        folder = Path(path).absolute().parent
+        disks.setdefault(folder.stat().st_dev if folder.is_dir() else 0, []).append(name)
+    for names in disks.values():
+        size = sum(outputs[name][1] for name in names)
+        if words := missing_room(outputs[names[-1]][0], size, names[-1]):
+            others = f" with {', '.join(names[:-1])} on the same disk" if names[1:] else ""
+            raise InputError(f"{words}{others}: make room or name a file on another disk")
 
 
 class NoRoomError(OSError):
