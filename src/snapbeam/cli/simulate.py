@@ -100,8 +100,8 @@ def simulate(
         from snapbeam.plot.animation import ANIMATION_SUFFIXES
 
         check_writable(animate, "animate", ANIMATION_SUFFIXES)
-    named = {"plot": plot, "animate": animate}
-    pictures = {name: (path, least_picture_size(path)) for name, path in named.items() if path is not None}
+    drawn = {"plot": plot, "animate": animate}
+    pictures = {name: (path, least_picture_size(path)) for name, path in drawn.items() if path is not None}
     require_room_of(pictures)
     part = opt.parse_window(window)
 
