@@ -148,3 +148,31 @@ def test_loss_of_slow_and_lossy_impacts():
     assert law.speed_for(1e-300) > law.speed_for(1e-3)
     with pytest.raises(sb.InputError, match="restitution"):
         law.speed_for(5e-324)
+
+
+HARVESTERS = [
+    sb.PiezoelectricHarvester(moment_per_volt=1e-5, capacitance=1e-9, resistance=1e5),
+    sb.ElectromagneticHarvester(force_factor=0.1, resistance=10.0, inductance=1e-3, coil_resistance=2.0),
+]
+
+
+@pytest.mark.parametrize("harvester", HARVESTERS, ids=lambda each: each.name)
+@pytest.mark.parametrize("name", ["loss", "share", "volts"])
+def test_load_resistances(harvester, name):
+    ask = getattr(harvester, name)
+    for bad in BAD:
+        with pytest.raises(sb.InputError, match=r"resistance\[1\] = .*must be finite"):
+            ask([10.0, bad])
+    for bad in (0.0, -3.0, [], [5.0, -1.0]):
+        with pytest.raises(sb.InputError, match=r"resistance = .* greater than 0 ohm"):
+            ask(bad)
+    for bad in ("ab", None, 1j):
+        with pytest.raises(sb.InputTypeError, match="resistance"):
+            ask(bad)
+    assert ask([10.0, 20.0, 30.0]).shape == (3,)
+    assert float(ask(10.0)) == ask([20.0, 10.0])[1]
+
+
+def test_resistances_whose_inverse_overflows_are_refused():
+    with pytest.raises(sb.InputError, match="loss is not finite"):
+        HARVESTERS[0].loss(5e-324)
