@@ -146,8 +146,9 @@ def works_without(part: str, copy: Path) -> None:
         assert not re.search(rf"^\W*{command} ", shown, re.MULTILINE), command
 
 
-def test_works_without_a_part(tmp_path: Path) -> None:
-    works_without("lab", without("lab", tmp_path))
+@pytest.mark.parametrize("part", PARTS)
+def test_works_without_a_part(tmp_path: Path, part: str) -> None:
+    works_without(part, without(part, tmp_path))
 
 
 @pytest.mark.slow

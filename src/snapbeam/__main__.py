@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import sys
 
-from snapbeam.util import interrupts
+from snapbeam.util import interrupts, memory_limit
 
 
 def main() -> None:
@@ -14,13 +14,18 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     interrupts.install()  # before the imports of the program, which take seconds
-    from snapbeam.cli.app import main as run
-
+    memory_limit.refuse_libraries_without_room()
     try:
+        from snapbeam.cli.app import main as run
+
         run()
     except SystemExit as ended:
         interrupts.end(ended.code)
         raise
+    except (MemoryError, ImportError) as error:  # of a limit of memory the loader makes an ImportError
+        if isinstance(error, ImportError) and memory_limit.limit() >= memory_limit.sufficient():
+            raise
+        sys.exit(f"error: {memory_limit.not_sufficient()}")
 
 
 if __name__ == "__main__":

@@ -170,3 +170,28 @@ def test_refusals() -> None:
         sb.dynamics.backbone_curve(lossy)
     with pytest.raises(InputError, match="must be System or ReducedModel"):
         sb.dynamics.backbone_curve(default_values.BEAM)
+
+
+@pytest.mark.parametrize("well", ["lower", "both"])
+def test_the_progress_is_of_all_work(well, monkeypatch):
+    """Every point is measured before the next is reported, so that nothing long follows the last report."""
+    from snapbeam.dynamics import backbone
+
+    happened = []
+    for name in ("half", "waveform"):
+        computed = getattr(backbone._Structure, name)
+
+        def noted(self, *arguments, name=name, computed=computed):
+            happened.append(name)
+            return computed(self, *arguments)
+
+        monkeypatch.setattr(backbone._Structure, name, noted)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
+    curve = sb.dynamics.backbone_curve(
+        model, well=well, max_points=9, progress=lambda done, total: happened.append((done, total))
+    )
+    told = [each for each in happened if isinstance(each, tuple)]
+    assert [total for _, total in told] == [9] * len(told)
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert curve.sizes["point"] - 2 <= told[-1][0] <= curve.sizes["point"]
+    assert happened[happened.index(told[-1]) :].count("waveform") <= 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 
 import h5py
@@ -11,6 +12,7 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
+from snapbeam.util.files import is_ours
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.netcdf import read_netcdf, read_result
 from snapbeam.util.validation import InputError
@@ -149,3 +151,61 @@ def test_results_with_groups_are_read(tmp_path):
     data = xr.Dataset({"gap": ("time", np.arange(3.0))})
     sb.write_netcdf({None: xr.Dataset(), "one": data, "two": data}, path)
     xr.testing.assert_equal(read_result(f"{path}:two"), data)
+
+
+def _with_texts(path, at_root):
+    """A file with texts of variable length; the place in it of the heap that holds them."""
+    with h5py.File(path, "w") as file:
+        file["time"] = np.arange(8.0)
+        deep = file.create_group("deep/er")
+        place = file if at_root else deep
+        place.attrs["laboratory"] = "Sherbrooke"
+        if not at_root:
+            file["time"].attrs["units"] = "seconds"
+            deep["names"] = ["one", "another"]
+    return path.read_bytes().index(b"GCOL")
+
+
+DAMAGE = {
+    "the first has no length": lambda heap: heap[:16] + bytes(16) + heap[32:],
+    "the free space has no length": lambda heap: re.sub(
+        rb"\0{8}[\0-\xff]{8}(\0*)\Z", rb"\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\1", heap
+    ),
+    "the sum of lengths overflows": lambda heap: heap[:24] + (2**64 - 16).to_bytes(8, "little") + heap[32:],
+    "longer than the heap": lambda heap: heap[:24] + (5000).to_bytes(8, "little") + heap[32:],
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("at_root", [True, False])
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_texts_whose_list_does_not_advance_are_refused(damage, at_root, reader, tmp_path):
+    """The HDF5 library follows such a list without end, and holds the interpreter's lock meanwhile."""
+    path = tmp_path / ("file.h5" if reader == "open_recording" else "file.nc")
+    begin = _with_texts(path, at_root)
+    whole = path.read_bytes()
+    spoiled = DAMAGE[damage](whole[begin : begin + 4096])
+    assert len(spoiled) == 4096 and spoiled != whole[begin : begin + 4096]
+    path.write_bytes(whole[:begin] + spoiled + whole[begin + 4096 :])
+    with pytest.raises(InputError, match=r"a stored text at byte .* has the impossible length"):
+        READERS[reader](path)
+
+
+def test_an_output_with_such_texts_is_not_ours(tmp_path):
+    path = tmp_path / "file.nc"
+    begin = _with_texts(path, True)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: begin + 16] + bytes(16) + whole[begin + 32 :])
+    assert not is_ours(path)
+
+
+def test_many_texts_are_read(tmp_path):
+    """Heaps that are full, removed texts, a user block before the file, and the name of a heap in a text."""
+    path = tmp_path / "texts.nc"
+    with h5py.File(path, "w", userblock_size=1024) as file:
+        file["names"] = [f"{'x' * (k % 50)}GCOL {k}" for k in range(3000)]
+        for number in range(200):
+            file.attrs["changed"] = "y" * number
+        file.attrs["empty"] = ""
+    with open_hdf5(path) as file:
+        assert file["names"].shape == (3000,) and len(file.attrs["changed"]) == 199

@@ -8,6 +8,7 @@ import io
 import json
 import math
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -28,6 +29,7 @@ from snapbeam._version import __version__
 from snapbeam.cli.short_help import wants_all
 from snapbeam.util.files import VERSION, foreign_files_kept
 from snapbeam.util.interrupts import WORDS, during_command
+from snapbeam.util.memory_limit import limit, not_sufficient, sufficient
 from snapbeam.util.packages import extra_of, needs
 from snapbeam.util.validation import InputError, printable, text
 from snapbeam.util.work_rate import WorkRate
@@ -222,13 +224,15 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
             errors().print(f"[bold red]error:[/] {escape(printable(_folder_gone() or str(error)))}")
             raise typer.Exit(FAILED) from None
         except MemoryError as error:
-            said = f" ({error})" if str(error) else ""
-            errors().print(f"[bold red]error:[/] the memory is not sufficient{escape(printable(said))}")
+            errors().print(f"[bold red]error:[/] {escape(not_sufficient(printable(str(error))))}")
             raise typer.Exit(FAILED) from None
         except RuntimeError as error:
             if "start new thread" not in str(error):
                 raise
-            errors().print("[bold red]error:[/] the system starts no further threads; end other programs")
+            words = "the system starts no further threads; end other programs"
+            if limit() < sufficient():
+                words = not_sufficient("no further threads")
+            errors().print(f"[bold red]error:[/] {escape(words)}")
             raise typer.Exit(FAILED) from None
         except KeyboardInterrupt:
             errors().print(WORDS)
@@ -399,13 +403,23 @@ def open_result(file: Path) -> xr.Dataset:
 
 def check_pictures(*pictures: tuple[str, Path | None]) -> None:
     """Raise an error, before any computation, if a figure file cannot be written."""
-    from snapbeam.util.files import check_writable
+    from snapbeam.util.files import check_writable, require_room
 
     for name, path in pictures:
         if path is not None:
             from snapbeam.plot.style import FIGURE_SUFFIXES
 
             check_writable(path, name, FIGURE_SUFFIXES)
+            require_room(path, least_picture_size(path), name)
+
+
+_LEAST_SIZES = {".png": 35e3, ".pdf": 10e3, ".svg": 8e3, ".gif": 300e3, ".mp4": 50e3}
+"""Half of the sizes of the smallest figures and animations of the commands, bytes."""
+
+
+def least_picture_size(path: Path) -> float:
+    """Size in bytes below which no figure or animation of a command is."""
+    return _LEAST_SIZES.get(path.suffix.lower(), 0.0)
 
 
 def read_overlay(
@@ -429,6 +443,51 @@ def write_map(dataset: xr.Dataset, path: Path) -> Path:
     return path
 
 
+@contextmanager
+def kept_if_not_drawn(
+    again: Callable[[str], str], kept: Path | None, save: Callable[[Path], object]
+) -> Iterator[None]:
+    """In the block, add to an error where the numbers are, and how to draw them again.
+
+    Parameters
+    ----------
+    again : callable
+        Function of their file that returns the command that draws them.
+    kept : path, optional
+        Their file.
+    save : callable
+        Function that writes them to a path, which is called if they are in no file yet.
+    """
+    try:
+        yield
+    except (OSError, MemoryError, InputError) as error:
+        there = kept if kept is not None else _rescued(save)
+        if there is None:
+            raise
+        words = not_sufficient() if isinstance(error, MemoryError) else str(error)
+        words = f"{words}.  The numbers are in {str(there)!r}"
+        if isinstance(error, InputError):  # would be refused again
+            raise InputError(words) from error
+        raise OSError(f"{words}; draw them with: {again(str(there))}") from error
+
+
+def _rescued(save: Callable[[Path], object]) -> Path | None:
+    """A temporary file with numbers that are in no other; None if it cannot be written."""
+    import tempfile
+
+    try:
+        handle, name = tempfile.mkstemp(prefix="snapbeam-", suffix=".nc")
+    except OSError:
+        return None
+    os.close(handle)
+    try:
+        save(Path(name))
+    except (OSError, MemoryError):
+        os.unlink(name)
+        return None
+    return Path(name)
+
+
 def draw(dataset: xr.Dataset, path: Path, variable: str | None = None, **options: Any) -> Path:
     """Draw a result of any kind to a figure file, as ``dataset.snapbeam.plot`` does."""
     import matplotlib
@@ -438,3 +497,30 @@ def draw(dataset: xr.Dataset, path: Path, variable: str | None = None, **options
     from snapbeam.plot.style import save_figure
 
     return save_figure(plot_dataset(dataset, variable, **options), path)
+
+
+def draw_computed(
+    dataset: xr.Dataset,
+    path: Path,
+    kept: Path | None,
+    variable: str | None = None,
+    *,
+    save: Callable[[Path], object] | None = None,
+    **options: Any,
+) -> Path:
+    """Draw a result that the command has computed, as :func:`draw`; errors as of :func:`kept_if_not_drawn`."""
+    save = functools.partial(write_map, dataset) if save is None else save
+    with kept_if_not_drawn(
+        lambda file: plot_command(file, path, variable, options.get("window")), kept, save
+    ):
+        return draw(dataset, path, variable, **options)
+
+
+def plot_command(
+    file: str, path: Path, variable: str | None = None, window: tuple[float, float] | None = None
+) -> str:
+    """The command that draws a result file."""
+    words = ["snapbeam", "plot", file, "-o", str(path)]
+    words += [] if variable is None else ["--variable", variable]
+    words += [] if window is None else ["--window", f"{window[0]:.12g}:{window[1]:.12g}"]
+    return shlex.join(words)

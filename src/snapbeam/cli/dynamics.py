@@ -132,7 +132,7 @@ def _plain(found: object) -> str:
 
 def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str]) -> None:
     """Write, draw and print the results."""
-    from snapbeam.cli.console import draw, write_map
+    from snapbeam.cli.console import draw_computed, write_map
     from snapbeam.cli.summary import initial_well_lines
 
     reason = dataset.attrs.get("termination_reason")
@@ -141,7 +141,7 @@ def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[st
     lines = [*initial_well_lines(dataset), *lines]
     files = [write_map(dataset, output)]
     if plot is not None:
-        files.append(draw(dataset, plot))
+        files.append(draw_computed(dataset, plot, output))
     small = {str(name): each.values for name, each in dataset.data_vars.items() if each.size <= _FEW}
     add_json(results=small, summary=lines, files=files)
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
@@ -280,7 +280,7 @@ def hysteresis(
     Example: snapbeam dynamics hysteresis --config harvester.toml --parameter base_excitation.frequency_ratio
     --values 0.2:1.4:25 --statistic harvested_power_last_quarter --plot power.png
     """
-    from snapbeam.cli.console import check_pictures, draw, write_map
+    from snapbeam.cli.console import check_pictures, draw_computed, write_map
     from snapbeam.cli.summary import initial_well_lines
     from snapbeam.dynamics.swept_statistics import hysteresis as swept
     from snapbeam.model.parameter_file import parsed_axis
@@ -305,7 +305,7 @@ def hysteresis(
     ]
     files = [write_map(dataset, output)]
     if plot is not None:
-        files.append(draw(dataset, plot, statistic))
+        files.append(draw_computed(dataset, plot, output, statistic))
     add_json(summary=lines, files=files)
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
     if failed:
@@ -338,7 +338,7 @@ def backbone_curve(
 
     Example: snapbeam dynamics backbone-curve --modes 3 --well both -o backbone.nc --plot backbone.png
     """
-    from snapbeam.cli.console import check_pictures, draw, write_map
+    from snapbeam.cli.console import check_pictures, draw_computed, write_map
     from snapbeam.dynamics.backbone import backbone_curve as curve_of
     from snapbeam.util.files import check_writable
 
@@ -358,7 +358,7 @@ def backbone_curve(
     ]
     files = [write_map(curve, output)]
     if plot is not None:
-        files.append(draw(curve, plot))
+        files.append(draw_computed(curve, plot, output))
     add_json(summary=lines, files=files)
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
 

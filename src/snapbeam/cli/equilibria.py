@@ -13,7 +13,7 @@ from snapbeam.cli.console import (
     add_json,
     check_pictures,
     cli_command,
-    draw,
+    draw_computed,
     file_line,
     out,
     progress,
@@ -307,4 +307,4 @@ def _write(dataset: Any, output: Path | None, plot: Path | None) -> None:
     if output is not None:
         out().print(f"Written: {file_line(write_map(dataset, output))}")
     if plot is not None:
-        out().print(f"Written: {file_line(draw(dataset, plot))}")
+        out().print(f"Written: {file_line(draw_computed(dataset, plot, output))}")

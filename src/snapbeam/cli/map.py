@@ -60,7 +60,7 @@ def compute_map(
     Example: snapbeam map --modes 32 --cycles 200 --frequency-ratio 0.1:4:64 --velocity-amplitude
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
     """
-    from snapbeam.cli.console import check_pictures, draw, read_overlay
+    from snapbeam.cli.console import check_pictures, draw_computed, read_overlay
     from snapbeam.cli.summary import map_facts, map_summary
     from snapbeam.util.files import check_writable, require_room, set_request
 
@@ -112,9 +112,9 @@ def compute_map(
     if plot is not None:
         overlays = {"measurements": overlay, "quasi_static_line": quasi_static_line}
         files.append(
-            draw(dataset, plot, variable)
+            draw_computed(dataset, plot, output, variable)
             if variable not in (None, "response_class")
-            else draw(dataset, plot, "response_class", **overlays)
+            else draw_computed(dataset, plot, output, "response_class", **overlays)
         )
     add_json(**map_facts(dataset), seconds=elapsed, files=files)
     out().print(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,6 +17,8 @@ from snapbeam.cli.console import (
     duration,
     errors,
     file_line,
+    kept_if_not_drawn,
+    least_picture_size,
     notes,
     out,
 )
@@ -85,9 +88,9 @@ def simulate(
     Example: snapbeam simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 -o run.nc --plot run.png
     --window 0:20
     """
-    from snapbeam.cli.console import check_pictures, draw
+    from snapbeam.cli.console import check_pictures, draw_computed
     from snapbeam.simulation.simulate import least_file_size
-    from snapbeam.util.files import check_writable, require_room
+    from snapbeam.util.files import check_writable, require_room_of
 
     settings = configured(given)
     if output is not None:
@@ -97,6 +100,9 @@ def simulate(
         from snapbeam.plot.animation import ANIMATION_SUFFIXES
 
         check_writable(animate, "animate", ANIMATION_SUFFIXES)
+    drawn = {"plot": plot, "animate": animate}
+    pictures = {name: (path, least_picture_size(path)) for name, path in drawn.items() if path is not None}
+    require_room_of(pictures)
     part = opt.parse_window(window)
 
     import snapbeam as sb
@@ -121,7 +127,7 @@ def simulate(
         times = _even(system, integration, samples)
         if output is not None and not stream:
             size = least_file_size(system, integration, None if times is None else len(times))
-            require_room(output, size)
+            require_room_of({"output": (output, size), **pictures})
         if stream and output is not None:
             summary = sb.simulate_to_file(
                 system, integration, path=output, sample_times=times, progress=progress
@@ -137,9 +143,11 @@ def simulate(
             run.save(output)
         console.print(f"Written: {file_line(output)}")
     if run is not None and plot is not None:
-        console.print(f"Written: {file_line(draw(run.dataset, plot, window=part))}")
+        console.print(
+            f"Written: {file_line(draw_computed(run.dataset, plot, output, save=run.save, window=part))}"
+        )
     if run is not None and animate is not None:
-        console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
+        console.print(f"Written: {file_line(_animated(run, animate, part, output))}")
     files = [path for path in (output, plot, animate) if path is not None]
     wells = 2 if system.model.is_bistable else 1
     shown = dict(summary) | {"response_class": summary.response_class.label_of(wells)}
@@ -237,13 +245,21 @@ def _recorded(path: Path) -> xr.Dataset:
     return read_netcdf(path, "drive")
 
 
-def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None) -> Path:
+def _animated(run: Any, path: Path, window: tuple[float, float] | None, kept: Path | None) -> Path:
     import matplotlib
 
     matplotlib.use("Agg")
     from snapbeam.plot.animation import animate_run
 
-    return animate_run(dataset, path, window)
+    def again(file: str) -> str:
+        code = (
+            "import snapbeam; from snapbeam.plot.animation import animate_run; "
+            f"animate_run(snapbeam.load({file!r}).dataset, {str(path)!r}, {window})"
+        )
+        return shlex.join(["python", "-c", code])
+
+    with kept_if_not_drawn(again, kept, run.save):
+        return animate_run(run.dataset, path, window)
 
 
 def _harvest_lines(summary: Any) -> list[str]:

@@ -68,7 +68,7 @@ def threshold(
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png
     """
-    from snapbeam.cli.console import check_pictures, draw, write_map
+    from snapbeam.cli.console import check_pictures, draw_computed, write_map
     from snapbeam.util.files import check_writable
 
     settings = configured(given, lambda config, _: _axes_of(config, parameter, values))
@@ -88,7 +88,7 @@ def threshold(
     elapsed = time.monotonic() - start
     files = [write_map(dataset, output)]
     if plot is not None:
-        files.append(draw(dataset, plot))
+        files.append(draw_computed(dataset, plot, output))
     names = (
         "lower_threshold", "upper_threshold", "lower_threshold_min", "upper_threshold_max", "failed_runs",
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -118,16 +119,19 @@ def agreed(cost: CostEstimate, yes: bool, stop: bool) -> bool:
 
 def finish(dataset: xr.Dataset, output: Path, plot: Path | None, drawn: Any, lines: list[str]) -> None:
     """Write and plot the results and print a summary."""
-    from snapbeam.cli.console import write_map
+    from snapbeam.cli.console import kept_if_not_drawn, plot_command, write_map
 
     files = [write_map(dataset, output)]
     if plot is not None:
-        import matplotlib
+        with kept_if_not_drawn(
+            lambda file: plot_command(file, plot), output, functools.partial(write_map, dataset)
+        ):
+            import matplotlib
 
-        matplotlib.use("Agg")
-        from snapbeam.plot.style import save_figure
+            matplotlib.use("Agg")
+            from snapbeam.plot.style import save_figure
 
-        files.append(save_figure(drawn(dataset), plot))
+            files.append(save_figure(drawn(dataset), plot))
     add_json(summary=lines, files=files)
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
 

@@ -137,11 +137,13 @@ def backbone_curve(
     start = structure.start_about_well(mode) if well != "both" else structure.start_across()
     limits = amplitude_limit, np.pi / lowest_frequency_ratio, max_step
     if well == "both":
-        back, _ = _follow(structure, start, -1.0, limits, max_points // 2, report, 0)
-        ahead, end = _follow(structure, start, 1.0, limits, max_points - len(back), report, len(back))
+        back, _ = _follow(structure, start, -1.0, limits, max_points // 2, report, 0, max_points)
+        ahead, end = _follow(
+            structure, start, 1.0, limits, max_points - len(back), report, len(back), max_points
+        )
         points = [*reversed(back[1:]), *ahead]
     else:
-        points, end = _follow(structure, start, 1.0, limits, max_points, report, 0)
+        points, end = _follow(structure, start, 1.0, limits, max_points, report, 0, max_points)
     return _dataset(structure, points, end)
 
 
@@ -420,21 +422,23 @@ def _follow(
     max_points: int,
     report: Callable[[int, int], object] | None,
     before: int,
-) -> tuple[list[_Array], str]:
-    """Points of a curve from its start in one direction, and why it ends.
+    total: int,
+) -> tuple[list[dict[str, Any]], str]:
+    """Measures of the points of a curve from its start in one direction, and why it ends.
 
-    The *limits* are the maximum displacement of the centre, half period and arc length between two points.
+    A point is measured when it is found, which takes as long as to find it: the progress is that of both.  The *limits* are the maximum displacement of the centre, half period and arc length between two points.
     """
     found = _corrected(structure, start[0], start[1], start[0])
     if found is None:
         raise RuntimeError("no motion was found where the curve begins; choose another mode")
     point, along, turned, _ = found
     apart = turned - point[:-1]
-    points, direction, length = [point], way * along, min(_FIRST, limits[2])
+    last, direction, length = point, way * along, min(_FIRST, limits[2])
+    points = [_measures(structure, point)]
     while len(points) < max_points:
         if report is not None:
-            report(before + len(points), max(max_points, before + len(points)))
-        guess = points[-1] + length * direction
+            report(before + len(points), total)
+        guess = last + length * direction
         found = _corrected(structure, guess, direction, guess)
         if found is None or found[1] @ direction < 0.7:  # lost, or around too sharp a bend
             length *= 0.5
@@ -445,18 +449,19 @@ def _follow(
         last_apart, apart = apart, turned - point[:-1]
         part = _vanishing(last_apart, apart)
         if part is not None:
-            met = ((1.0 - part) * points[-1] + part * point)[:-1]
+            met = ((1.0 - part) * last + part * point)[:-1]
             near = _NEAR_ZERO * np.linalg.norm(apart - last_apart)
             if np.linalg.norm(met) < near:
                 return points, _AT_REST
             to_rest = lstsq(structure.slope(met), structure.acceleration(met))
             return points, _OTHER_REST if np.linalg.norm(to_rest) < near else _RETRACED
-        points.append(point)
+        points.append(_measures(structure, point))
+        last = point
         if iterations <= 3:
             length = min(1.4 * length, limits[2])
-        first, last = structure.centre(point[:-1]), structure.centre(turned)
+        ends = structure.centre(point[:-1]), structure.centre(turned)
         middle = 0.0 if structure.well == "both" else structure.centre(np.zeros(structure.size))
-        if max(abs(first - middle), abs(last - middle)) > limits[0]:
+        if max(abs(each - middle) for each in ends) > limits[0]:
             return points, "amplitude_limit"
         if point[-1] > limits[1]:
             return points, "lowest_frequency_ratio"
@@ -474,28 +479,31 @@ def _multipliers(structure: _Structure, point: _Array) -> NDArray[np.complex128]
     return found[np.argsort(-np.abs(found))]
 
 
-def _dataset(structure: _Structure, points: list[_Array], end: str) -> xr.Dataset:
+def _measures(structure: _Structure, point: _Array) -> dict[str, Any]:
+    """Numbers of the dataset for one point."""
+    y, v = structure.waveform(point[:-1], float(point[-1]))
+    centre, kinetic = structure.centre(y), np.trapezoid(v**2, axis=0)
+    multipliers = _multipliers(structure, point)
+    others = np.delete(multipliers, np.argsort(np.abs(multipliers - 1.0))[:2])
+    return {
+        "frequency": structure.unit / (2.0 * point[-1]),
+        "energy": structure.energy(point[:-1]),
+        "low": float(centre.min()),
+        "high": float(centre.max()),
+        "share": kinetic / kinetic.sum(),
+        "size": np.abs(multipliers),
+        "angle": np.angle(multipliers),
+        "unstable": int((np.abs(others) > 1.0 + _STABLE).sum()),
+        "begun": structure.rest + structure.back @ point[:-1],
+    }
+
+
+def _dataset(structure: _Structure, points: list[dict[str, Any]], end: str) -> xr.Dataset:
     from snapbeam.util.datasets import xr
 
     model, n = structure.model, structure.size
-    frequency = np.array([structure.unit / (2.0 * point[-1]) for point in points])
-    rows: dict[str, list[Any]] = {
-        name: [] for name in ("energy", "low", "high", "share", "size", "angle", "unstable", "begun")
-    }
-    for point in points:
-        y, v = structure.waveform(point[:-1], float(point[-1]))
-        centre = structure.centre(y)
-        kinetic = np.trapezoid(v**2, axis=0)
-        multipliers = _multipliers(structure, point)
-        others = np.delete(multipliers, np.argsort(np.abs(multipliers - 1.0))[:2])
-        rows["energy"].append(structure.energy(point[:-1]))
-        rows["low"].append(float(centre.min()))
-        rows["high"].append(float(centre.max()))
-        rows["share"].append(kinetic / kinetic.sum())
-        rows["size"].append(np.abs(multipliers))
-        rows["angle"].append(np.angle(multipliers))
-        rows["unstable"].append(int((np.abs(others) > 1.0 + _STABLE).sum()))
-        rows["begun"].append(structure.rest + structure.back @ point[:-1])
+    rows = {name: [point[name] for point in points] for name in points[0]}
+    frequency = np.array(rows["frequency"])
     reference = model.reference_frequency
     unstable = np.array(rows["unstable"])
     variables: dict[str, tuple[Any, Any, str, str]] = {

@@ -115,7 +115,7 @@ class _UnderForce:
         return dataclasses.replace(self.potential, constant=self.potential.constant + value * self.row)
 
     def residual(self, alpha: _Array, value: float) -> _Array:
-        return self.potential.gradient(alpha) - value * self.row
+        return self.potential._gradient(alpha) - value * self.row
 
     def push(self, alpha: _Array, value: float) -> _Array:
         """Minus the derivative of the residual by the force."""
@@ -178,13 +178,13 @@ class _OverParameter:
     loaded = at
 
     def residual(self, alpha: _Array, value: float) -> _Array:
-        return self.at(value).gradient(alpha)
+        return self.at(value)._gradient(alpha)
 
     def push(self, alpha: _Array, value: float) -> _Array:
         """Minus the derivative of the gradient by the parameter, by differences within the range."""
         h = _DIFFERENCE * (self.high - self.low)
         ends = [min(max(end, self.low), self.high) for end in (value - h, value + h)]
-        one, other = (self.at(end).gradient(alpha) for end in ends)
+        one, other = (self.at(end)._gradient(alpha) for end in ends)
         return (one - other) / (ends[1] - ends[0]) if ends[0] < ends[1] else np.zeros_like(alpha)
 
     def scale(self, stiffness: _Array, length: float) -> tuple[float, float]:
@@ -220,7 +220,7 @@ class _Tracer:
         value, first = self.family.first
         potential = self.family.at(value)
         self.length = float(np.abs(potential.size).max())
-        stiffness = potential.tangent(first)
+        stiffness = potential._tangent(first)
         self.origin, self.unit = self.family.scale(stiffness, self.length)
         self.balance = 1.0 / np.maximum(np.abs(stiffness).max(axis=1) * self.length, 1e-300)
 
@@ -237,7 +237,7 @@ class _Tracer:
 
     def _jacobian(self, y: _Array) -> _Array:
         """Derivatives of the scaled residual, shape (N, N + 1)."""
-        stiffness = self.length * self.potential(y).tangent(self.amplitude(y))
+        stiffness = self.length * self.potential(y)._tangent(self.amplitude(y))
         push = self.family.push(self.amplitude(y), self.value(y))
         return np.column_stack((stiffness, -self.unit * push)) * self.balance[:, None]
 
@@ -245,7 +245,7 @@ class _Tracer:
         """The point with the tangent on the side of *along*."""
         tangent = svd(self._jacobian(y))[2][-1]
         potential = self.potential(y)
-        stiffness = potential.in_modes(potential.tangent(self.amplitude(y)))
+        stiffness = potential._in_modes(potential._tangent(self.amplitude(y)))
         tangent = math.copysign(1.0, float(tangent @ along)) * tangent
         return _Point(y, np.asarray(tangent), np.asarray(np.linalg.eigvalsh(stiffness)))
 
@@ -257,7 +257,7 @@ class _Tracer:
         y = guess
         for _ in range(_NEWTON if normal is not None else _LEAST_NORM):
             try:
-                if not self.potential(y).holds(self.amplitude(y)):
+                if not self.potential(y)._holds(self.amplitude(y)):
                     return None
                 residual = self.family.residual(self.amplitude(y), self.value(y)) * self.balance
                 if normal is None:
@@ -269,7 +269,7 @@ class _Tracer:
                 return None
             y = y - step
             if np.abs(step).max() <= _CONVERGED * max(1.0, float(np.abs(y).max())):
-                return y if self.potential(y).holds(self.amplitude(y)) else None
+                return y if self.potential(y)._holds(self.amplitude(y)) else None
         return y if normal is None else None
 
     def between(self, a: _Point, b: _Point, value: Callable[[_Point], float]) -> _Point:
@@ -318,7 +318,7 @@ class _Tracer:
     def null_direction(self, point: _Point) -> _Array:
         """Amplitudes of the direction without stiffness."""
         potential = self.potential(point.y)
-        values, axes = np.linalg.eigh(potential.in_modes(potential.tangent(self.amplitude(point.y))))
+        values, axes = np.linalg.eigh(potential._in_modes(potential._tangent(self.amplitude(point.y))))
         return np.asarray(potential.model.linear_modes @ axes[:, int(np.abs(values).argmin())])
 
     def is_known(self, y: _Array) -> bool:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import modes_between
@@ -15,7 +17,16 @@ from snapbeam.model.extension import check_defined, check_names
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.diagnostics import Diagnostic
-from snapbeam.util.validation import InputError, choice, finite, instance, positive, within
+from snapbeam.util.validation import (
+    InputError,
+    choice,
+    finite,
+    finite_array,
+    instance,
+    positive,
+    shown,
+    within,
+)
 
 _Array = NDArray[np.float64]
 
@@ -24,6 +35,23 @@ HARVESTERS: dict[str, type[Harvester]] = {}
 WIRINGS = ("parallel", "series")
 _STRONGEST_COUPLING = 1.0
 """Theta^2 (x_2 - x_1) L/(C E I) that no layers reach: e^2/(eps c) of the material, which stiffens the beam too."""
+
+
+def _of_resistances(function: Callable[[Any, _Array], _Array]) -> Callable[[Any, ArrayLike], _Array]:
+    """Refuse resistances that are not positive and finite, before the formula of any harvester."""
+
+    @functools.wraps(function)
+    def checked(self: Any, resistance: ArrayLike) -> _Array:
+        given = finite_array("resistance", resistance)
+        if not given.size or (given <= 0.0).any():
+            raise InputError(f"resistance = {shown(resistance)}: must be greater than 0 ohm")
+        with np.errstate(all="ignore"):
+            found = np.asarray(function(self, given))
+        if not np.isfinite(found).all():
+            raise InputError(f"resistance = {shown(resistance)}: {function.__name__} is not finite there")
+        return found
+
+    return checked
 
 
 class Harvester:
@@ -63,6 +91,9 @@ class Harvester:
         if cls.name:
             check_defined(cls, Harvester, ["row", "inertia", "loss", "share", "volts"])
             HARVESTERS[cls.name] = cls
+        for name in ("loss", "share", "volts"):
+            if name in vars(cls):
+                setattr(cls, name, _of_resistances(vars(cls)[name]))
 
     def row(self, model: ReducedModel) -> _Array:
         """theta of every buckling mode, shape (N,)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -109,22 +109,79 @@ class Potential:
         return not self.local_forces and not self.constant.any()
 
     def energy(self, alpha: ArrayLike) -> _Array:
-        """U, J, of amplitudes of shape (..., N)."""
+        """U, J, of amplitudes of shape (..., N).
+
+        Raises
+        ------
+        InputError
+            As :meth:`terms`.
+        """
+        return self._of_finite_forces(self._energy, alpha)
+
+    def _energy(self, alpha: _Array) -> _Array:
         found = self.model.potential_energy(alpha)
         if self.is_of_the_structure_alone:
             return found
-        a = np.asarray(alpha, dtype=np.float64)
-        found = found - a @ self.constant
+        found = found - alpha @ self.constant
         for row, law in zip(self.rows, self.local_forces, strict=True):
-            found = found + law.energy_at(a @ row)
+            found = found + law.energy_at(alpha @ row)
         return np.asarray(found)
 
-    def gradient(self, alpha: _Array) -> _Array:
-        """dU/dalpha, shape (..., N): minus the generalised force."""
+    def gradient(self, alpha: ArrayLike) -> _Array:
+        """dU/dalpha, shape (..., N): minus the generalised force.
+
+        Raises
+        ------
+        InputError
+            As :meth:`terms`.
+        """
         return self.terms(alpha).sum(axis=0)
 
-    def terms(self, alpha: _Array) -> _Array:
-        """Terms of the gradient, shape (terms, ..., N), whose magnitudes are the measure of its rounding."""
+    def terms(self, alpha: ArrayLike) -> _Array:
+        """Terms of the gradient, shape (terms, ..., N), whose magnitudes are the measure of its rounding.
+
+        Raises
+        ------
+        InputError
+            If *alpha* has NaN or infinite numbers or no shape (..., N), or a force is not finite there.
+        """
+        return self._of_finite_forces(self._terms, alpha)
+
+    def tangent(self, alpha: ArrayLike) -> _Array:
+        """Second derivative of U, shape (..., N, N).
+
+        Raises
+        ------
+        InputError
+            As :meth:`terms`.
+        """
+        return self._of_finite_forces(self._tangent, alpha)
+
+    def _of_finite_forces(self, function: Callable[[_Array], _Array], alpha: ArrayLike) -> _Array:
+        there = self._amplitudes(alpha)
+        with np.errstate(all="ignore"):
+            found = function(there)
+        if not np.isfinite(found).all():
+            raise InputError(
+                f"alpha = {shown(alpha)}: has forces that are not finite, beyond the range of a law or of numbers"
+            )
+        return found
+
+    def _amplitudes(self, alpha: ArrayLike) -> _Array:
+        """Amplitudes of shape (..., N), checked."""
+        found = finite_array("alpha", alpha)
+        if not found.ndim or found.shape[-1] != self.model.modes:
+            raise InputError(
+                f"alpha of shape {found.shape}: must have the amplitudes of {self.model.modes} modes along its last axis"
+            )
+        return found
+
+    # Newton's methods try what is beyond the ranges of numbers: they call the functions without checks.
+
+    def _gradient(self, alpha: _Array) -> _Array:
+        return self._terms(alpha).sum(axis=0)
+
+    def _terms(self, alpha: _Array) -> _Array:
         model = self.model
         pulled = product(model.elongation_matrix, alpha)
         bent = model.stiffness * alpha if model.stiffness.ndim == 1 else product(model.stiffness, alpha)
@@ -136,8 +193,7 @@ class Potential:
         tension = (model.nonlinear_stiffness * dot(alpha, pulled))[..., None] * pulled
         return np.array([bent, tension, np.broadcast_to(-load, alpha.shape), *forces])
 
-    def tangent(self, alpha: _Array) -> _Array:
-        """Second derivative of U, shape (..., N, N)."""
+    def _tangent(self, alpha: _Array) -> _Array:
         model = self.model
         found = tangent_stiffness(model.stiffness, model.nonlinear_stiffness, alpha, model.elongation_matrix)
         for row, law in zip(self.rows, self.local_forces, strict=True):
@@ -204,7 +260,7 @@ class Potential:
         away = self._starts(_STARTS[0])
         sizes = np.linalg.norm(away, axis=-1)
         away = away[sizes > 0.0] * (float(np.linalg.norm(self.size)) / sizes[sizes > 0.0, None])
-        away = away[self.holds(1e3 * _FAR * away)]
+        away = away[self._holds(1e3 * _FAR * away)]
         near, far = (self.energy(reach * away) for reach in (_FAR, 1e3 * _FAR))
         return bool(((far < near) & (far < 0.0)).any())
 
@@ -229,7 +285,7 @@ class Potential:
                     if pull > 0.0:
                         faces.append((j, end / self._length))
                         row = self.rows[j]
-                        terms = structure.terms(end * row / float(row @ row))
+                        terms = structure._terms(end * row / float(row @ row))
                         if pull * float(np.abs(row).max()) < _WEAK * float(np.abs(terms).max()):
                             weak.append(faces[-1])
         above = np.concatenate((self.rows, -self.rows))
@@ -267,11 +323,25 @@ class Potential:
 
     def _equilibrium(self, alpha: _Array) -> Equilibrium:
         alpha.setflags(write=False)
-        unstable = int((np.linalg.eigvalsh(self.in_modes(self.tangent(alpha))) < 0.0).sum())
-        return Equilibrium(amplitude=alpha, energy=float(self.energy(alpha)), unstable_directions=unstable)
+        unstable = int((np.linalg.eigvalsh(self._in_modes(self._tangent(alpha))) < 0.0).sum())
+        return Equilibrium(amplitude=alpha, energy=float(self._energy(alpha)), unstable_directions=unstable)
 
-    def in_modes(self, matrix: _Array) -> _Array:
-        """A symmetric matrix in the linear modes of the structure, whose mass matrix is the identity."""
+    def in_modes(self, matrix: ArrayLike) -> _Array:
+        """A symmetric matrix in the linear modes of the structure, whose mass matrix is the identity.
+
+        Raises
+        ------
+        InputError
+            If *matrix* has NaN or infinite numbers or no shape (..., N, N).
+        """
+        found, n = finite_array("matrix", matrix), self.model.modes
+        if found.shape[-2:] != (n, n):
+            raise InputError(
+                f"matrix of shape {found.shape}: must have {n} rows and columns in its last axes"
+            )
+        return self._in_modes(found)
+
+    def _in_modes(self, matrix: _Array) -> _Array:
         modes = self.model.linear_modes
         return np.asarray(modes.T @ matrix @ modes)
 
@@ -315,8 +385,17 @@ class Potential:
                 found += [alpha + share * (away @ (compliance * rows)) for share in 1.0 - distances]
         return found
 
-    def holds(self, alpha: _Array) -> NDArray[np.bool_]:
-        """Return whether the displacement of every local force is within the range of its law, for shape (..., N)."""
+    def holds(self, alpha: ArrayLike) -> NDArray[np.bool_]:
+        """Return whether the displacement of every local force is within the range of its law, for shape (..., N).
+
+        Raises
+        ------
+        InputError
+            If *alpha* has NaN or infinite numbers or no shape (..., N).
+        """
+        return self._holds(self._amplitudes(alpha))
+
+    def _holds(self, alpha: _Array) -> NDArray[np.bool_]:
         inside = np.ones(alpha.shape[:-1], dtype=bool)
         for row, law in zip(self.rows, self.local_forces, strict=True):
             (low, high), u = law.displacement_range(law.numbers), dot(alpha, row)
@@ -336,10 +415,10 @@ class Potential:
         """Equilibria by damped Newton steps from starting points, shape (starts, N); without those that come to none."""
         alpha = np.array(alpha)
         solved = np.zeros(len(alpha), dtype=bool)
-        runs = np.flatnonzero(self.holds(alpha))
-        terms = self.terms(alpha[runs])
+        runs = np.flatnonzero(self._holds(alpha))
+        terms = self._terms(alpha[runs])
         for _ in range(_ITERATIONS):
-            gradient, tangent = terms.sum(axis=0), self.tangent(alpha[runs])
+            gradient, tangent = terms.sum(axis=0), self._tangent(alpha[runs])
             # next to a body that attracts, rounding of the amplitudes changes the force by more than its own rounding
             rounding = _ROUNDING * product(np.abs(tangent), np.abs(alpha[runs]))
             bound = (_RESIDUAL * np.abs(terms).sum(axis=0) + rounding).max(axis=-1)
@@ -355,9 +434,9 @@ class Potential:
             for _ in range(_HALVINGS):
                 at = np.flatnonzero(searching)
                 tried = alpha[runs[at]] - share * step[at]
-                inside = self.holds(tried)
+                inside = self._holds(tried)
                 at, tried = at[inside], tried[inside]
-                terms_there = self.terms(tried)
+                terms_there = self._terms(tried)
                 new = terms_there.sum(axis=0)
                 less = dot(new, new) < (1.0 - 0.1 * share) * size[at]
                 taken = at[less]
@@ -371,9 +450,9 @@ class Potential:
 
     def _polished(self, alpha: _Array) -> _Array:
         for _ in range(2):
-            tried = alpha - _solved(self.tangent(alpha), self.gradient(alpha))
-            better = np.flatnonzero(self.holds(tried))
-            new, old = (np.abs(self.gradient(each[better])).max(axis=-1) for each in (tried, alpha))
+            tried = alpha - _solved(self._tangent(alpha), self._gradient(alpha))
+            better = np.flatnonzero(self._holds(tried))
+            new, old = (np.abs(self._gradient(each[better])).max(axis=-1) for each in (tried, alpha))
             better = better[new < old]
             alpha[better] = tried[better]
         return alpha
@@ -421,7 +500,7 @@ class Potential:
         for row, law in zip(self.rows, self.local_forces, strict=True):
             stiffness = law.stiffness_at(float(row @ alpha), self._length)
             magnitude = magnitude + abs(stiffness) * np.abs(np.outer(row, row))
-        return linear_modes_about(alpha, model.mass, self.tangent(alpha), magnitude, parity)
+        return linear_modes_about(alpha, model.mass, self._tangent(alpha), magnitude, parity)
 
     def natural_frequencies(self, equilibrium: Equilibrium) -> _Array:
         """Natural frequencies about a well, Hz, ascending, shape (N,); without circuits and contacts."""
@@ -469,7 +548,7 @@ class Potential:
 
     def _sides(self, saddle: Equilibrium) -> tuple[int | None, int | None]:
         """Wells that the descents from a saddle along its unstable direction, downwards and upwards, end in."""
-        _, axes = np.linalg.eigh(self.in_modes(self.tangent(saddle.amplitude)))
+        _, axes = np.linalg.eigh(self._in_modes(self._tangent(saddle.amplitude)))
         away = self.model.linear_modes @ axes[:, 0]
         away *= 1e-3 * np.abs(self.size).max() / np.abs(away).max()
         return self.descent(saddle.amplitude - away), self.descent(saddle.amplitude + away)
@@ -477,7 +556,7 @@ class Potential:
     def descent(self, alpha: _Array) -> int | None:
         """Number of the well that a motion without inertia, M alpha' = -dU/dalpha, comes to; None if it leaves a range."""
         size = np.abs(self.size).max()
-        for there, _ in self._falling(finite_array("alpha", alpha, 1)):
+        for there, _ in self._falling(self._start_of_descent(alpha)):
             for number, well in enumerate(self.wells):
                 if np.abs(there - well.amplitude).max() <= _NEAR * size:
                     return number
@@ -485,7 +564,13 @@ class Potential:
 
     def settles(self, alpha: _Array) -> bool:
         """Return whether a motion without inertia comes to rest within the ranges of all laws, in a well that need not be known."""
-        return any(arrived for _, arrived in self._falling(finite_array("alpha", alpha, 1)))
+        return any(arrived for _, arrived in self._falling(self._start_of_descent(alpha)))
+
+    def _start_of_descent(self, alpha: ArrayLike) -> _Array:
+        found = self._amplitudes(alpha)
+        if found.ndim != 1:
+            raise InputError(f"alpha of shape {found.shape}: must have 1 dimension")
+        return found
 
     def _falling(self, alpha: _Array) -> Iterator[tuple[_Array, bool]]:
         """Amplitudes of a motion without inertia up to where it leaves a range, and whether they are those of a well.
@@ -497,7 +582,7 @@ class Potential:
         size = np.abs(self.size).max()
         identity = np.eye(len(modes))
         for _ in range(_DESCENT_STEPS):
-            slope, bend = modes.T @ self.gradient(alpha), self.in_modes(self.tangent(alpha))
+            slope, bend = modes.T @ self._gradient(alpha), self._in_modes(self._tangent(alpha))
             if not (np.isfinite(slope).all() and np.isfinite(bend).all()):  # no step would ever be short
                 return
             lowest = float(np.linalg.eigvalsh(bend)[0])
@@ -508,7 +593,7 @@ class Potential:
                 if np.abs(step).max() <= _DESCENT_STEP * size:
                     break
                 shift *= 4.0
-            if not self.holds(tried):
+            if not self._holds(tried):
                 return
             arrived = (
                 lowest > 1e-12 * float(np.abs(bend).max())

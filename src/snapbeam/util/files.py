@@ -9,7 +9,7 @@ import os
 import platform
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -17,6 +17,7 @@ from importlib import import_module
 from pathlib import Path
 
 from snapbeam._version import __version__
+from snapbeam.util.memory_limit import limit
 from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError, file_path
 
@@ -34,6 +35,7 @@ __all__ = [
     "refuse_foreign",
     "request_hash",
     "require_room",
+    "require_room_of",
     "set_request",
 ]
 
@@ -205,11 +207,13 @@ def is_ours(path: str | os.PathLike[str], begin: str = "") -> bool:
 
 
 def _attribute(path: Path, name: str) -> object:
-    """An attribute of the root of a NetCDF file; None if it has none."""
-    import h5py
+    """An attribute of the root of a NetCDF file; None if it has none that can be read."""
+    from snapbeam.util.hdf5 import open_hdf5
 
-    with h5py.File(path, "r") as file:
-        return file.attrs.get(name)
+    with suppress(Exception):  # of damaged bytes the library makes errors of every kind
+        with open_hdf5(path, in_parts=True) as file:
+            return file.attrs.get(name)
+    return None
 
 
 def check_writable(
@@ -260,6 +264,8 @@ def check_writable(
         module, extra = _NEEDED[target.suffix.lower()]
         with needing(f"{name} = {str(path)!r}: a file {target.suffix}", extra):
             import_module(module)
+    if target.suffix.lower() == ".nc" and limit() < float("inf"):
+        import_module("h5netcdf")  # whose libraries must fit the memory before the work, too
     try:
         with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{target.stem[:40]}.") as tried:
             tried.write(bytes(_TRIED))  # a full disk still makes empty files
@@ -298,8 +304,25 @@ def require_room(path: str | os.PathLike[str], size: float, name: str = "output"
     ------
     InputError
     """
-    if words := missing_room(path, size, name):
-        raise InputError(f"{words}: make room or name a file on another disk")
+    require_room_of({name: (path, size)})
+
+
+def require_room_of(outputs: Mapping[str, tuple[str | os.PathLike[str], float]]) -> None:
+    """Refuse outputs, paths and least sizes in bytes by name, for which together a disk has no room.
+
+    Raises
+    ------
+    InputError
+    """
+    disks: dict[int, list[str]] = {}
+    for name, (path, _) in outputs.items():
+        folder = Path(path).absolute().parent
+        disks.setdefault(folder.stat().st_dev if folder.is_dir() else 0, []).append(name)
+    for names in disks.values():
+        size = sum(outputs[name][1] for name in names)
+        if words := missing_room(outputs[names[-1]][0], size, names[-1]):
+            others = f" with {', '.join(names[:-1])} on the same disk" if names[1:] else ""
+            raise InputError(f"{words}{others}: make room or name a file on another disk")
 
 
 class NoRoomError(OSError):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from snapbeam.util.input_files import refuse_inflated
 from snapbeam.util.validation import InputError, file_path
@@ -43,7 +44,7 @@ def open_hdf5(path: str | os.PathLike[str], name: str = "path", *, in_parts: boo
     InputError
         If *path* is no regular file; for external links, links of unknown kinds, links from a group to a group that has
         another place, numbers in other files (external storage, virtual datasets), more than 32 levels, 1,000 groups,
-        100,000 datasets or 100,000 texts, and for content that
+        100,000 datasets or 100,000 texts, stored texts of impossible lengths, and for content that
         :func:`~snapbeam.util.input_files.refuse_inflated` refuses; if *path* is no HDF5 file, or is damaged.
 
     Examples
@@ -61,7 +62,9 @@ def open_hdf5(path: str | os.PathLike[str], name: str = "path", *, in_parts: boo
     file = None
     try:
         file = h5py.File(source, "r")
-        size = _size(file, f"{name} = {str(path)!r}")
+        size, has_texts = _size(file, f"{name} = {str(path)!r}")
+        if has_texts:
+            _refuse_endless_heaps(file, source, f"{name} = {str(path)!r}")
         if not in_parts:
             refuse_inflated(name, path, size)
     except BaseException as error:
@@ -78,8 +81,8 @@ def open_hdf5(path: str | os.PathLike[str], name: str = "path", *, in_parts: boo
     return file
 
 
-def _size(file: h5py.File, where: str) -> int:
-    """Bytes of all datasets by way of every link, at 8 bytes for a number.
+def _size(file: h5py.File, where: str) -> tuple[int, bool]:
+    """Bytes of all datasets by way of every link, at 8 bytes for a number; whether anything is stored in heaps.
 
     The calls of the lower level do not follow links.  The size of a virtual dataset is not asked for, because the
     library opens its sources to find it.
@@ -91,9 +94,17 @@ def _size(file: h5py.File, where: str) -> int:
     groups = {h5py.h5o.get_info(root).addr}
     soft: list[tuple[h5py.h5g.GroupID, bytes, Path]] = []
     size = texts = datasets = 0
+    has_texts = False
+
+    def look(item: h5py.h5d.DatasetID | h5py.h5g.GroupID) -> None:
+        """Take note of attributes of variable length, whose types are read and not the values."""
+        nonlocal has_texts
+        for number in range(h5py.h5a.get_num_attrs(item)):
+            has_texts |= _in_heap(h5py.h5a.open(item, index=number).get_type())
 
     def add(item: h5py.h5d.DatasetID, at: Path) -> None:
-        nonlocal size, texts, datasets
+        nonlocal size, texts, datasets, has_texts
+        look(item)
         made = item.get_create_plist()
         if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
             raise InputError(f"{where}: {_said(at)} has its numbers in another file: copy them into this one")
@@ -103,6 +114,7 @@ def _size(file: h5py.File, where: str) -> int:
         if item.get_space().get_simple_extent_type() == h5py.h5s.NULL:
             count = 0
         size += count * max(kind.get_size(), 8)
+        has_texts |= _in_heap(kind)
         texts += count if kind.dtype.hasobject else 0
         datasets += 1
         if texts > _MOST_TEXTS:
@@ -112,6 +124,7 @@ def _size(file: h5py.File, where: str) -> int:
 
     while waiting:
         group, place = waiting.pop()
+        look(group)
         for key in list(group):
             at = place / key.decode("utf-8", "replace")
             link = group.links.get_info(key).type
@@ -146,7 +159,67 @@ def _size(file: h5py.File, where: str) -> int:
             raise InputError(f"{where}: {_said(at)} is a link to a group: must be a link to a dataset")
         if isinstance(item, h5py.h5d.DatasetID):
             add(item, at)
-    return size
+    return size, has_texts
+
+
+def _in_heap(kind: h5py.h5t.TypeID) -> bool:
+    """Return whether values of a type may be stored in the global heaps of the file."""
+    from h5py import h5t
+
+    if isinstance(kind, h5t.TypeStringID):
+        return bool(kind.is_variable_str())
+    return any(kind.detect_class(each) for each in (h5t.VLEN, h5t.STRING, h5t.REFERENCE))
+
+
+_HEAP = b"GCOL\x01"
+_HEAD = 16
+"""Bytes before the first object of a heap, and before the content of each."""
+_LEAST_HEAP = 4096
+_WINDOW = 2**24
+
+
+def _refuse_endless_heaps(file: h5py.File, source: Path, where: str) -> None:
+    """Refuse a file with a heap whose list of objects does not advance, which the library follows without end.
+
+    A heap (HDF5 File Format Specification, III.E) is a list of objects: number (2 bytes), references (2), 4 bytes, size of
+    the content.  Object 0 is the free space up to the end, whose size includes its head.
+    """
+    width = file.id.get_create_plist().get_sizes()[1]
+    left = source.stat().st_size // _HEAD + 1  # objects without overlap
+    with source.open("rb") as raw:
+        for begin in _places(raw, _HEAP):
+            raw.seek(begin + 8)
+            size = int.from_bytes(raw.read(width), "little")
+            end = begin + size
+            if size < _LEAST_HEAP or end > source.stat().st_size:  # no heap: the library refuses it
+                continue
+            at = begin + _HEAD
+            while at + _HEAD <= end:
+                raw.seek(at)
+                head = raw.read(_HEAD)
+                length = int.from_bytes(head[8 : 8 + width], "little")
+                step = _HEAD + -(-length // 8) * 8 if head[:2] != b"\0\0" else length
+                left -= 1
+                if not _HEAD <= step <= end - at or left < 0:
+                    raise InputError(
+                        f"{where}: is damaged, a stored text at byte {at} has the impossible length {length}"
+                    )
+                at += step
+
+
+def _places(raw: BinaryIO, mark: bytes) -> Iterator[int]:
+    """Places of a mark in a file, which is read in parts."""
+    begin, kept = 0, b""
+    while True:
+        raw.seek(begin)
+        if not (part := raw.read(_WINDOW)):
+            return
+        whole, first = kept + part, begin - len(kept)
+        at = whole.find(mark)
+        while at >= 0:
+            yield first + at
+            at = whole.find(mark, at + 1)
+        begin, kept = begin + len(part), whole[-len(mark) + 1 :]
 
 
 def _said(at: Path) -> str:

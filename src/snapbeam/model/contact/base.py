@@ -13,7 +13,7 @@ import numpy as np
 
 from snapbeam.model.extension import check_names, check_pair
 from snapbeam.model.quantity import check_fields, numbers_type
-from snapbeam.util.validation import InputError, nonnegative, positive
+from snapbeam.util.validation import InputError, nonnegative, positive, within
 
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""
@@ -21,6 +21,9 @@ _GAUSS = tuple((0.5 * (x + 1.0), 0.5 * w) for x, w in zip(*(each.tolist() for ea
 """Nodes and weights of Gauss's rule on [0, 1]."""
 _HERTZ_PHASE = 4.03026
 """Phase of a linear oscillator with the maximum slope of an impact under Hertz's law: (4/5) B(2/5, 1/2) sqrt(15/8)."""
+
+
+_LEAST, _MOST = 1e-30, 1e30
 
 
 def hertzian_time(slope: float, mass: float) -> float:
@@ -32,11 +35,18 @@ def hertzian_time(slope: float, mass: float) -> float:
 
 
 def _of_impact(function: Callable[[Any, float, float], float]) -> Callable[[Any, float, float], float]:
-    """Refuse a mass or a velocity of an impact that is none, before the formula of any law."""
+    """Refuse a mass or a velocity of an impact that is none, before the formula of any law.
+
+    Masses and velocities beyond 1e30 and below 1e-30 are refused too: their energies leave the range of numbers.
+    """
 
     @functools.wraps(function)
     def checked(self: Any, mass: float, velocity: float) -> float:
-        return function(self, positive("mass", mass, "kg"), nonnegative("velocity", velocity, "m/s"))
+        positive("mass", mass, "kg"), nonnegative("velocity", velocity, "m/s")
+        mass = within("mass", mass, _LEAST, _MOST, closed="both", unit="kg")
+        if velocity != 0.0:
+            velocity = within("velocity", velocity, _LEAST, _MOST, closed="both", unit="m/s")
+        return function(self, mass, float(velocity))
 
     return checked
 

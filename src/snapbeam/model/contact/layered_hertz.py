@@ -103,13 +103,16 @@ class LayeredHertz(ContactLaw):
         """Maximum penetration, m, of a free *mass* (kg) that arrives with *velocity* (m/s)."""
         from scipy.optimize import brentq
 
+        if velocity == 0.0:
+            return 0.0
         wanted, law = 0.5 * mass * velocity**2, self.numbers_type()(self.stiffness, self.layer_stiffness)
         most = HertzContact(self.stiffness).max_penetration(mass, velocity)
         most += (3.0 * wanted / self.layer_stiffness) ** (1.0 / 3.0)
         return float(brentq(lambda d: self.energy(law, d) - wanted, 1e-6 * most, most, xtol=1e-12 * most))
 
     def impact_duration(self, mass: float, velocity: float) -> float:
-        """Duration of a free impact, s: 2 int dd/v(d) to the maximum, by Gauss's rule in x, d = d_max (1 - x^2)."""
+        """Duration, s, of a free impact at a velocity above 0: 2 int dd/v(d), by Gauss's rule in x, d = d_max (1 - x^2)."""
+        velocity = positive("velocity", velocity, "m/s")
         law = self.numbers_type()(self.stiffness, self.layer_stiffness)
         most, total = self.max_penetration(mass, velocity), 0.0
         for node, weight in zip(0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS, strict=True):
@@ -119,6 +122,7 @@ class LayeredHertz(ContactLaw):
 
     def time_scale(self, mass: float, velocity: float) -> float:
         """The duration, or that of Hertz's contact with the same maximum slope, which is less."""
+        duration = self.impact_duration(mass, velocity)
         law = self.numbers_type()(self.stiffness, self.layer_stiffness)
         slope = self.slope(law, self.max_penetration(mass, velocity))
-        return min(self.impact_duration(mass, velocity), hertzian_time(slope, mass))
+        return min(duration, hertzian_time(slope, mass))

@@ -47,7 +47,7 @@ def loss_number(restitution: float) -> float:
     Parameters
     ----------
     restitution : float
-        e, in (0, 1].
+        e, in [1e-300, 1].
 
     Raises
     ------
@@ -55,7 +55,7 @@ def loss_number(restitution: float) -> float:
     """
     from scipy.optimize import brentq
 
-    e = within("restitution", restitution, 0.0, 1.0, closed="right")
+    e = within("restitution", restitution, 1e-300, 1.0, closed="both")
     if e == 1.0:
         return 0.0
     if 1.0 - e < _SMALL:
@@ -84,8 +84,8 @@ def restitution_of_loss(loss: float) -> float:
     from scipy.optimize import brentq
 
     d = within("loss", loss, 0.0, math.inf, closed="left")
-    if d == 0.0:
-        return 1.0
+    if d < 1e-8:  # the terms that are left out are below rounding
+        return 1.0 - 2.0 * d / 3.0
     if d < 2.0 * _SMALL:
         return float(brentq(lambda e: _expanded(e, d), 1.0 - 2.0 * d, 1.0, xtol=1e-300, rtol=1e-15))
     high = -math.log1p(-d) if d < 1.0 - _SMALL else d + math.log1p(d) + 1.0

@@ -74,13 +74,15 @@ class PowerLaw(ContactLaw):
         return float(_MICROMETRE * (0.5 * n * mass * velocity**2 / at_one) ** (1.0 / n))
 
     def impact_duration(self, mass: float, velocity: float) -> float:
-        """Duration of a free impact, s: (2 d_max/v) B(1/n, 1/2)/n with n = p + 1."""
+        """Duration, s, of a free impact at a velocity above 0: (2 d_max/v) B(1/n, 1/2)/n with n = p + 1."""
+        velocity = positive("velocity", velocity, "m/s")
         n = self.exponent + 1.0
         beta = math.sqrt(math.pi) * math.gamma(1.0 / n) / math.gamma(1.0 / n + 0.5)
         return 2.0 * self.max_penetration(mass, velocity) / velocity * beta / n
 
     def time_scale(self, mass: float, velocity: float) -> float:
         """The duration, or, of an exponent above 3/2, that of Hertz's contact with the same maximum slope."""
+        duration = self.impact_duration(mass, velocity)
         law = self.numbers_type()(self.force_at_1um, self.exponent)
         slope = self.slope(law, self.max_penetration(mass, velocity))
-        return min(self.impact_duration(mass, velocity), hertzian_time(slope, mass))
+        return min(duration, hertzian_time(slope, mass))
