@@ -83,9 +83,9 @@ class _Given(Exception):
     """Arguments of the module's record, in place of a run."""
 
 
-def test_record(monkeypatch):
-    rng, refused = np.random.default_rng(3), 0
-    system = crowded(2)
+@pytest.fixture
+def recording(monkeypatch):
+    """Copies of the arguments of a recorded run, as a function."""
     given = []
 
     def kept(problem, batch, recorder, layout, which):
@@ -94,12 +94,27 @@ def test_record(monkeypatch):
 
     with monkeypatch.context() as patch, contextlib.suppress(_Given):
         patch.setattr(native._core, "record", kept)
-        next(native.record(arrays(system, 1).ensemble, np.linspace(0.0, 1e-3, 20), True))
+        next(native.record(arrays(crowded(2), 1).ensemble, np.linspace(0.0, 1e-3, 20), True))
+    return lambda: [
+        {name: each.copy() if isinstance(each, np.ndarray) else each for name, each in part.items()}
+        for part in given[0]
+    ]
+
+
+@pytest.mark.parametrize("at", range(5))
+@pytest.mark.parametrize("bad", [-1, -(2**31), 2**31 - 1])
+def test_marks_beyond_the_records_are_refused(recording, at, bad):
+    """They are places in the records, which are read and written there."""
+    problem, batch, recorder = recording()
+    recorder["marks"][at] = bad
+    with pytest.raises(ValueError, match="marks"):
+        _core.record(problem, batch, recorder, "thread", "")
+
+
+def test_record(recording):
+    rng, refused = np.random.default_rng(3), 0
     for number in range(200):
-        problem, batch, recorder = (
-            {name: each.copy() if isinstance(each, np.ndarray) else each for name, each in part.items()}
-            for part in given[0]
-        )
+        problem, batch, recorder = recording()
         problem, batch = changed(rng, problem, batch) if number % 2 else (problem, batch)
         (recorder,) = (recorder,) if number % 4 == 1 else changed(rng, recorder)
         try:

@@ -364,6 +364,9 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
     r.impact_rows = of_recorder.array<double, true>("impacts", {impacts, OF_IMPACT}, false);
     static_assert(sizeof(long) == 8 || sizeof(long) == 4);
     r.marks = of_recorder.array<long, true>("marks", {5});
+    const long most[] = {r.instants, r.samples, r.impacts, 1000000, 1};  // instants passed, samples, impacts, steps of a contact, begun
+    for (int i = 0; i < 5; ++i)
+        if (r.marks[i] < 0 || r.marks[i] > most[i]) of_recorder.refuse("marks", "must count what is recorded");
     const std::vector<Set> have = sets();
     const Set &chosen = set_named(set, have);
     const int which = layout_named(layout);
