@@ -36,8 +36,6 @@ class ExtendedSystem:
     cycles: int = 60
     """How long its runs may be."""
     reference_frequency: float | None = None
-    own_kernel: bool = True
-    """Whether no other quick test has a use for its kernel of many runs, which takes ten seconds to compile."""
     decides: bool = True
     """Whether a run of it can be decided early at all."""
 
@@ -159,7 +157,7 @@ MEASURED = sb.Imperfection(
 )
 
 SYSTEMS: dict[str, ExtendedSystem] = {
-    "the paper's": ExtendedSystem(struck(sine()), SINE | PLACE, own_kernel=False),
+    "the paper's": ExtendedSystem(struck(sine()), SINE | PLACE),
     "restitution": ExtendedSystem(struck(sine(), sb.Restitution(0.6)), SINE | PLACE, modes=1),
     "power": ExtendedSystem(struck(sine(), sb.PowerLaw.from_stiffness(4e11, 2.0)), SINE | PLACE),
     "layer": ExtendedSystem(struck(sine(), sb.LayeredHertz(stiffness=4e8, layer_stiffness=1e10)), SINE | PLACE),
@@ -167,16 +165,14 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         struck(sine(), sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)), SINE | PLACE
     ),
     "kelvin_voigt": ExtendedSystem(struck(sine(), sb.KelvinVoigt(2e6, 20.0)), SINE | PLACE),
-    "a gap": ExtendedSystem(struck(sine(), gap=4e-5), SINE | {"contact.gap": (-5e-5, 1e-4)}, own_kernel=False),
+    "a gap": ExtendedSystem(struck(sine(), gap=4e-5), SINE | {"contact.gap": (-5e-5, 1e-4)}),
     "a phase": ExtendedSystem(
         struck(sb.DisplacementSine(frequency_ratio=1.3, displacement_amplitude=0.2, phase=0.7)),
         {"drive.frequency_ratio": (0.3, 3.0), "drive.displacement_amplitude": (0.02, 0.5), "drive.phase": (-3.0, 3.0)},
-        own_kernel=False,
     ),
     "acceleration_sine": ExtendedSystem(
         struck(sb.AccelerationSine(frequency_ratio=1.3, acceleration_amplitude=0.3)),
         {"drive.frequency_ratio": (0.3, 3.0), "drive.acceleration_amplitude": (0.02, 1.2)},
-        own_kernel=False,
     ),
     "burst": ExtendedSystem(
         struck(BURST),
@@ -201,7 +197,7 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
     ),
     "recorded": ExtendedSystem(record, PLACE, cycles=11),
-    "still": ExtendedSystem(struck(sb.FixedStop(), gap=-1e-4), {"contact.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
+    "still": ExtendedSystem(struck(sb.FixedStop(), gap=-1e-4), {"contact.gap": (-3e-4, 1e-4)} | PLACE),
     "a body": ExtendedSystem(
         struck(sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7), SINE | PLACE, decides=False
     ),
@@ -224,13 +220,12 @@ SYSTEMS: dict[str, ExtendedSystem] = {
     ),
     "unequal wells": ExtendedSystem(struck(sine()), SINE | PLACE, imperfection=UNEVEN, fewest=2),
     "a measured shape": ExtendedSystem(struck(sine()), SINE | PLACE, imperfection=MEASURED),
-    "other ends": ExtendedSystem(struck(sine()), SINE | PLACE, beam=SPRUNG, own_kernel=False),
+    "other ends": ExtendedSystem(struck(sine()), SINE | PLACE, beam=SPRUNG),
     "a given load": ExtendedSystem(
         struck(sine()),
         SINE | PLACE,
         beam=default_values.BEAM.replace(axial_load=1.5 * default_values.BEAM.critical_load),
         reference_frequency=80.0,
-        own_kernel=False,
     ),
     "a base": ExtendedSystem(
         on_a_base(sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25, phase=0.3)), SHAKEN,

@@ -225,7 +225,7 @@ class Waiting:
         self._asked: dict[int, object] = {}
 
     def begin(self, which: int, tell: Callable[[float], None]) -> object:
-        """Call ``tell(seconds)`` every second until *which* ends, or begins again; returns what stands for it."""
+        """Call ``tell(seconds)`` every second until *which* ends or begins again; return the mark of this wait."""
         begun, mark = time.monotonic(), object()
         self._asked[which] = mark
 
