@@ -62,14 +62,14 @@ template <class L> void record_inside(Group<L> &run) {
     if (to.marks[0] >= to.instants || !(to.times[to.marks[0]] <= end || last)) return;
     const int n = run.s->cells;
     const Runs<L> kept = z;
-    z.jumping = FromBits<typename L::Marks>::of(0);
+    const bool jumps = lane(z.jumping, 0);
     run.keep_signals();
     for (int i = 0; i < n; ++i) run.spare[i] = z.q1[i], run.spare[n + i] = z.p1[i], run.spare[2 * n + i] = z.k1[i];
     for (int j = 0; j < z.channels; ++j) run.spare_channel[j] = z.channel[j];
     while (to.marks[0] < to.instants && (to.times[to.marks[0]] <= end || last) && to.marks[1] + 1 < to.samples) {
         double part = to.times[to.marks[0]] - start;
         part = part < 0.0 ? 0.0 : part > end - start ? end - start : part;
-        z.h = typename L::Number(part);
+        z.h = typename L::Number(part), z.jumping = FromBits<typename L::Marks>::of(jumps && part + 1.5 * tick >= end - start);
         run.form_flows(run.own, FromBits<typename L::Marks>::of(1u));
         z.flows = run.own;
         run.set_lengths();

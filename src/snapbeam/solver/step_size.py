@@ -28,10 +28,10 @@ _Array = NDArray[np.float64]
 _FEWEST = 30.0
 """Flight steps in a period of the first mode, at least."""
 _MOST = 2.0**17
-_PER_OCTAVE = 10
-_MARGIN = 1
-"""So many of the numbers that are tried must serve below and above the one that is taken: steps are made shorter to fit
-the cycle, and modes that come in step with the kicks spoil single lengths."""
+_PER_OCTAVE = 20
+_IN_A_ROW = 2
+"""So many of the numbers that are tried must serve, the one that is taken and those above it: steps are made shorter to
+fit the cycle, and modes that come in step with the kicks spoil single lengths."""
 _FINER = 2.0
 """Steps of sixth order that all others are compared with, over the shortest of them."""
 TRIED = 10.0
@@ -74,7 +74,7 @@ _MOST_DECAY = 1.8
 _CONTACT_SHARE = {"standard": 1.0 / 8.0, "reference": 1.0 / 32.0}
 _CONTACT_SPEED = 0.2
 _HALVINGS = {4: 4, 6: 10}
-_LONGER, _NATIVE_HALVINGS = 10.0, 3
+_LONGER, _NATIVE_HALVINGS = 5.0, 3
 _MOST_HALVINGS = {"standard": 5, "reference": 7}
 _CONTACT_TURN = math.pi
 """Maximum phase of the fastest mode in the longest contact step, rad; beyond half a turn, kicks are in resonance."""
@@ -330,11 +330,11 @@ class _Bench:
         """Fewest flight steps per period that serve, and still do with a few more of them."""
         lowest = _FEWEST
         while lowest < _MOST:
-            counts = lowest * 2.0 ** (np.arange(_PER_OCTAVE + 2 * _MARGIN + 1) / _PER_OCTAVE)
+            counts = lowest * 2.0 ** (np.arange(_PER_OCTAVE + _IN_A_ROW) / _PER_OCTAVE)
             serves = self._errors(counts) <= limit
             for first in range(_PER_OCTAVE + 1):
-                if serves[first : first + 2 * _MARGIN + 1].all():
-                    return float(counts[first + _MARGIN])
+                if serves[first : first + _IN_A_ROW].all():
+                    return float(counts[first])
             lowest *= 2.0
         return float(counts[-1])
 
