@@ -114,7 +114,7 @@ template <class L> struct Group {
             for (Number &x : one.p) x = Number(0.0);
             one.at = one.begun = one.kept = Moment<L>{Number(0.0), Number(1.0), Number(0.0), Number(0.0), Number(0.0), Number(0.0)};
             for (int &x : one.piece) x = 0;
-            one.set_length(s->composition, z.h);
+            one.acts = false, one.set_length(z.h);
         }
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
@@ -130,7 +130,7 @@ template <class L> struct Group {
             for (int i = 0; c.law == CIRCUIT && i < z.channels; ++i) c.along_M[i] = Number(0.0);
             for (int i = 0; i < problem->law_numbers; ++i) c.P[i] = Number(1.0);
             for (int i = 0; i < z.channels; ++i) c.M[i] = Number(0.0);
-            c.rest = c.offset = c.early = c.z = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
+            c.rest = c.offset = c.tip = c.tip_slope = c.early = c.z = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
             for (Number &x : c.decay) x = Number(0.0);
             c.closed = c.pressing = FromBits<Marks>::of(0), c.onset = c.safe = Real(0.0);
             c.impulse = c.work = c.lost = c.own_impulse = c.deepest = c.hardest = Number(0.0);
@@ -274,6 +274,7 @@ template <class L> struct Group {
         const Marks which = FromBits<Marks>::of(fresh);
         const int n = s->size();
         begin_signals(which, which);
+        for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].begun;
         assign(which, turned, Real(0.0));
         for (int j = 0; j < z.channels; ++j)
             if (!z.channel[j].contact) z.channel[j].active = true;
@@ -319,7 +320,7 @@ template <class L> struct Group {
     }
 
     SNAPBEAM_FN void begin_signals(Marks anchored, Marks fresh) {
-        for (int i = 0; i < z.signals; ++i) z.signal[i].begin(anchored, fresh, z.t, z.tick), z.signal[i].at = z.signal[i].begun;
+        for (int i = 0; i < z.signals; ++i) z.signal[i].begin(anchored, fresh, z.t, z.tick);
     }
 
     // --- propose --------------------------------------------------------------------------------------------------------
@@ -428,7 +429,7 @@ template <class L> struct Group {
     }
     // What signals and circuits have for the length of the step.
     SNAPBEAM_FN void set_lengths() {
-        for (int i = 0; i < z.signals; ++i) z.signal[i].set_length(s->composition, z.h);
+        for (int i = 0; i < z.signals; ++i) z.signal[i].set_length(z.h);
         for (int j = 0; j < z.channels; ++j)
             for (int f = 0; z.channel[j].circuit && f < s->composition.distinct; ++f) {
                 const Number x = z.channel[j].P[0] * z.h;
@@ -483,7 +484,7 @@ template <class L> struct Group {
         // found, which a cubic without value and slope at the beginning then takes away.
         for (int pass = c.impulsive ? 0 : 1; pass < 2; ++pass) {
             inside.begin(z, scratch);
-            for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].begun, z.signal[i].ahead(0, Number(inside.part));
+            for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].begun), z.signal[i].ahead(0, Number(inside.part));
             Real d0 = min(value(c.d0), Real(0.0)), r0 = value(c.r0);
             for (;;) {
                 const Marks within = near & (inside.share < inside.parts) & (found > Real(1.0));
@@ -514,10 +515,10 @@ template <class L> struct Group {
     }
     // While the inside of a step is followed, the signals at its end are kept.
     SNAPBEAM_FN void keep_signals() {
-        for (int i = 0; i < z.signals; ++i) z.signal[i].kept = z.signal[i].at;
+        for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].kept, z.signal[i].at);
     }
     SNAPBEAM_FN void restore_signals() {
-        for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].kept, z.signal[i].set_length(s->composition, z.h);
+        for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].kept), z.signal[i].formed = false;
     }
 
     // Open contacts that may close within the step.
@@ -568,8 +569,8 @@ template <class L> struct Group {
                 }
                 continue;
             }
-            c.d1 = penetration(z, c, z.q1);
-            c.r1 = signal_slope(z, c) - dot<L>(c.row, z.p1, n);
+            c.tip = signal_of(z, c), c.tip_slope = signal_slope(z, c);
+            c.d1 = c.offset + c.tip - along(z, c, z.q1), c.r1 = c.tip_slope - dot<L>(c.row, z.p1, n);
             touching |= any(alive & c.closed);
         }
         Real length = ticks, which = event;
@@ -633,7 +634,7 @@ template <class L> struct Group {
             }
             const Marks open = others & (!c.closed);
             // a contact without duration may rest on the tip: what rounding makes of the gap is no impact
-            const Real noise = c.impulsive ? Real(NOISE) * (abs(value(signal_slope(z, c))) + abs(r1 - value(signal_slope(z, c)))) * step * z.tick : Real(0.0);
+            const Real noise = c.impulsive ? Real(NOISE) * (abs(value(c.tip_slope)) + abs(r1 - value(c.tip_slope))) * step * z.tick : Real(0.0);
             const Marks unsafe = open & (!(z.t + ticks <= c.safe) | !(d1 <= noise));
             if (any(unsafe)) {
                 if (!have_amplitudes) amplitudes(z, amplitude), have_amplitudes = true;

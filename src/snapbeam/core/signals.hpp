@@ -5,15 +5,17 @@
 //   SWEEP    s(t) = speed/w(t) sin(integral of w), w from first to last within a duration, linear in time or exponential
 //
 // with t from the signal's own beginning.  A signal may have a window, another signal by which it is multiplied: a burst is a tone in
-// a window of pieces.  A channel adds its signals with factors.  Of a tone, sine and cosine advance with the flows of a step by
-// products that were formed once for its length, and are taken from the time again every ANCHOR steps.  At a jump of a derivative
-// a step ends, and its last kick sees the signal just before.
+// a window of pieces.  A channel adds its signals with factors.  A signal is taken to the end of a step at once, and to the kicks
+// inside only where it acts there.  Of a tone, sine and cosine advance by products that were formed once for the length of the step,
+// and are taken from the time again every ANCHOR steps.  At a jump of a derivative a step ends, and its last kick sees the signal
+// just before.
 #pragma once
 #include "structure.hpp"
 
 namespace SNAPBEAM_SET {
 
 constexpr double ANCHOR = 64.0;
+constexpr int WHOLE = MOST_DISTINCT;  // the whole step, among the flows
 
 // Where a signal is: sine and cosine of a tone; time (s), value and derivatives of the others.
 template <class L> struct Moment {
@@ -26,10 +28,11 @@ template <class L> struct Signal {
     typedef typename L::Marks Marks;
     int kind;
     const double *pieces;                                 // rows of PIECE_NUMBERS
-    const Signal *window;                                 // null: none
+    Signal *window;                                       // null: none
+    bool acts, formed;                                    // in the kicks of the step; advances over its flows are at hand
     Number p[snapbeam::SIGNAL_NUMBERS];                   // numbers, in the order of api.hpp
     Moment<L> at, begun, kept;                            // at the kick, at the beginning of the step, put aside
-    Number ahead_sine[MOST_DISTINCT], ahead_cosine[MOST_DISTINCT];  // over each flow of the step; of others than tones times
+    Number ahead_sine[WHOLE + 1], ahead_cosine[WHOLE + 1];  // over each flow of the step and all of it; of others than tones times
     int piece[L::runs];                                   // the piece at hand, at which the search begins
 
     SNAPBEAM_FN bool is_tone() const { return kind == snapbeam::TONE; }
@@ -115,8 +118,12 @@ template <class L> struct Signal {
             assign(fresh, begun.now, at.now), assign(fresh, begun.value, at.value), assign(fresh, begun.slope, at.slope), assign(fresh, begun.bend, at.bend);
         }
     }
-    SNAPBEAM_FN void set_length(const Composition &c, Number h) {
-        for (int f = 0; f < c.distinct; ++f) ahead(f, h * Number(c.flow[f]));
+    SNAPBEAM_FN void set_length(Number h) { ahead(WHOLE, h), formed = false; }
+    SNAPBEAM_FN void act(const Composition &c, Number h) {
+        acts = true;
+        for (int f = 0; f < c.distinct && !formed; ++f) ahead(f, h * Number(c.flow[f]));
+        formed = true;
+        if (window) window->act(c, h);
     }
     SNAPBEAM_FN void ahead(int f, Number time) {
         if (is_tone()) {
@@ -126,15 +133,20 @@ template <class L> struct Signal {
             ahead_sine[f] = time;
         }
     }
-    SNAPBEAM_FN void advance(int f) {
+    SNAPBEAM_FN void advance(int f) { advance_from(at, f); }
+    SNAPBEAM_FN void advance_from(const Moment<L> &from, int f) {
         if (is_tone()) {
-            const Number turned = fma(at.sine, ahead_cosine[f], at.cosine * ahead_sine[f]);
-            at.cosine = fma(at.cosine, ahead_cosine[f], -(at.sine * ahead_sine[f]));
+            const Number turned = fma(from.sine, ahead_cosine[f], from.cosine * ahead_sine[f]);
+            at.cosine = fma(from.cosine, ahead_cosine[f], -(from.sine * ahead_sine[f]));
             at.sine = turned;
         } else {
-            at.now += ahead_sine[f];
+            at.now = from.now + ahead_sine[f];
             evaluate();
         }
+    }
+    SNAPBEAM_FN void copy(Moment<L> &to, const Moment<L> &from) const {
+        to.sine = from.sine, to.cosine = from.cosine;
+        if (!is_tone()) to.now = from.now, to.value = from.value, to.slope = from.slope, to.bend = from.bend;
     }
     // Just before a jump at the end of the step.
     SNAPBEAM_FN void before_jump(Marks jumps, Real end, Real tick) {

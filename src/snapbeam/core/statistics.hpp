@@ -308,7 +308,7 @@ template <class L> struct Totals {
         Number end_u, end_v;
         if (shared) {  // from its penetration
             const Channel<L> &c = z.channel[0];
-            end_u = c.offset + signal_of(z, c) - c.d1 + rest, end_v = signal_slope(z, c) - c.r1;
+            end_u = c.offset + c.tip - c.d1 + rest, end_v = c.tip_slope - c.r1;
         } else {
             end_u = height(z, z.q1), end_v = dot<L>(row, z.p1, n);
         }

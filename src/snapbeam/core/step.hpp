@@ -56,6 +56,7 @@ template <class L> struct Channel {
     Number decay[MOST_DISTINCT]; // of it e^(-lam t) - 1 over each flow of the step
     Number early;                // of a lossy channel 2/w^2 times the integral of (w - t) f over a kick of w: f if it is constant
     Number d0, r0, d1, r1;
+    Number tip, tip_slope;       // of a contact, its signals at the end of the step
     typename L::Marks closed, pressing;  // pressing: of one with memory, beyond its yield and deeper ever
     Real onset, safe;            // tick of the onset; time until which the contact cannot close, ticks
     // increments of the step, and sums of the run
@@ -476,12 +477,13 @@ template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
     typedef typename L::Number Number;
     typedef typename L::Real Real;
     z.dissipated = Number(0.0), z.direct = true;
-    for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].begun;
+    for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].begun), z.signal[i].acts = false;
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         c.impulse = c.work = c.lost = Number(0.0), c.z = c.circuit ? c.P[c.state] : Number(0.0);
         if (c.circuit) c.follows = follows(c, j, c.P[0] * z.h);
         c.active = !c.contact || any(c.closed), z.direct &= !c.active;
+        for (int i = 0; c.active && i < c.uses; ++i) z.signal[c.signal[i]].act(z.s->composition, z.h);
         if (!(c.law == AXIAL_LOAD)) c.f = c.first_f = Number(0.0);
     }
     if (z.direct) return;
@@ -563,9 +565,14 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
     if (!circuits) flow.template take<0, true>(z, nullptr, nullptr);
     else if (circuits == 1) flow.template take<1, true>(z, &z.channel[first], nullptr);
     else flow.template take<2, true>(z, &z.channel[first], &z.channel[second]);
-    for (int i = 0; i < z.signals; ++i) z.signal[i].advance(which);
-    if (stage + 1 == s.composition.flows && any(z.jumping))
-        for (int i = 0; i < z.signals; ++i) z.signal[i].before_jump(z.jumping, z.t + z.ticks, z.tick);
+    // the end of the step has the same bits whether a signal acts inside or not
+    const bool ends = stage + 1 == s.composition.flows;
+    for (int i = 0; i < z.signals; ++i) {
+        Signal<L> &one = z.signal[i];
+        if (ends) one.advance_from(one.begun, WHOLE);
+        else if (one.acts) one.advance(which);
+        if (ends && any(z.jumping)) one.before_jump(z.jumping, z.t + z.ticks, z.tick);
+    }
 }
 
 // The whole step from q, p, k to q1, p1, k1; rows of a length that the compiler knows stay in registers.
