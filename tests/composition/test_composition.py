@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 PHYSICAL = {
     "no well": r"leave no well where a run begins",
+    "start beyond a law": r"initial_state: the displacement .* must be within the range of its law",
     "kink of a chirp": r"striker_on_base = False with a chirp",
 }
 """Refusals with a physical reason, or for data that are missing."""

@@ -242,3 +242,26 @@ def test_coulomb_friction_of_an_oscillator():
 
     truth = solve_ivp(rate, (0.0, times[-1]), [start, 0.0], "LSODA", t_eval=times, rtol=1e-11, atol=1e-15)
     np.testing.assert_allclose(found, truth.y[0], rtol=0.0, atol=1e-6 * start)
+
+
+@pytest.mark.filterwarnings("ignore:engine = 'python' is made to be read")
+@pytest.mark.parametrize("engine", ["native", "python"])
+def test_a_start_beyond_the_range_of_a_law(engine: str) -> None:
+    """One start is refused by name; of a batch those runs end at once, and the others are what they are alone."""
+    well = MODEL.well_amplitude
+    end = 1.4 * abs(float(MODEL.midspan_shape @ well))
+    spring = sb.LocalSpring(stiffness=5.0, cubic_stiffness=-5.0 / end**2, location=0.5)
+    system = sb.System(MODEL, forces=[spring], initial_state=sb.State(amplitude=-1.5 * well))
+    with pytest.raises(InputError, match=r"initial_state: the displacement .* of LocalSpring must be within"):
+        sb.simulate(system, sb.Integration(cycles=1, engine=engine))
+    inside = sb.State(amplitude=0.9 * well)
+    alone = sb.advance(system, inside, 1, integration=sb.Integration(engine=engine))
+    batch = sb.State(amplitude=np.stack((0.9 * well, -1.5 * well, 1.5 * well)))
+    found = sb.advance(system, batch, 1, integration=sb.Integration(engine=engine))
+    assert found.statistics["status"].tolist() == [
+        sb.RunStatus.OK,
+        sb.RunStatus.DIVERGED,
+        sb.RunStatus.DIVERGED,
+    ]
+    assert np.isnan(found.amplitude[1:]).all()
+    np.testing.assert_allclose(found.amplitude[0], alone.amplitude, rtol=1e-12, atol=0.0)

@@ -277,6 +277,7 @@ def make_ensemble(
     if step_factor != 1.0:
         plans = [each.scaled(step_factor) for each in plans]
     _require_clock(system, state)
+    _require_valid(system, state)
     clock = clock_of(system, columns, runs)
     table = np.zeros(runs, dtype=RUN)
     places = _places(structure, table, columns.get("contact.location", np.full(runs, 0.5)))
@@ -353,6 +354,21 @@ def _require_clock(system: System, state: State) -> None:
             f"state phase = {shown(given[(given < 0.0) | (given > _LONGEST_CLOCK)][0])}: must not be given if several "
             f"motions act; give each motion its own phase ({names})"
         )
+
+
+def _require_valid(system: System, state: State) -> None:
+    """Refuse one start at which a local force is not valid; of a batch, such runs end at once with the status DIVERGED."""
+    local = system.unloaded_potential
+    if state.batch or not system.local_forces or bool(local.holds(state.amplitude)):
+        return
+    for force in system.local_forces:
+        low, high = force.displacement_range(force.numbers)
+        u = float(force.row(system.model) @ state.amplitude)
+        if not low < u < high:
+            raise InputError(
+                f"initial_state: the displacement {u:.4g} m or rad of {type(force).__name__} must be within the range of its law, "
+                f"from {low:.4g} to {high:.4g} m or rad"
+            )
 
 
 def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Array]:

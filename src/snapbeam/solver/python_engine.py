@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -228,6 +228,7 @@ class Simulation(Records):
         sizes = (np.full(eq.n, size), np.full(eq.n, size * ensemble.scale.omega), np.full(sums.size, np.inf))
         self.atol = np.concatenate(sizes)
         """Of a step; integrals do not choose it."""
+        self.limited = [each for each, law in eq.local if law.is_limited()]
 
     def events(self) -> list[tuple[int, str, _Event]]:
         """Events that end a smooth piece: contact, event, and the function whose zero it is."""
@@ -254,18 +255,19 @@ class Simulation(Records):
                     add(j, "turn", -1.0, lambda _, v, __: v)
                 else:
                     add(j, "yield", 1.0, lambda d, _, numbers, edge=edge: d - edge(numbers))
-        for each in (each for each, law in eq.local if law.is_limited()):
-
-            def inside(t: float, s: _Array, each: Any = each) -> float:
-                u, (low, high) = (
-                    each.rest + float(each.row @ s[: eq.n]),
-                    type(each.law).owner.displacement_range(each.law),
-                )
-                return min(u - low, high - u)
-
-            inside.terminal = True  # type: ignore[attr-defined]
-            found.append((-1, "leave", inside))
+        for each in self.limited:
+            leave: Any = partial(self.space, each)
+            leave.terminal = True
+            found.append((-1, "leave", leave))
         return found
+
+    def space(self, each: Any, _: float, s: _Array) -> float:
+        """Distance of a local force's displacement from the nearest end of its law's range; negative outside."""
+        u, (low, high) = (
+            each.rest + float(each.row @ s[: self.eq.n]),
+            type(each.law).owner.displacement_range(each.law),
+        )
+        return min(u - low, high - u)
 
     def happened(self, j: int, what: str) -> None:
         """Change the state of a contact after an event."""
@@ -293,6 +295,8 @@ class Simulation(Records):
         """Integrate to the end; q, p and contact times at the *stops*."""
         kept, losses = [], slice(self.s.size - len(self.eq.circuits), None)
         early, turns = self.s[losses].copy(), np.arange(self.cycle, self.end, self.cycle)
+        if not all(self.space(each, self.t, self.s) > 0.0 for each in self.limited):
+            self.found["status"] = RunStatus.DIVERGED
         cuts = {self.late, self.end, *stops, *self.eq.breaks, *turns.tolist()}
         for until in sorted(at for at in cuts if 0.0 < at <= self.end):
             try:
