@@ -13,6 +13,16 @@ def integrate(
 ) -> None:
     """Integrate runs; writes into the arrays of *batch*."""
 
+def integrate_tangents(
+    problem: Mapping[str, Any],
+    batch: Mapping[str, Any],
+    tangent: Mapping[str, Any],
+    set: str,
+    threads: int,
+    progress: Callable[[int, int], object] | None,
+) -> None:
+    """Integrate runs with derivatives along so many directions; writes into the arrays of *batch* and *tangent*."""
+
 def record(
     problem: Mapping[str, Any], batch: Mapping[str, Any], recorder: Mapping[str, Any], layout: str, set: str
 ) -> None:
@@ -32,5 +42,6 @@ LOSSY: list[int]
 """Numbers of the laws whose force depends on a velocity."""
 RUN_NUMBERS: int
 """Numbers of a run, statistics of a run, and sums of a channel: the lengths of rows."""
+DIRECTIONS: int
 STATISTICS: int
 OF_CHANNEL: int

@@ -1,15 +1,11 @@
-"""Derivatives of maps by central differences, and what is said where there is none."""
+"""Derivatives of maps by central differences."""
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import pytest
-from tests.dynamics.doubles import henon
 
-import snapbeam as sb
-from snapbeam.simulation.advance import differences
+from snapbeam.util.differences import differences
 
 
 def test_a_smooth_map_is_exact_to_rounding() -> None:
@@ -45,32 +41,3 @@ def test_neighbours_with_other_impacts_have_no_derivative() -> None:
 
     _, error = differences(image, np.array([[0.0, 1.0]]), np.eye(2)[None])
     assert error[0].tolist() == [np.inf, pytest.approx(0.0, abs=1e-8)]
-
-
-class Grazing:
-    """A map that says that its tangents are not known in some runs."""
-
-    def __init__(self, error: float) -> None:
-        self._map, self._error = henon(), error
-        self.smooth, self.dimension, self.period = True, 2, 1.0
-
-    def advance(self, states, periods=1, *, tangents=None, every=False, points=None):
-        found = self._map.advance(states, periods, tangents=tangents, every=every, points=points)
-        found.statistics["tangent_error"] = np.full(len(found.states), self._error)
-        return found
-
-    def neighbour(self, name, value):
-        return self
-
-    def value(self, name):
-        return 0.0
-
-
-def test_exponents_tell_of_grazing_periods() -> None:
-    with pytest.warns(UserWarning, match="impacts graze in 100.0 % of the periods"):
-        found = sb.dynamics.lyapunov_spectrum(Grazing(np.inf), 2, 40, transient=10, states=[[0.1, 0.1]])
-    assert "dynamics.grazing_periods" in found.attrs["diagnostics"]
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        found = sb.dynamics.lyapunov_spectrum(Grazing(1e-8), 2, 40, transient=10, states=[[0.1, 0.1]])
-    assert found.attrs["diagnostics"] == "[]"

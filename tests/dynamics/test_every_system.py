@@ -12,7 +12,7 @@ import snapbeam as sb
 from snapbeam.dynamics.flow import Stroboscope
 from snapbeam.dynamics.periodic_orbits import Family, OrbitNotFoundError, jacobian
 from snapbeam.model import default_values as paper
-from snapbeam.simulation.advance import _by_differences
+from snapbeam.util.differences import differences
 
 PRECISE = sb.Integration(accuracy="reference")
 SINE = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.05)
@@ -142,15 +142,44 @@ def test_all_exponents_add_up_to_the_losses() -> None:
     assert float(found["exponent"].sum()) == pytest.approx(-contraction(system), rel=1e-5)
 
 
-def test_differences_agree_with_the_tangent_flow() -> None:
-    system = system_of()
-    begun = sb.advance(system, periods=7, integration=PRECISE).flat()
-    tangents = np.random.default_rng(2).normal(size=(1, 3, 2, 2)) * np.array([[1.0], [500.0]])
-    moved = sb.advance(system, begun, tangent=tangents, integration=PRECISE).tangent
-    found, error = _by_differences(system, begun, 1.0, tangents, PRECISE)
+PARTS: dict[str, dict[str, Any]] = {
+    "hertz": {},
+    "power": {"law": sb.PowerLaw(force_at_1um=1.0, exponent=1.4)},
+    "kelvin_voigt": {"law": sb.KelvinVoigt(2e5, 3.0)},
+    "hunt_crossley": {"law": sb.HuntCrossley(4e8, 1.0)},
+    "plastic": {"law": sb.ElasticPlasticContact(loading_stiffness=2e5, unloading_stiffness=8e5)},
+    "newton": {"law": sb.Restitution(0.7)},
+    "body": {"striker": BODY},
+    "circuits": {"harvesters": [PIEZO, COIL]},
+    "spring": {"forces": [SPRING]},
+    "magnet": {"forces": [sb.MagneticForce(strength=2e-9, gap=2e-3, location=0.4)]},
+    "drag": {"forces": [sb.QuadraticDamping(coefficient=0.3, location=0.4)]},
+    "friction": {"forces": [sb.CoulombFriction(friction_force=2e-3, smoothing_velocity=0.02, location=0.45)]},
+    "force": {"forces": [sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.3, amplitude=0.02), location=0.4)]},
+    "base": {"base_excitation": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=1.3, acceleration_amplitude=0.2))},
+    "load": {"axial_load": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=1.3, amplitude=1.0))},
+    "whole": WHOLE,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_tangents_are_differences_between_neighbours(name: str) -> None:
+    """Of every coordinate, through impacts: releases, yields, jumps of forces and of velocities."""
+    drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.2)
+    flow = Stroboscope(system_of(**({"drive": drive, "modes": 1 if name == "newton" else 2} | PARTS[name])), PRECISE)
+    x = settled(flow)[None]
+    while not (came := flow.advance(x)).statistics["impacts"][0]:
+        x = came.states
+
+    def advance_rows(rows: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        beside = flow.advance(rows)
+        return beside.states, beside.statistics["impacts"]
+
+    came = flow.advance(x, tangents=np.eye(flow.dimension)[None])
+    found, error = differences(advance_rows, x, np.eye(flow.dimension)[None])
     assert error.max() < 1e-6
-    scale = np.abs(moved).max(axis=(0, 1, 3))[:, None]
-    assert found / scale == pytest.approx(moved / scale, abs=1e-6)
+    assert came.tangents is not None
+    np.testing.assert_allclose(came.tangents, found, rtol=0.0, atol=1e-6 * np.abs(found).max())
 
 
 @pytest.mark.slow

@@ -89,6 +89,19 @@ struct Recorder {
     long budget;                  // steps of a call
 };
 
+// Derivatives along DIRECTIONS at a time: of the initial state, of the numbers of channels and signals; and of the output states.
+constexpr int DIRECTIONS = 8;
+struct Tangent {
+    const double *q, *p;          // (runs, DIRECTIONS, modes)
+    const double *numbers;        // (runs, DIRECTIONS, channels, law_numbers)
+    const double *laws;           // (runs, DIRECTIONS, channels): of the states of laws
+    const double *offset, *rest;  // (runs, DIRECTIONS, channels)
+    const double *rows;           // (runs, DIRECTIONS, channels, modes)
+    const double *signals;        // (runs, DIRECTIONS, signals, SIGNAL_NUMBERS)
+    const double *end;            // (runs, DIRECTIONS): of the time of the end, s
+    double *states;               // (runs, outputs, DIRECTIONS, 2 modes + channels): q, p, states of laws
+};
+
 struct Batch {
     int runs;
     const double *run;            // (runs, RUN_NUMBERS)
@@ -113,6 +126,7 @@ struct Batch {
     int *next;                    // the next run, shared by threads
     int *done;                    // runs that ended
     Recorder *recorder;           // null: nothing is recorded
+    const Tangent *tangent;       // null: no derivatives
 };
 
 typedef void (*Kernel)(const Problem &, const Batch &);

@@ -25,6 +25,7 @@ typename L::Number pressed_by(const Runs<L> &z, const Channel<L> &c, const typen
 template <class L> void hit(Group<L> &runs, int number, typename L::Marks on);
 template <class L> void jumped_velocity(Group<L> &runs, typename L::Marks which);
 template <class L> void hold_together(Group<L> &runs, Channel<L> &c);
+template <int K> void move_in_time(Group<Tangents<K>> &runs, Dual<K> later);
 
 // What a channel does at the end of a step.
 template <class L> struct Event {
@@ -105,7 +106,7 @@ template <class L> struct Group {
         Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &contact_step, &halvings,
                          &most_steps, &stretch, &stretch_at_rest, &calm, &energy, &lowest, &jump, &turned, &z.t, &z.ticks};
         for (Real *x : zeros) *x = Real(0.0);
-        z.tick = z.sign = z.parts = Real(1.0), z.h = z.gq = z.qr = z.along_g = z.along_r = Number(0.0), z.next_gq = Cell(0.0);
+        z.tick = z.sign = z.parts = Real(1.0), z.h = z.drift = z.gq = z.qr = z.along_g = z.along_r = Number(0.0), z.next_gq = Cell(0.0);
         z.flows = own;
         for (int i = 0; i < z.signals; ++i) {
             Signal<L> &one = z.signal[i];
@@ -175,7 +176,7 @@ template <class L> struct Group {
         const int taken = __atomic_fetch_add(batch->next, 1, __ATOMIC_RELAXED);
         const bool there = taken < batch->runs;
         set_lane(alive, l, there), set_lane(again, l, false), set_lane(landing, l, false);
-        set_lane(z.h, l, 0.0), set_lane(ticks, l, 0.0), set_lane(key, l, -1.0);
+        set_lane(z.h, l, 0.0), set_lane(z.drift, l, 0.0), set_lane(ticks, l, 0.0), set_lane(key, l, -1.0);
         for (int j = 0; j < z.channels && !there; ++j)  // nothing of a user is called for it
             for (int k = 0; k < problem->law_numbers && of_user(z.channel[j].law); ++k) set_lane(z.channel[j].P[k], l, 0.0);
         if (!there) return false;
@@ -216,6 +217,7 @@ template <class L> struct Group {
             for (Number *x : zeros) set_lane(*x, l, 0.0);
             set_lane(c.safe, l, 0.0), set_lane(c.onset, l, 0.0), set_lane(c.closed, l, false), set_lane(c.pressing, l, false);
         }
+        if constexpr (L::directions > 0) seed(i);
         const double *observed = batch->rows + long(row_of[z.channels]) * modes;
         totals.load(*batch, i, l, observed, rest[z.channels]);
         advance_jump(l);
@@ -237,6 +239,39 @@ template <class L> struct Group {
             length = next, next = after;
         }
         return true;
+    }
+
+    // Derivatives of what run i begins with.
+    void seed(int i) requires(L::directions > 0) {
+        const snapbeam::Tangent &t = *batch->tangent;
+        const int modes = problem->modes, channels = z.channels, numbers = problem->law_numbers;
+        for (int k = 0; k < L::directions; ++k) {
+            const long row = long(i) * L::directions + k;
+            for (int m = 0; m < modes; ++m) z.q[s->place[m]].d.set(k, t.q[row * modes + m]), z.p[s->place[m]].d.set(k, t.p[row * modes + m]);
+            for (int j = 0; j < channels; ++j) {
+                Channel<L> &c = z.channel[j];
+                const long of = row * channels + j;
+                for (int x = 0; x < numbers && !of_user(c.law); ++x) c.P[x].d.set(k, t.numbers[of * numbers + x]);
+                for (int x = User::OWN; x < numbers && of_user(c.law); ++x) c.P[x].d.set(k, t.numbers[of * numbers + x]);
+                if (c.state >= 0) c.P[c.state].d.set(k, t.laws[of]);
+                c.rest.d.set(k, t.rest[of]), c.offset.d.set(k, t.offset[of] - (c.memory ? lane(c.P[c.state].d, k) : 0.0));
+                for (int m = 0; m < modes; ++m) c.row[s->place[m]].d.set(k, t.rows[of * modes + m]);
+            }
+            for (int x = 0; x < z.signals; ++x)
+                for (int y = 0; y < snapbeam::SIGNAL_NUMBERS; ++y) z.signal[x].p[y].d.set(k, t.signals[(row * z.signals + x) * snapbeam::SIGNAL_NUMBERS + y]);
+        }
+        for (int j = 0; j < channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            for (int x = 0; x < channels; ++x) c.M[x] = dot<L>(c.row, z.channel[x].row, s->size());
+            for (int x = 0; c.circuit && x < channels; ++x) c.along_M[x] = Number(0.0);
+            for (int m = 0; c.circuit && m < s->size(); ++m) {
+                const Number omega2 = Number(s->omega[m] * s->omega[m]), D = c.P[0] * c.P[0] - Number(2.0 * s->sigma[m]) * c.P[0] + omega2;
+                const Number t = value(c.row[m]) != 0.0 ? c.row[m] / D : Number(0.0);
+                c.along_q[m] = t * omega2, c.along_p[m] = t * c.P[0];
+                for (int x = 0; x < channels && value(c.row[m]) != 0.0; ++x)
+                    c.along_M[x] = value(D) > 0.0 ? c.along_M[x] + c.along_p[m] * z.channel[x].row[m] : Number(INFINITY);
+            }
+        }
     }
 
     // What carries a circuit of run l along with the beam.
@@ -320,7 +355,7 @@ template <class L> struct Group {
     }
 
     SNAPBEAM_FN void begin_signals(Marks anchored, Marks fresh) {
-        for (int i = 0; i < z.signals; ++i) z.signal[i].begin(anchored, fresh, z.t, z.tick);
+        for (int i = 0; i < z.signals; ++i) z.signal[i].begin(anchored, fresh, z.t, z.tick, z.drift);
     }
 
     // --- propose --------------------------------------------------------------------------------------------------------
@@ -551,27 +586,47 @@ template <class L> struct Group {
         return open & (((!clear) & (!unreachable)) | (d1 > Real(0.0)));
     }
 
-    SNAPBEAM_FN void inspect() {
-        const int n = s->size();
-        Marks redo = FromBits<Marks>::of(0), broken = FromBits<Marks>::of(0), pulled = FromBits<Marks>::of(0);
+    // Gaps at the end of the step.
+    SNAPBEAM_FN bool end_of_contacts() {
         bool touching = false;
         for (int j = 0; j < z.channels; ++j) hold_together(*this, z.channel[j]);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
-            if (!c.contact) {  // out of the range in which a law is valid
-                if (c.circuit) c.r1 = select(c.follows, Number(0.0), -fma(c.P[0], c.z, dot<L>(c.row, z.p1, n)));
-                if (!c.timed) {
-                    const Number u = along(z, c, z.q1);
-                    const Number low_end = with_law(c.law, [&](auto law) { return law.low(c.P); });
-                    const Number high_end = with_law(c.law, [&](auto law) { return law.high(c.P); });
-                    const Marks out = !((u > low_end) & (u < high_end));
-                    broken = broken | out, pulled = pulled | (out & (value(c.first_f * (u - c.rest)) > Real(0.0)));
-                }
-                continue;
-            }
+            if (c.circuit) c.r1 = select(c.follows, Number(0.0), -fma(c.P[0], c.z, dot<L>(c.row, z.p1, s->size())));
+            if (!c.contact) continue;
             c.tip = signal_of(z, c), c.tip_slope = signal_slope(z, c);
-            c.d1 = c.offset + c.tip - along(z, c, z.q1), c.r1 = c.tip_slope - dot<L>(c.row, z.p1, n);
+            c.d1 = c.offset + c.tip - along(z, c, z.q1), c.r1 = c.tip_slope - dot<L>(c.row, z.p1, s->size());
             touching |= any(alive & c.closed);
+        }
+        return touching;
+    }
+    // A step that ends where a contact opens, closes or yields, with the derivatives of that time.
+    void follow_event() requires(L::directions > 0) {
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            const bool yields = c.memory && events[j].force && !c.pressing;
+            if (!c.contact || !(events[j].flip || yields)) continue;
+            const Number gap = yields ? c.d1 - yield_of(c) : c.d1;
+            z.h = Number(value(z.h), Pack<L::directions>(-1.0 / value(c.r1)) * gap.d);
+            set_lengths();
+            take_step(z);
+            end_of_contacts();
+            z.drift += z.h - Number(value(z.h)), key = -1.0;
+            return;
+        }
+    }
+
+    SNAPBEAM_FN void inspect() {
+        Marks redo = FromBits<Marks>::of(0), broken = FromBits<Marks>::of(0), pulled = FromBits<Marks>::of(0);
+        const bool touching = end_of_contacts();
+        for (int j = 0; j < z.channels; ++j) {  // out of the range in which a law is valid
+            Channel<L> &c = z.channel[j];
+            if (c.contact || c.timed) continue;
+            const Number u = along(z, c, z.q1);
+            const Number low_end = with_law(c.law, [&](auto law) { return law.low(c.P); });
+            const Number high_end = with_law(c.law, [&](auto law) { return law.high(c.P); });
+            const Marks out = !((u > low_end) & (u < high_end));
+            broken = broken | out, pulled = pulled | (out & (value(c.first_f * (u - c.rest)) > Real(0.0)));
         }
         Real length = ticks, which = event;
         bool have_amplitudes = false;
@@ -674,6 +729,7 @@ template <class L> struct Group {
         if (!any(ok)) return;
         const int n = s->size();
         bool was_touching = false;
+        if constexpr (L::directions > 0) follow_event();
         if (batch->recorder) {
             record_inside(*this);
             for (int j = 0; j < z.channels; ++j) was_touching |= z.channel[j].contact && lane(z.channel[j].closed, 0);
@@ -689,10 +745,12 @@ template <class L> struct Group {
         z.t = select(ok, z.t + ticks, z.t), turned += select(ok, Real(1.0), Real(0.0));
         for (int i = 0; i < z.signals; ++i) assign(ok, z.signal[i].begun.sine, z.signal[i].at.sine), assign(ok, z.signal[i].begun.cosine, z.signal[i].at.cosine);
         const Marks jumped = ok & (!(z.t < jump));
+        if constexpr (L::directions > 0)
+            if (jumped) move_in_time(*this, -z.drift);
         if (any(jumped)) {
             for (int l = 0; l < L::runs; ++l)
                 if (lane(jumped, l)) advance_jump(l);
-            for (int i = 0; i < z.signals; ++i) z.signal[i].begin(FromBits<Marks>::of(0), jumped, z.t, z.tick), z.signal[i].at = z.signal[i].begun;
+            for (int i = 0; i < z.signals; ++i) z.signal[i].begin(FromBits<Marks>::of(0), jumped, z.t, z.tick, z.drift), z.signal[i].at = z.signal[i].begun;
         }
         assign(ok, stretch, Real(value(fma(Number(2.0), z.gq, z.qr))));
         Marks changed = FromBits<Marks>::of(0);
@@ -738,6 +796,11 @@ template <class L> struct Group {
         if (any(changed)) {
             assign(changed, energy, totals.energy(z, true, true));
             for (int j = 0; j < z.channels; ++j) assign(changed, z.channel[j].safe, z.t);
+        }
+        if constexpr (L::directions > 0) {
+            bool held = false;
+            for (int j = 0; j < z.channels; ++j) held |= z.channel[j].contact && z.channel[j].closed;
+            if (!held || z.t >= min(limit, end)) move_in_time(*this, -z.drift);
         }
         totals.add_modes(z, ok, value(z.h));
         if (batch->recorder) record_end(*this, was_touching);
@@ -818,6 +881,22 @@ template <class L> struct Group {
             to[2 * modes + 1 + j] = lane(Marks(acting(c)), l) ? lane(z.t, l) - lane(c.onset, l) : -1.0;
             to[2 * modes + 1 + z.channels + j] = c.state < 0 ? 0.0 : lane(value(c.P[c.state]), l);
         }
+        if constexpr (L::directions > 0) write_tangents();
+    }
+    // Derivatives of an output, whose time may move; after its state was written.
+    void write_tangents() requires(L::directions > 0) {
+        const int modes = problem->modes, width = 2 * modes + z.channels;
+        const long first = (long(run[0]) * batch->outputs + output[0] - 1) * L::directions;
+        const double share = lane(z.t, 0) / lane(end, 0);
+        Number later = Number(0.0);
+        for (int k = 0; k < L::directions; ++k) later.d.set(k, share * batch->tangent->end[long(run[0]) * L::directions + k]);
+        move_in_time(*this, later);
+        for (int k = 0; k < L::directions; ++k) {
+            double *to = batch->tangent->states + (first + k) * width;
+            for (int m = 0; m < modes; ++m) to[m] = lane(z.q[s->place[m]].d, k), to[modes + m] = lane(z.p[s->place[m]].d, k);
+            for (int j = 0; j < z.channels; ++j) to[2 * modes + j] = z.channel[j].state < 0 ? 0.0 : lane(z.channel[j].P[z.channel[j].state].d, k);
+        }
+        move_in_time(*this, -later);
     }
 
     void finish(int l, int status) {

@@ -17,23 +17,40 @@ namespace SNAPBEAM_SET {
 
 constexpr double SOON = 0.05, NO_HEIGHT = 1e-4;  // rest of a chatter over the shortest period; heights over LOWEST that are none
 
+// Force of a channel at a state; of one that is held together that of the last kick.
+template <class L> typename L::Number force_of(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p) {
+    if (c.law == AXIAL_LOAD || (c.contact && !any(acting(c)))) return typename L::Number(0.0);
+    if (c.timed) return signal_of(z, c);
+    if (c.impulsive) return select(acting(c), c.f, typename L::Number(0.0));
+    const auto x = c.contact ? penetration(z, c, q) : along(z, c, q), v = dot<L>(c.row, p, z.s->size());
+    return c.circuit ? x : force_at(c, x, c.contact ? signal_slope(z, c) - v : v);
+}
 // Force that holds a contact together at a state, times M: what its row lacks of the acceleration of the tip.
 template <class L>
 typename L::Number pressed_by(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p, const typename L::Cell *k) {
-    const int n = z.s->size();
-    typename L::Number a = dot<L>(c.row, k, n) + linear_acceleration(*z.s, c.row, q, p);
-    for (int j = 0; j < z.channels; ++j) {
-        const Channel<L> &other = z.channel[j];
-        if (&other == &c || other.law == AXIAL_LOAD || (other.contact && !any(acting(other)))) continue;
-        typename L::Number f;
-        if (other.timed) f = signal_of(z, other);
-        else {
-            const auto x = other.contact ? penetration(z, other, q) : along(z, other, q), v = dot<L>(other.row, p, n);
-            f = other.circuit ? x : other.impulsive ? select(acting(other), other.f, typename L::Number(0.0)) : force_at(other, x, other.contact ? signal_slope(z, other) - v : v);
-        }
-        a = fma(c.M[j], f, a);
-    }
+    typename L::Number a = dot<L>(c.row, k, z.s->size()) + linear_acceleration(*z.s, c.row, q, p);
+    for (int j = 0; j < z.channels; ++j)
+        if (&z.channel[j] != &c) a = fma(c.M[j], force_of(z, z.channel[j], q, p), a);
     return signal_bend(z, c) - a;
+}
+
+// The derivatives of the state become those of a state so much later.
+template <int K> void move_in_time(Group<Tangents<K>> &runs, Dual<K> later) {
+    typedef Tangents<K> L;
+    Runs<L> &z = runs.z;
+    const Structure<L> &s = *z.s;
+    double *rate = runs.scratch;
+    for (int i = 0; i < s.size(); ++i) rate[i] = z.k[i].v - s.omega[i] * s.omega[i] * z.q[i].v - 2.0 * s.sigma[i] * z.p[i].v;
+    for (int j = 0; j < z.channels; ++j) {
+        Channel<L> &c = z.channel[j];
+        const double f = force_of(z, c, z.q, z.p).v;
+        for (int i = 0; i < s.size(); ++i) rate[i] += c.row[i].v * f;
+        if (c.circuit) c.P[c.state] -= Dual<K>(dot<L>(c.row, z.p, s.size()).v + c.P[0].v * c.P[c.state].v) * later;
+    }
+    for (int i = 0; i < s.size(); ++i) z.q[i] += Dual<K>(z.p[i].v) * later, z.p[i] += Dual<K>(rate[i]) * later;
+    for (int i = 0; i < z.signals; ++i) z.signal[i].move_in_time(later);
+    z.drift += later;
+    tension_at(z, z.q, z.k);
 }
 
 // Impacts of contact *number*, where its gap closes at the rate r0.
@@ -44,7 +61,7 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
     Runs<L> &z = runs.z;
     Channel<L> &c = z.channel[number];
     const int n = z.s->size();
-    const Number zero = Number(0.0), M = c.M[number], r = c.r0, away = c.P[0] * r, tip = signal_slope(z, c), bounce = select(on, (r + away) / M, zero);
+    const Number zero = Number(0.0), M = c.M[number], tip = signal_slope(z, c), r = c.r0, away = c.P[0] * r, bounce = select(on, (r + away) / M, zero);
     for (int i = 0; i < n; ++i) z.p[i] = fma(typename L::Cell(bounce), c.row[i], z.p[i]);
     const Number pressed = pressed_by(z, c, z.q, z.p, z.k);
     const Number height = Number(0.5) * away * away / max(pressed, Number(1e-300)), lasts = Number(2.0) * away / max(pressed * (Number(1.0) - c.P[0]), Number(1e-300));
@@ -77,6 +94,7 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
     }
     assign(stays, c.onset, z.t);
     c.closed = c.closed | stays, c.pressing = c.closed;
+    c.f = select(stays, pressed_by(z, c, z.q, z.p, z.k) / M, c.f);
 }
 
 // After impacts: rates of all contacts and circuits, and what is observed.

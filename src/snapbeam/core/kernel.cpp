@@ -18,7 +18,9 @@ void modes_side_by_side(const Problem &problem, const Batch &batch) {
     if (halves(problem, 32)) integrate<ModeLanes<SNAPBEAM_WIDTH, 32 / SNAPBEAM_WIDTH>>(problem, batch);
     else integrate<ModeLanes<SNAPBEAM_WIDTH>>(problem, batch);
 }
-#else
+#elif SNAPBEAM_LAYOUT == 2
 void run_by_run(const Problem &problem, const Batch &batch) { integrate<Thread<>>(problem, batch); }
+#else
+void run_with_tangents(const Problem &problem, const Batch &batch) { integrate<Tangents<snapbeam::DIRECTIONS>>(problem, batch); }
 #endif
 }  // namespace SNAPBEAM_SET

@@ -20,7 +20,7 @@
 // the contact turns back from beyond yield(P); then it grows to grown(x, P), and so does what x is measured from.  An impulsive
 // contact lasts no time, or is held together by the force that this takes (impact.hpp).
 #pragma once
-#include "number.hpp"
+#include "dual.hpp"
 
 namespace SNAPBEAM_SET {
 
@@ -114,7 +114,11 @@ struct KelvinVoigt : ContactLaw<2> {  // f = k d + c d'
 struct ElasticPlastic : ContactLaw<3> {
     static int state(const double *) { return 2; }
     static constexpr bool memory = true;
-    template <class T> static SNAPBEAM_FN T force(T d, T, const T *P) { return min(P[0] * (d + P[2]), P[1] * d); }
+    // y > 0: it is known to yield, y < 0: it is known to be elastic, so that derivatives are right where both are equal
+    template <class T> static SNAPBEAM_FN T force(T d, T y, const T *P) {
+        const T yields = P[0] * (d + P[2]), elastic = P[1] * d;
+        return select(y > T(0.0), yields, select(y < T(0.0), elastic, min(yields, elastic)));
+    }
     template <class T> static SNAPBEAM_FN T yield(const T *P) {
         const T stiffer = P[1] - P[0];
         return select(stiffer > T(0.0), P[2] * P[0] / max(stiffer, T(1e-300)), T(INFINITY));
@@ -256,6 +260,25 @@ struct User {
             for (int i = 0; i < OWN + int(lane(P[COUNT], l)); ++i) own[i] = lane(P[i], l);
             found.set(l, f(lane(x, l), lane(y, l), own));
         }
+        return found;
+    }
+    // Derivatives by differences.
+    template <int K, class F> static __attribute__((noinline)) Dual<K> each(const Dual<K> &x, const Dual<K> &y, const Dual<K> *P, F f) {
+        const int count = OWN + int(P[COUNT].v);
+        double own[MOST], u = x.v, v = y.v;
+        for (int i = 0; i < count; ++i) own[i] = P[i].v;
+        Dual<K> found(f(u, v, own));
+        const auto along = [&](double &at, const Pack<K> &d) {
+            if (!any(differ(d, Pack<K>(0.0)))) return;
+            const double kept = at, h = 1e-6 * max(abs(kept), 1e-9);
+            at = kept + h;
+            const double above = f(u, v, own);
+            at = kept - h;
+            found.d += Pack<K>((above - f(u, v, own)) / (2.0 * h)) * d;
+            at = kept;
+        };
+        along(u, x.d), along(v, y.d);
+        for (int i = OWN; i < count; ++i) along(own[i], P[i].d);
         return found;
     }
 };

@@ -4,12 +4,13 @@
 //   RunLanes      W runs        W runs        double        W runs side by side, a cell a mode
 //   ModeLanes     double        W modes       W modes       one run, its modes side by side
 //   Thread        double        double        double        one run; a lane of RunLanes has the same bits
+//   Tangents      Dual          Dual          double        one run with derivatives (dual.hpp)
 //
 // Number and Cell may carry derivatives; Real and Plain are the same without them.  Tables, bounds, times and counters are Real.
 // FIXED is a number of cells that the compiler knows, of two blocks of equal size if it is more than 1; 0: it does not.
 // *together* runs (or packs of them) take turns, a stage each, so that the processor always has work that does not wait.
 #pragma once
-#include "number.hpp"
+#include "dual.hpp"
 
 namespace SNAPBEAM_SET {
 
@@ -20,7 +21,7 @@ template <int W, int FIXED = 0> struct RunLanes {
     typedef Pack<W> Plain;
     typedef double Coef;
     typedef Mask<W> Marks;
-    static constexpr int runs = W, lanes = 1, fixed = FIXED, together = 1;
+    static constexpr int runs = W, lanes = 1, fixed = FIXED, together = 1, directions = 0;
     static SNAPBEAM_FN Number total(Cell x) { return x; }
     static SNAPBEAM_FN void totals(Cell a, Cell b, Number &of_a, Number &of_b) { of_a = a, of_b = b; }
     static SNAPBEAM_FN Cell mode(const Cell *row, int i) { return row[i]; }
@@ -33,7 +34,7 @@ template <int W, int FIXED = 0> struct ModeLanes {
     typedef Pack<W> Plain;
     typedef Pack<W> Coef;
     typedef bool Marks;
-    static constexpr int runs = 1, lanes = W, fixed = FIXED, together = 2;
+    static constexpr int runs = 1, lanes = W, fixed = FIXED, together = 2, directions = 0;
     static SNAPBEAM_FN double total(Cell x) {
 #if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
         if constexpr (W == 8) {
@@ -79,7 +80,7 @@ template <int FIXED = 0> struct Thread {
     typedef double Plain;
     typedef double Coef;
     typedef bool Marks;
-    static constexpr int runs = 1, lanes = 1, fixed = FIXED, together = 1;
+    static constexpr int runs = 1, lanes = 1, fixed = FIXED, together = 1, directions = 0;
     static SNAPBEAM_FN double total(double x) { return x; }
     static SNAPBEAM_FN void totals(double a, double b, double &of_a, double &of_b) { of_a = a, of_b = b; }
     static SNAPBEAM_FN double mode(const double *row, int i) { return row[i]; }

@@ -37,12 +37,13 @@ using snapbeam::Recorder;
     void runs_side_by_side(const Problem &, const Batch &);          \
     void modes_side_by_side(const Problem &, const Batch &);         \
     void run_by_run(const Problem &, const Batch &);                 \
+    void run_with_tangents(const Problem &, const Batch &);          \
     }
 SNAPBEAM_FOR_SETS(SNAPBEAM_KERNELS)
 
 struct Set {
     const char *name;
-    snapbeam::Kernel layouts[3];
+    snapbeam::Kernel layouts[3], tangents;
 };
 
 static bool present(const std::string &set) {
@@ -68,7 +69,7 @@ static bool present(const std::string &set) {
 static std::vector<Set> sets() {  // that this build and this processor have, best first
     std::vector<Set> found;
 #define SNAPBEAM_SET_OF(NAME) \
-    if (present(#NAME)) found.push_back({#NAME, {NAME::runs_side_by_side, NAME::modes_side_by_side, NAME::run_by_run}});
+    if (present(#NAME)) found.push_back({#NAME, {NAME::runs_side_by_side, NAME::modes_side_by_side, NAME::run_by_run}, NAME::run_with_tangents});
     SNAPBEAM_FOR_SETS(SNAPBEAM_SET_OF)
     return found;
 }
@@ -344,6 +345,29 @@ static void integrate(nb::dict problem, nb::dict batch, const std::string &layou
     in_threads(threads < b.runs ? threads : b.runs, shared, b.runs, progress, [&] { with_python(p, [&] { kernel(p, b); }); });
 }
 
+static void integrate_tangents(nb::dict problem, nb::dict batch, nb::dict tangent, const std::string &set, int threads, nb::object progress) {
+    using namespace snapbeam;
+    Arguments of_problem(problem, "problem"), of_batch(batch, "batch"), a(tangent, "tangent");
+    Shared shared;
+    const Problem p = problem_of(of_problem);
+    Batch b = batch_of(of_batch, p, shared);
+    if (threads < 1 || threads > 4096) throw nb::value_error("threads: must be 1 to 4096");
+    const size_t runs = size_t(b.runs), n = size_t(p.modes), channels = size_t(p.channels), K = DIRECTIONS;
+    Tangent t{};
+    t.q = a.array<double>("q", {runs, K, n}), t.p = a.array<double>("p", {runs, K, n});
+    t.numbers = a.array<double>("numbers", {runs, K, channels, size_t(p.law_numbers)});
+    t.offset = a.array<double>("offset", {runs, K, channels}), t.rest = a.array<double>("rest", {runs, K, channels});
+    t.laws = a.array<double>("laws", {runs, K, channels});
+    t.rows = a.array<double>("rows", {runs, K, channels, n});
+    t.signals = a.array<double>("signals", {runs, K, size_t(p.signals), SIGNAL_NUMBERS});
+    t.end = a.array<double>("end", {runs, K});
+    t.states = a.array<double, true>("states", {runs, size_t(b.outputs), K, 2 * n + channels}, false);
+    b.tangent = &t;
+    const std::vector<Set> have = sets();
+    const Kernel kernel = set_named(set, have).tangents;
+    in_threads(threads < b.runs ? threads : b.runs, shared, b.runs, progress, [&] { with_python(p, [&] { kernel(p, b); }); });
+}
+
 static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const std::string &layout, const std::string &set) {
     using namespace snapbeam;
     Arguments of_problem(problem, "problem"), of_batch(batch, "batch"), of_recorder(recorder, "recorder");
@@ -418,6 +442,8 @@ NB_MODULE(_core, m) {
     }
     m.attr("COMPOSITIONS") = compositions;
     m.def("integrate", &integrate, nb::arg("problem"), nb::arg("batch"), nb::arg("layout"), nb::arg("set"), nb::arg("threads"), nb::arg("progress").none());
+    m.attr("DIRECTIONS") = int(snapbeam::DIRECTIONS);
+    m.def("integrate_tangents", &integrate_tangents, nb::arg("problem"), nb::arg("batch"), nb::arg("tangent"), nb::arg("set"), nb::arg("threads"), nb::arg("progress").none());
     m.def("record", &record, nb::arg("problem"), nb::arg("batch"), nb::arg("recorder"), nb::arg("layout"), nb::arg("set"));
     m.def("law_values", &law_values, nb::arg("law"), nb::arg("arrays"));
     m.def("instruction_sets", [] {

@@ -65,55 +65,66 @@ template <class L> struct Signal {
 
     // Value and derivatives of others than tones at at.now.
     SNAPBEAM_FN void evaluate() {
-        for (int l = 0; l < L::runs; ++l) {
-            double found[3];
-            if (kind == snapbeam::PIECES) of_pieces(l, lane(at.now, l), found);
-            else of_sweep(l, lane(at.now, l), found);
-            set_lane(at.value, l, found[0]), set_lane(at.slope, l, found[1]), set_lane(at.bend, l, found[2]);
+        if constexpr (L::directions > 0) {
+            evaluate(0, at.now, p, at.value, at.slope, at.bend);
+        } else {
+            for (int l = 0; l < L::runs; ++l) {
+                double own[snapbeam::SIGNAL_NUMBERS], value, slope, bend;
+                for (int k = 0; k <= snapbeam::EXPONENTIAL; ++k) own[k] = lane(p[k], l);
+                evaluate(l, lane(at.now, l), own, value, slope, bend);
+                set_lane(at.value, l, value), set_lane(at.slope, l, slope), set_lane(at.bend, l, bend);
+            }
         }
     }
-    SNAPBEAM_FN void of_pieces(int l, double t, double *found) {
+    template <class T> SNAPBEAM_FN void evaluate(int l, T t, const T *own, T &value, T &slope, T &bend) {
+        if (kind == snapbeam::PIECES) of_pieces(l, t, own, value, slope, bend);
+        else of_sweep(t, own, value, slope, bend);
+    }
+    template <class T> SNAPBEAM_FN void of_pieces(int l, T t, const T *own, T &value, T &slope, T &bend) {
         using namespace snapbeam;
-        const double *rows = pieces + long(lane(p[FIRST_PIECE], l)) * PIECE_NUMBERS, gain = lane(p[GAIN], l);
-        const int count = int(lane(p[PIECE_COUNT], l));
+        const double *rows = pieces + long(lane(own[FIRST_PIECE], 0)) * PIECE_NUMBERS, at = lane(t, 0);
+        const int count = int(lane(own[PIECE_COUNT], 0));
         int &i = piece[l];
         if (i >= count) i = 0;
-        while (i + 1 < count && t >= rows[(i + 1) * PIECE_NUMBERS]) ++i;
-        while (i > 0 && t < rows[i * PIECE_NUMBERS]) --i;
-        const double *c = rows + i * PIECE_NUMBERS + 1, x = t - c[-1];
-        double value = c[5], slope = 0.0, bend = 0.0;
-        for (int k = 4; k >= 0; --k) bend = fma(bend, x, slope), slope = fma(slope, x, value), value = fma(value, x, c[k]);
-        found[0] = gain * value, found[1] = gain * slope, found[2] = 2.0 * gain * bend;
+        while (i + 1 < count && at >= rows[(i + 1) * PIECE_NUMBERS]) ++i;
+        while (i > 0 && at < rows[i * PIECE_NUMBERS]) --i;
+        const double *c = rows + i * PIECE_NUMBERS + 1;
+        const T x = t - T(c[-1]), gain = own[GAIN];
+        value = T(c[5]), slope = bend = T(0.0);
+        for (int k = 4; k >= 0; --k) bend = fma(bend, x, slope), slope = fma(slope, x, value), value = fma(value, x, T(c[k]));
+        value = gain * value, slope = gain * slope, bend = T(2.0) * gain * bend;
     }
-    SNAPBEAM_FN void of_sweep(int l, double t, double *found) const {
+    template <class T> SNAPBEAM_FN static void of_sweep(T t, const T *own, T &value, T &slope, T &bend) {
         using namespace snapbeam;
-        const double first = lane(p[FIRST_RATE], l), last = lane(p[LAST_RATE], l), duration = lane(p[DURATION], l), speed = lane(p[SPEED], l);
-        const double s = t < duration ? t : duration;
-        double now, angle, change, bend = 0.0;
-        if (lane(p[EXPONENTIAL], l) != 0.0 && last != first) {
-            const double grows = ::log(last / first) / duration;
-            now = first * ::exp(grows * s), angle = (now - first) / grows, change = grows * now, bend = grows * change;
+        const T first = own[FIRST_RATE], last = own[LAST_RATE], duration = own[DURATION], speed = own[SPEED], s = min(t, duration);
+        T now, angle, change, curve = T(0.0);
+        if (lane(own[EXPONENTIAL], 0) != 0.0 && differ(last, first)) {
+            const T grows = log(last / first) / duration;
+            now = first * exp(grows * s), angle = (now - first) / grows, change = grows * now, curve = grows * change;
         } else {
-            change = (last - first) / duration, now = first + change * s, angle = s * (first + 0.5 * change * s);
+            change = (last - first) / duration, now = first + change * s, angle = s * (first + T(0.5) * change * s);
         }
-        angle += last * (t - s);
-        if (!(t < duration)) now = last, change = bend = 0.0;
-        const Turn<double> of = turn(angle - 6.283185307179586 * ::floor(angle / 6.283185307179586));
-        const double a = speed / now, falls = -a * change / now, curves = a * (2.0 * change * change / (now * now) - bend / now);
-        found[0] = a * of.sine, found[1] = speed * of.cosine + falls * of.sine;
-        found[2] = (curves - a * now * now) * of.sine + (2.0 * falls * now + a * change) * of.cosine;
+        angle = angle + last * (t - s);
+        if (!(t < duration)) now = last, change = curve = T(0.0);
+        const Turn<T> of = turn(angle - T(6.283185307179586 * ::floor(lane(angle, 0) / 6.283185307179586)));
+        const T a = speed / now, falls = -a * change / now, curves = a * (T(2.0) * change * change / (now * now) - curve / now);
+        value = a * of.sine, slope = speed * of.cosine + falls * of.sine;
+        bend = (curves - a * now * now) * of.sine + (T(2.0) * falls * now + a * change) * of.cosine;
     }
 
     // The beginning of a step at *t* ticks: of a tone where it is anchored, of others where the step is a new one.
-    SNAPBEAM_FN void begin(Marks anchored, Marks fresh, Real t, Real tick) {
+    SNAPBEAM_FN void begin(Marks anchored, Marks fresh, Real t, Real tick, Number late) {
         using namespace snapbeam;
         if (is_tone()) {
             if (!any(anchored)) return;
             const Real wrapped = select(value(p[PERIOD]) > Real(0.0), remainder(t, max(value(p[PERIOD]), Real(1.0))), t);
-            const Turn<Number> now = turn(Number(fma(p[RATE], Number(wrapped * tick), p[PHASE])));
+            Number angle = fma(p[RATE], Number(wrapped * tick), p[PHASE]);
+            if constexpr (L::directions > 0) angle += fma(p[RATE], late, Number((t - wrapped) * tick) * (p[RATE] - Number(value(p[RATE]))));
+            const Turn<Number> now = turn(angle);
             assign(anchored, begun.sine, now.sine), assign(anchored, begun.cosine, now.cosine);
         } else if (any(fresh)) {
             at.now = fma(Number(t), Number(tick), p[SHIFT]);
+            if constexpr (L::directions > 0) at.now += late;
             evaluate();
             assign(fresh, begun.now, at.now), assign(fresh, begun.value, at.value), assign(fresh, begun.slope, at.slope), assign(fresh, begun.bend, at.bend);
         }
@@ -148,6 +159,14 @@ template <class L> struct Signal {
         to.sine = from.sine, to.cosine = from.cosine;
         if (!is_tone()) to.now = from.now, to.value = from.value, to.slope = from.slope, to.bend = from.bend;
     }
+    // The derivatives are those of a time so much later.
+    static SNAPBEAM_FN void move_in_time(Moment<L> &m, Number rate, Number later) requires(L::directions > 0) {
+        const Number sine = m.sine;
+        const double turned = rate.v;
+        m.sine += Number(turned * m.cosine.v) * later, m.cosine -= Number(turned * sine.v) * later;
+        m.now += later, m.value += Number(m.slope.v) * later, m.slope += Number(m.bend.v) * later;
+    }
+    SNAPBEAM_FN void move_in_time(Number later) requires(L::directions > 0) { move_in_time(at, p[snapbeam::RATE], later), move_in_time(begun, p[snapbeam::RATE], later); }
     // Just before a jump at the end of the step.
     SNAPBEAM_FN void before_jump(Marks jumps, Real end, Real tick) {
         if (is_tone()) return;

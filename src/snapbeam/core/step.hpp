@@ -81,7 +81,7 @@ template <class L> struct Runs {
     Real t, tick, sign;                   // sign: +1 about the first well, -1 about its mirror image
     Real ticks, parts;                    // length of the step; parts in which it is followed inside
     typename L::Marks jumping;            // the step ends at a jump of a signal
-    Number h;                             // s
+    Number h, drift;                      // s; drift has the value 0, and derivatives where the times of events have
     Cell next_gq;                         // cells of g.q after a flow
     Number gq, qr, along_g, along_r, dissipated;
     bool account;
@@ -438,6 +438,7 @@ template <class L> struct Flow {
     Cell by_g, by_r, weight;
     bool first;
     int which;
+    Number longer;  // derivatives of its time
 
     template <int CIRCUITS, bool MODES> SNAPBEAM_FN void take(Runs<L> &z, Channel<L> *one, Channel<L> *other) const {
         const Structure<L> &s = *z.s;
@@ -447,7 +448,11 @@ template <class L> struct Flow {
         Cell before = Cell(0.0), after = Cell(0.0), gq = Cell(0.0), carried[2] = {Cell(0.0), Cell(0.0)}, moved[2] = {Cell(0.0), Cell(0.0)};
         for (int i = 0; i < n; ++i, a += 4) {
             const Cell q = from_q[i], p = first ? fma(weight, from_k[i], from_p[i]) : fma(by_g, s.g[i], fma(by_r, z.r[i], from_p[i]));
-            const Cell dq = fma(a[0], q, a[1] * p), q1 = q + dq, dp = fma(a[3], p, a[2] * q), p1 = p + dp;
+            Cell dq = fma(a[0], q, a[1] * p), dp = fma(a[3], p, a[2] * q), q1 = q + dq, p1 = p + dp;
+            if constexpr (L::directions > 0) {  // of a flow that lasts longer
+                const Cell more_q = Cell(p1.v) * longer, more_p = Cell(-s.omega[i] * s.omega[i] * q1.v - 2.0 * s.sigma[i] * p1.v) * longer;
+                dq += more_q, dp += more_p, q1 += more_q, p1 += more_p;
+            }
             for (int k = 0; k < CIRCUITS; ++k) {
                 const Cell by_q = circuit[k]->along_q[i], by_p = circuit[k]->along_p[i];
                 carried[k] = fma(by_q, q, fma(by_p, p, carried[k])), moved[k] = fma(by_q, dq, fma(by_p, dp, moved[k]));
@@ -521,7 +526,7 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
             }
         } else {
             c.x = c.contact ? penetration(z, c, z.q1) : along(z, c, z.q1);
-            if (!c.lossy) c.f = force_at(c, c.x, Number(0.0));
+            if (!c.lossy) c.f = force_at(c, c.x, c.memory ? select(c.pressing, Number(1.0), Number(-1.0)) : Number(0.0));
             if (c.circuit) c.f = c.early = steady_force(c), c.lost = fma(w * c.P[0] * c.f, c.f, c.lost);
         }
     }
@@ -556,7 +561,7 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
     }
     const bool direct = stage == 0 && z.direct;
     const Cell *from_q = direct ? z.q : z.q1, *from_p = direct ? z.p : z.p1, *from_k = direct ? z.k : z.k1;
-    const Flow<L> flow = {a, from_q, from_p, from_k, by_g, by_r, weight, stage == 0, which};
+    const Flow<L> flow = {a, from_q, from_p, from_k, by_g, by_r, weight, stage == 0, which, Number(s.composition.flow[which]) * (z.h - Number(value(z.h)))};
     int circuits = 0, first = z.channels, second = z.channels;
     for (int j = 0; j < z.channels; ++j)
         if (z.channel[j].circuit && circuits++ < 2) (circuits == 1 ? first : second) = j;

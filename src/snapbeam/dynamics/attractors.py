@@ -529,7 +529,7 @@ def _chaotic(
     orbits: list[PeriodicOrbit],
 ) -> tuple[list[Attractor], list[NDArray[np.int64]]]:
     """Groups of runs that never repeat, those of them that last and diverge."""
-    if not which.size or not (flow.smooth or isinstance(flow, Stroboscope)):
+    if not which.size or not flow.smooth:
         return [], []
     later = flow.advance(flow.advance(seen.states[which], lasts), 2 * most + 62, every=True)
     assert later.every is not None

@@ -268,7 +268,7 @@ class _Curve:
         flow, names = self.plane.flow, self.plane.names
         if (
             not isinstance(flow, Stroboscope)
-            or flow.smooth
+            or not flow.jumps
             or any(flow.system.parameter(name).name.endswith(".phase") for name in names)
         ):
             return self, point

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.flow import Flow, Stroboscope, dimensionless, fixed_parameters
+from snapbeam.dynamics.flow import Flow, Stroboscope, dimensionless, fixed_parameters, jumps
 from snapbeam.dynamics.periodic_orbits import (
     Corrector,
     Family,
@@ -560,7 +560,7 @@ def _follow(
                 raise OrbitNotFoundError("the next orbit is too far away, or on another branch")
             if over is None and not limit[0] <= spot.y[-1] <= limit[1]:
                 raise OrbitNotFoundError("the corrected orbit is beyond the limit")
-            if not corrector.family.flow.smooth and spot.came.impacts != last.came.impacts:
+            if jumps(corrector.family.flow) and spot.came.impacts != last.came.impacts:
                 raise OrbitNotFoundError("another number of impacts: it grazes")
         except OrbitNotFoundError as error:
             length *= 0.5

@@ -24,11 +24,13 @@ from snapbeam.model.parameters import lookup, ratio_of
 from snapbeam.model.quantity import split_name
 from snapbeam.model.state import FIELDS, OWN_FIELDS, State, amplitude_scale
 from snapbeam.model.system import System
-from snapbeam.simulation.advance import advance, differences, tangent_obstacle
+from snapbeam.simulation.advance import advance
 from snapbeam.simulation.request import cycle_of
 from snapbeam.simulation.states import states_of
-from snapbeam.solver.assemble import cycles_of, make_ensemble, phases_of, plans_of, run_columns
+from snapbeam.solver import native
+from snapbeam.solver.assemble import cycles_of, make_ensemble, modal_of, phases_of, plans_of, run_columns
 from snapbeam.solver.engines import engine_of
+from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_start
 from snapbeam.util.provenance import canonical_json
@@ -422,8 +424,16 @@ class Stroboscope:
 
     @property
     def smooth(self) -> bool:
-        """True if the forces are continuous and depend on displacements alone, so that the map has derivatives everywhere."""
-        return tangent_obstacle(self.system) is None
+        """True: tangents are exact."""
+        return True
+
+    @property
+    def jumps(self) -> bool:
+        """True if the derivatives of the map may jump, by a contact force that does, depends on the velocity or has a memory."""
+        laws = [each.law for each in self.system.contacts]
+        return any(
+            law.is_dissipative or not (law.properties.smooth and law.properties.tangent) for law in laws
+        )
 
     @property
     def refined(self) -> Stroboscope:
@@ -577,7 +587,7 @@ class Stroboscope:
         """
         from snapbeam.simulation.simulate import simulate
 
-        if self.smooth or self.system.striker is None:
+        if not self.jumps or self.system.striker is None:
             return None
         cycles, cycle = periods * self.cycles_per_period, cycle_of(self.system)
         integration = self.integration.replace(cycles=cycles, early_termination=False)
@@ -617,9 +627,12 @@ class Stroboscope:
         points: Mapping[str, _Array] | None = None,
     ) -> AdvancedStates:
         """Advance as :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
-        if tangents is not None:
-            return self._advance_with_differences(states, periods, tangents, every, points)
         begun = states.hidden if isinstance(states, AdvancedStates) else self._begun(states)
+        if tangents is not None and periods > 1:  # along this motion, not along one with finer steps that leaves it
+            came = self.advance(states, periods, every=True, points=points)
+            for start in (begun, *(came.hidden_every or ())[:-1]):
+                tangents = self._advance_part(start, 1, False, points, tangents).tangents
+            return replace(came, tangents=tangents) if every else replace(came, tangents=tangents, every=None, hidden_every=None)
         count, size = begun.batch[0], 2 * 8 * (self.modes + 16)
         share = max(1, _BYTES // (size * periods * self.cycles_per_period))
         parts = [slice(at, min(at + share, count)) for at in range(0, count, share)]
@@ -629,43 +642,11 @@ class Stroboscope:
                 periods,
                 every,
                 None if points is None else {name: values[part] for name, values in points.items()},
+                None if tangents is None else tangents[part],
             )
             for part in parts
         ]
         return found[0] if len(found) == 1 else _joined(found)
-
-    def _advance_with_differences(
-        self,
-        states: ArrayLike | AdvancedStates,
-        periods: int,
-        tangents: _Array,
-        every: bool,
-        points: Mapping[str, _Array] | None,
-    ) -> AdvancedStates:
-        """Advance as :meth:`advance`, with tangents by differences between neighbours, of all periods at once."""
-        came = self.advance(states, periods, every=True, points=points)
-        assert came.every is not None
-        begun = states.states if isinstance(states, AdvancedStates) else _rows(states)
-        count, size = begun.shape
-        x = np.concatenate((begun[:, None], came.every[:, :-1]), axis=1).reshape(-1, size)
-
-        def advance_rows(rows: _Array, which: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
-            own = None if points is None else {name: each[which // periods] for name, each in points.items()}
-            beside = self.advance(rows, points=own)
-            return beside.states, None if self.smooth else beside.statistics["impacts"]
-
-        given = tangents if periods == 1 else np.tile(np.eye(size), (count * periods, 1, 1))
-        found, doubt = differences(advance_rows, x, given)
-        error = doubt.reshape(count, -1).max(axis=1)
-        if periods > 1:
-            for slope in found.reshape(count, periods, size, size).swapaxes(0, 1):
-                tangents = tangents @ slope
-        else:
-            tangents = found
-        tangents[~np.isfinite(came.states).all(axis=1)] = np.nan
-        if not every:
-            came = replace(came, every=None, hidden_every=None)
-        return replace(came, tangents=tangents, statistics={**came.statistics, "tangent_error": error})
 
     def _begun(self, states: ArrayLike) -> State:
         rows = _rows(states)
@@ -691,6 +672,7 @@ class Stroboscope:
         periods: int,
         every: bool,
         points: Mapping[str, _Array] | None,
+        tangents: _Array | None,
     ) -> AdvancedStates:
         lost = None if begun.statistics is None else ~np.isin(begun.statistics["status"], _REACHED)
         for name in points or ():
@@ -747,11 +729,29 @@ class Stroboscope:
         return AdvancedStates(
             last,
             whole,
-            None,
+            None if tangents is None else self._moved(ensemble, tangents, failed),
             statistics_of(ensemble, output_states.accumulators_of_runs),
             after(-1),
             tuple(after(index) for index in ends) if every else None,
         )
+
+    def _moved(self, ensemble: Ensemble, tangents: _Array, failed: NDArray[np.bool_]) -> _Array:
+        """Small changes of shape (runs, k, d) of the coordinates at the end of runs, NaN of those that failed."""
+        structure, full, n = ensemble.structure, np.diag(self.scales), self.modes
+        units = np.array([each.unit for each in ensemble.circuits] or [1.0])
+        along = State(
+            amplitude=structure.equilibrium + full[:, :n],
+            velocity=full[:, n : 2 * n],
+            **self._own_arrays(full),
+        )
+        modal = modal_of(structure, along, units)
+        q, p = native.tangents(
+            ensemble, tangents @ modal[:, 0], tangents @ modal[:, 1], self.integration.threads
+        )
+        one, none = np.ones(q.shape[:2], np.int64), np.zeros_like(q)
+        found: _Array = self._rows(ensemble, q, p, one) - self._rows(ensemble, none, none, one)
+        found[failed] = np.nan
+        return found
 
     def _require_period(self, own: Mapping[str, _Array]) -> None:
         """Refuse parameters of runs with which the motions have a common period of another number of cycles."""
@@ -838,6 +838,11 @@ def flow_of(
     if integration is not None:
         raise InputTypeError("integration: is for a System; a Flow brings its own")
     return system
+
+
+def jumps(flow: Flow) -> bool:
+    """Return whether the derivatives of a map may jump between orbits with other numbers of impacts."""
+    return flow.jumps if isinstance(flow, Stroboscope) else not flow.smooth
 
 
 TIME_CONSTANTS = 16.0

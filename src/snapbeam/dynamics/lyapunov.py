@@ -38,10 +38,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _Array = NDArray[np.float64]
-_DOUBTFUL = 1e-3
-"""Relative error of tangents by differences beyond which their growth in a period is in doubt."""
-_RARE = 0.01
-"""Share of such periods that is not reported."""
 _BLOCKS = 20
 """Means of as many stretches tell the standard error."""
 _TOGETHER = 64
@@ -118,7 +114,7 @@ def lyapunov_spectrum(
     count = integer("k", k, 1, flow.dimension)
     total = integer("periods", periods, _BLOCKS, 10**7)
     before, rule = _transient(flow, transient, 0)
-    if not (flow.smooth or isinstance(flow, Stroboscope)):
+    if not flow.smooth:
         raise InputError(
             "system: the flow advances no tangents; use largest_lyapunov for the largest exponent"
         )
@@ -129,7 +125,6 @@ def lyapunov_spectrum(
     runs = advanced.states.shape[0]
     frame = np.tile(np.eye(flow.dimension)[:count], (runs, 1, 1))
     growth, crossed = np.empty((total, runs, count)), np.zeros((total, runs), dtype=bool)
-    doubtful = np.zeros((total, runs), dtype=bool)
     report = counting(progress, "Lyapunov spectrum", "periods")
     together = max(1, _TOGETHER // runs)
     done = 0
@@ -138,20 +133,17 @@ def lyapunov_spectrum(
         if some == 1:
             advanced = flow.advance(advanced, 1, tangents=frame, points=columns)
             frame, growth[done] = _orthogonal(advanced.tangents)
-            crossed[done], doubtful[done] = _crossed(advanced), _doubtful(advanced)
+            crossed[done] = _crossed(advanced)
         else:
             ahead = flow.advance(advanced, some, every=True, points=columns)
             for i, found in enumerate(_derivatives(flow, advanced.beginnings(ahead), columns, some), done):
                 frame, growth[i] = _orthogonal(frame @ np.asarray(found.tangents))
-                crossed[i], doubtful[i] = _crossed(found), _doubtful(found)
+                crossed[i] = _crossed(found)
             advanced = ahead
         done += some
         if report is not None:
             report(done, total)
     dataset = _dataset(flow, growth, crossed, points, before)
-    diagnostics = _grazing(float(doubtful.mean()))
-    tell(diagnostics)
-    dataset.attrs["diagnostics"] = to_json(diagnostics)
     dataset.attrs["termination_reason"] = _stopped(total, before, rule)
     return dataset
 
@@ -207,22 +199,6 @@ def _derivatives(
         )
         for part in parts
     ]
-
-
-def _doubtful(advanced: AdvancedStates) -> NDArray[np.bool_] | bool:
-    """True where the tangents of the period are differences across a grazing impact; a lost run has none."""
-    found = advanced.statistics.get("tangent_error")
-    return False if found is None else (found > _DOUBTFUL) & np.isfinite(advanced.states).all(axis=1)
-
-
-def _grazing(share: float) -> tuple[Diagnostic, ...]:
-    if share <= _RARE:
-        return ()
-    message = (
-        f"impacts graze in {100.0 * share:.1f} % of the periods, in which the derivative of the map is not known; compare the "
-        "largest exponent with largest_lyapunov"
-    )
-    return (Diagnostic("dynamics.grazing_periods", message, {"share": share}),)
 
 
 def _crossed(advanced: AdvancedStates) -> NDArray[np.bool_] | bool:

@@ -14,10 +14,10 @@ from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, fixed_para
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
-from snapbeam.simulation.advance import differences
 from snapbeam.simulation.run import Run
 from snapbeam.simulation.simulate import simulate
 from snapbeam.util.cores import usable_cores
+from snapbeam.util.differences import differences
 from snapbeam.util.display import plotter
 from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import (
@@ -594,7 +594,7 @@ def periodic_orbit(
     iterations: int = 40,
     deflate: Sequence[PeriodicOrbit] = (),
 ) -> PeriodicOrbit:
-    """Find the periodic orbit near a state, stable or not, by Newton shooting with tangents by differences.
+    """Find the periodic orbit near a state, stable or not, by Newton shooting with exact tangents.
 
     The tip's mid-position is fixed in space, where it is at the system's start.  Solves P^m(x) = x for the map P over
     one period of the drive.
@@ -818,7 +818,7 @@ class Corrector:
         flow, name = self.family.flow, self.family.name
         if (
             not isinstance(flow, Stroboscope)
-            or flow.smooth
+            or not flow.jumps
             or name is None
             or flow.system.parameter(name).name.endswith(".phase")
         ):

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.integration import Integration
-from snapbeam.model.state import FIELDS, ModalState, State, amplitude_scale
+from snapbeam.model.state import FIELDS, ModalState, State
 from snapbeam.model.system import System
 from snapbeam.simulation.request import require_motion
 from snapbeam.simulation.states import states_of
+from snapbeam.solver import native
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.engines import engine_of
 from snapbeam.solver.ensemble import Ensemble
@@ -58,8 +59,9 @@ def advance(
         without an excitation, periods of the first mode.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitudes (m^0.5) and velocities (m^0.5/s): k of them for each state, or the same k for all.  They
-        are advanced by central differences of order six between neighbouring states.  Strikers with mass, indentations and circuits
-        begin unchanged, and their own changes are not returned.
+        are advanced exactly, by the derivatives of every step and of the times of events, with finer steps at both ends of a
+        contact; where a law of one's own acts, by differences of its functions.  Strikers with mass, indentations and circuits begin
+        unchanged, and their own changes are not returned.
     integration : Integration, optional
         Solver settings.  The states are advanced for *periods*, without early termination.
     save_every_period : bool
@@ -72,8 +74,7 @@ def advance(
     -------
     State
         The advanced state, with its ``statistics``, in the shape of the batch, and its ``tangent`` if *tangent* was
-        given; of differences ``statistics["tangent_error"]`` is the relative error, infinite where neighbouring runs have other
-        numbers of impacts.  A contact that has not ended does not count as an impact.  If a state could not be reached,
+        given.  A contact that has not ended does not count as an impact.  If a state could not be reached,
         ``statistics["status"]`` gives the reason, and its numbers are NaN.
 
     Examples
@@ -106,6 +107,10 @@ def advance(
         raise InputError(
             f"state of {state.modes} modes: must have the {system.model.modes} modes of the model"
         )
+    if tangent is not None and integration.engine == "python":
+        raise InputError(
+            "tangent with engine = 'python': must be left out; engine = 'native' has derivatives"
+        )
     if save_every_period and not float(span).is_integer():
         raise InputError(f"periods = {span:g} with save_every_period = True: must be an integer")
     flat = state.flat()
@@ -114,113 +119,35 @@ def advance(
             f"tolerance = {integration.tolerance:g}: applies to simulate; give step, or accuracy = 'reference'"
         )
     ensemble = make_ensemble(system, integration.replace(early_termination=False), start=flat, periods=span)
-    vectors, doubt = None, {}
+    vectors = None
     ends = engine_of(ensemble).integrate_with_output_states(ensemble, integration.threads, report)
     if tangent is not None:
-        # neighbours strike where the tip of this run is
-        fixed = replace(flat, striker_position=_states(ensemble, ends, False)[0].striker_position)
-        moved, error = _by_differences(system, fixed, span, _checked_tangent(tangent, flat), integration)
-        doubt["tangent_error"] = error.max(axis=1)
-        moved[~np.isin(ends.accumulators_of_runs["status"], _REACHED)] = np.nan
-        vectors = moved.reshape((*state.batch, *moved.shape[1:]))
+        given = _checked_tangent(tangent, flat)
+        reached = np.isin(ends.accumulators_of_runs["status"], _REACHED)
+        given[~reached] = np.nan
+        if reached.any():
+            given[reached] = _tangents(system, flat[reached], span, given[reached], integration)
+        vectors = given.reshape((*state.batch, *given.shape[1:]))
     found = _states(ensemble, ends, save_every_period)
     passed = statistics_of(ensemble, ends.accumulators_of_runs)
-    kept = {name: passed[name] for name in _STATISTICS} | doubt
+    kept = {name: passed[name] for name in _STATISTICS}
     return _shaped(found, state.batch, save_every_period, kept, vectors)
 
 
-def tangent_obstacle(system: System) -> str | None:
-    """The part by which the derivatives of the map may jump; None without one."""
-    laws = [each.law for each in system.contacts]
-    if any(law.is_dissipative or not (law.properties.smooth and law.properties.tangent) for law in laws):
-        return "a contact force that jumps, depends on the velocity or has a memory"
-    if any(each.striker.mass is not None for each in system.contacts):
-        return "a striker with a mass"
-    if system.local_forces:
-        return "a local force"
-    return "a harvester" if system.harvesters else None
-
-
-_STENCIL = np.array(((3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0), (2.0 / 3.0, -1.0 / 12.0, 0.0)))
-"""Weights of central differences of order six and four, over one, two and three steps."""
-_STEP = 2e-4
-"""Initial step, in units of the well's amplitude."""
-_SHRINKINGS = 7
-"""Times that it is quartered at most."""
-_CLOSE = 1e-8
-"""Difference of the two orders, over the derivative, with which a step is short enough."""
-
-
-def differences(
-    advance_rows: Callable[[_Array, NDArray[np.intp]], tuple[_Array, _Array | None]],
-    x: _Array,
-    directions: _Array,
-) -> tuple[_Array, _Array]:
-    """Directional derivatives of a map by central differences of order six.
-
-    Parameters
-    ----------
-    advance_rows : callable
-        Takes states of shape (n, d) and the run that each belongs to; returns their images and their numbers of impacts.
-    x : array of shape (runs, d)
-        States.
-    directions : array of shape (runs, k, d)
-
-    Returns
-    -------
-    derivatives : array of shape (runs, k, m)
-        Of the m numbers of an image.
-    error : array of shape (runs, k)
-        Estimated error over the norm of the derivative; infinite where neighbours at any distance have other numbers of impacts.
-    """
-    length = np.linalg.norm(directions, axis=-1, keepdims=True)
-    unit = np.divide(directions, length, out=np.zeros_like(directions), where=length > 0.0)
-    found, error = np.empty((*directions.shape[:2], 0)), np.full(directions.shape[:2], np.inf)
-    left, step = np.indices(error.shape).reshape(2, -1), _STEP
-    for _ in range(_SHRINKINGS):
-        moves = np.stack([sign * k * step * unit[*left] for k in (1, 2, 3) for sign in (1.0, -1.0)], axis=1)
-        images, impacts = advance_rows(
-            (x[left[0], None] + moves).reshape(-1, x.shape[1]), np.repeat(left[0], 6)
-        )
-        table = images.reshape(left.shape[1], 3, 2, -1)
-        six, four = np.einsum("os,psd->opd", _STENCIL, table[:, :, 0] - table[:, :, 1]) / step
-        doubt = np.linalg.norm(six - four, axis=-1) / np.maximum(np.linalg.norm(six, axis=-1), 1e-300)
-        doubt[~np.isfinite(doubt)] = np.inf
-        if impacts is not None:
-            hits = impacts.reshape(-1, 6)
-            doubt[(hits != hits[:, :1]).any(axis=1)] = np.inf
-        if not found.size:
-            found = six.reshape(*error.shape, -1).copy()
-        better = doubt < error[*left]
-        found[*left[:, better]], error[*left[:, better]] = six[better], doubt[better]
-        left, step = left[:, error[*left] > _CLOSE], 0.25 * step
-        if not left.size:
-            break
-    return found * length, error
-
-
-def _by_differences(
-    system: System, begun: State, periods: float, tangents: _Array, integration: Integration
-) -> tuple[_Array, _Array]:
-    """Tangents of shape (runs, k, 2, N) some periods on, between neighbours of the states *begun*, and their errors."""
-    size = amplitude_scale(system.model)
-    scales = np.array([size, size * 2.0 * np.pi * system.model.reference_frequency])[:, None]
-    smooth = tangent_obstacle(system) is None
-
-    def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
-        alpha, velocity = np.moveaxis(rows.reshape(len(rows), 2, begun.modes) * scales, 1, 0)
-        beside = replace(
-            begun[runs], amplitude=alpha, velocity=velocity, contact_time=np.array(np.nan),
-            tangent=None, statistics=None, modal=None,
-        )  # fmt: skip
-        end = advance(system, beside, periods, integration=integration)
-        assert end.statistics is not None
-        images = np.stack((end.amplitude, end.velocity), axis=1) / scales
-        return images.reshape(rows.shape), None if smooth else end.statistics["impacts"]
-
-    x = (np.stack((begun.amplitude, begun.velocity), axis=1) / scales).reshape(begun.batch[0], -1)
-    moved, error = differences(advance_rows, x, (tangents / scales).reshape(*tangents.shape[:2], -1))
-    return moved.reshape(tangents.shape) * scales, error
+def _tangents(system: System, begun: State, span: float, tangents: _Array, integration: Integration) -> _Array:
+    """Tangents of shape (runs, k, 2, N) some periods on, period by period: their own steps are finer than those of the motion."""
+    modes, how = system.model.linear_modes, integration.replace(early_termination=False)
+    while span > 0.0:
+        part = min(span, 1.0)
+        ensemble = make_ensemble(system, how, start=begun, periods=part)
+        rest = ensemble.structure.equilibrium
+        pairs = [ensemble.structure.to_modal(rest + each, each) for each in np.eye(begun.modes)]
+        q, p = (tangents[:, :, i] @ np.array([pair[i] for pair in pairs]) for i in (0, 1))
+        moved = np.stack(native.tangents(ensemble, q, p, integration.threads), axis=2)
+        tangents, span = moved[..., : begun.modes] @ modes.T, span - part
+        if span > 0.0:
+            begun = advance(system, begun, part, integration=integration)
+    return tangents
 
 
 def _checked_tangent(tangent: ArrayLike, flat: State) -> _Array:

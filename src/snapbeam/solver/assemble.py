@@ -580,16 +580,14 @@ def _starts(structure: Structure, table: NDArray[Any], state: State, since: _Arr
     if modal is not None and modal.structure == structure.hash:
         table["well_sign"] = modal.well_sign
         return np.stack((modal.q, modal.p), axis=1)
-    parts = (
-        flat.amplitude,
-        flat.velocity,
-        flat.striker_shift,
-        flat.striker_rate,
-        flat.indentation,
-        _per_unit(flat.circuit, units),
-    )
-    pairs = [structure.to_modal(*each) for each in zip(*parts, strict=True)]
-    return np.array(pairs)
+    return modal_of(structure, flat, units)
+
+
+def modal_of(structure: Structure, flat: State, units: _Array) -> _Array:
+    """q and p of each state of a batch about the first well, shape (runs, 2, N); *units* of the circuits."""
+    circuit = _per_unit(flat.circuit, units)
+    parts = (flat.amplitude, flat.velocity, flat.striker_shift, flat.striker_rate, flat.indentation, circuit)
+    return np.array([structure.to_modal(*each) for each in zip(*parts, strict=True)])
 
 
 def _offsets(

@@ -38,6 +38,7 @@ from snapbeam.solver.statistics import (
 )
 from snapbeam.solver.step_size import PARTS, TRIED, barrier_of, composition_of
 from snapbeam.solver.user_laws import updates_of
+from snapbeam.util.cores import usable_cores
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
@@ -78,6 +79,8 @@ _FINER = 16
 """Halvings of a tick, at most: events lie on ticks."""
 _STEEP = 7
 """Further halvings of the shortest step where a force grows without bound."""
+_GRADED = 6
+"""The same where derivatives are wanted: at both ends of a contact that of the force is a root, whose integral errs by h^1.5."""
 _SAMPLES, _IMPACTS, _BUDGET = 20_000, 4096, 200_000
 """Room for samples and impacts, and steps, of one piece of a recorded run."""
 
@@ -92,7 +95,7 @@ def layout_of(ensemble: Ensemble) -> str:
 class _Arrays:
     """An ensemble as the arrays of the core."""
 
-    def __init__(self, ensemble: Ensemble) -> None:
+    def __init__(self, ensemble: Ensemble, graded: int = 0) -> None:
         channels, structure = ensemble.channels, ensemble.structure
         assert channels is not None
         self.ensemble, self.channels = ensemble, channels
@@ -108,6 +111,7 @@ class _Arrays:
         sizes = np.bincount(label, minlength=count).astype(np.int32)
         n, modes = kept.size, structure.equilibrium.size
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
+        halvings += graded
         if np.isin(channels.laws, STEEP).any() or any(each.limited for each in channels.of_user):
             halvings += _STEEP  # near a magnet or an electrode
         lossy = bool(np.isin(channels.laws, _core.LOSSY).any())
@@ -219,6 +223,16 @@ class _Arrays:
             q[..., mode] = laws[..., contact]
         return q, p
 
+    def laws_of(self, q: _Array) -> dict[int, _Array]:
+        """States of laws in q of shape (..., N), by their channel: the inverse of :meth:`modes_of`."""
+        structure = self.ensemble.structure
+        circuits = zip(structure.circuits, self.circuits.tolist(), strict=True)
+        found = {
+            channel: q[..., each.mode] - q @ each.row for each, channel in circuits if each.mode is not None
+        }
+        bodies = structure.modes_of_bodies.stop
+        return found | {contact: q[..., mode] for mode, contact in enumerate(structure.indentations, bodies)}
+
     def check(self) -> None:
         """Raise the first error that a function of a user raised in the core."""
         self.channels.check()
@@ -282,8 +296,6 @@ def _work_of(law: int) -> str:
 
 
 def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) -> None:
-    from snapbeam.util.cores import usable_cores
-
     layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
     if progress is not None:
         progress(0, arrays.ensemble.size)
@@ -327,6 +339,50 @@ def integrate_with_output_states(
     return OutputStates(
         arrays.accumulators(), q, p, states[..., 2 * n], np.where(ticks > 0.0, ticks / arrays.finer, ticks)
     )
+
+
+def tangents(ensemble: Ensemble, q: _Array, p: _Array, threads: int | None = None) -> tuple[_Array, _Array]:
+    """Derivatives of the state at the end along changes of the first one.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+    q, p : array of shape (runs, k, N)
+        Changes of the modes, with those of circuits and indentations.
+    threads : int, optional
+
+    Returns
+    -------
+    q, p : array of shape (runs, k, N)
+        Changes at the end; NaN where a run did not reach it.
+    """
+    arrays = _Arrays(ensemble, _GRADED if ensemble.order == 4 else 0)
+    batch, n, channels, most = arrays.batch, arrays.order.size, arrays.channels.laws.size, _core.DIRECTIONS
+    runs, count = q.shape[:2]
+    batch["outputs"], batch["run"][:, RUN.index("output_interval")] = 1, batch["run"][:, RUN.index("end")]
+    batch["states"] = np.full((runs, 1, 2 * n + 1 + 2 * channels), np.nan)
+    laws = arrays.laws_of(q)
+    found_q, found_p = np.zeros((2, *q.shape))
+    for first in range(0, count, most):
+        own = slice(first, first + most)
+        some = q[:, own].shape[1]
+        shapes: dict[str, tuple[int, ...]] = {
+            "q": (n,), "p": (n,), "numbers": batch["numbers"].shape[1:], "offset": (channels,), "rest": (channels,), "laws": (channels,),
+            "rows": (channels, n), "signals": batch["signals"].shape[1:], "end": (),
+        }  # fmt: skip
+        seeds = {name: np.zeros((runs, most, *shape)) for name, shape in shapes.items()}
+        seeds["q"][:, :some], seeds["p"][:, :some] = arrays.row(q[:, own]), arrays.row(p[:, own])
+        for channel, change in laws.items():
+            seeds["laws"][:, :some, channel] = change[:, own]
+        seeds["states"] = np.full((runs, 1, most, 2 * n + channels), np.nan)
+        _core.integrate_tangents(
+            arrays.problem, batch, seeds, os.environ.get("SNAPBEAM_SET", ""),
+            1 if arrays.calls_python else threads or usable_cores(), None,
+        )  # fmt: skip
+        arrays.check()
+        ends = seeds["states"][:, 0, :some]
+        found_q[:, own], found_p[:, own] = arrays.modes_of(ends, ends[..., 2 * n :])
+    return found_q, found_p
 
 
 def record(

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
-from snapbeam.simulation.advance import differences
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.points import PointList
 from snapbeam.sweeps.sweep import sweep
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
+from snapbeam.util.differences import differences
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import InputError, checked, finite, instance, shown
 
