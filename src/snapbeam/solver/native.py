@@ -36,7 +36,7 @@ from snapbeam.solver.statistics import (
     empty_accumulators,
     updated,
 )
-from snapbeam.solver.step_size import PARTS, TRIED, barrier_of, composition_of
+from snapbeam.solver.step_size import CALM, PARTS, barrier_of, composition_of
 from snapbeam.solver.user_laws import updates_of
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.status_codes import RunStatus
@@ -179,7 +179,7 @@ class _Arrays:
         self.problem["levels"] = int(halvings.max()) + 2
         run[:, RUN.index("max_steps")] = ensemble.max_steps
         run[:, RUN.index("stretch")] = structure.stretch
-        run[:, RUN.index("calm_energy")] = TRIED * barrier_of(structure) or math.inf
+        run[:, RUN.index("calm_energy")] = CALM * barrier_of(structure) or math.inf
         signals = channels.signals.copy()
         tones = channels.kinds == 0
         signals[:, tones, 4] *= finer

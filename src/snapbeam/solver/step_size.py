@@ -34,8 +34,9 @@ _IN_A_ROW = 2
 fit the cycle, and modes that come in step with the kicks spoil single lengths."""
 _FINER = 2.0
 """Steps of sixth order that all others are compared with, over the shortest of them."""
-TRIED = 10.0
-_STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (TRIED, 1.0 / 160.0, 1.0, 1.0))
+CALM = 3.0
+"""Energy of a motion over the barrier's beyond which flight steps are halved."""
+_STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (10.0, 1.0 / 160.0, 1.0, 1.0))
 """Of each impulse its energy over the barrier's, how long it lasts at most in periods of the first mode, the length of the
 steps that are tried over the flight step, and the error allowed over the limit: a beam that rings in its well, and one
 after a strong impulse.  The first may ring for many cycles, so that steps of twice the length must serve."""
@@ -74,7 +75,7 @@ _MOST_DECAY = 1.8
 _CONTACT_SHARE = {"standard": 1.0 / 8.0, "reference": 1.0 / 32.0}
 _CONTACT_SPEED = 0.2
 _HALVINGS = {4: 4, 6: 10}
-_LONGER, _NATIVE_HALVINGS = 5.0, 3
+_NATIVE_HALVINGS = 3
 _MOST_HALVINGS = {"standard": 5, "reference": 7}
 _CONTACT_TURN = math.pi
 """Maximum phase of the fastest mode in the longest contact step, rad; beyond half a turn, kicks are in resonance."""
@@ -419,8 +420,7 @@ def choose_base_step(
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * _first_frequency(model)
         duration = contact.time_scale(mass, speed)
     longer = order == 4 and not (contact is not None and contact.impulsive)
-    limit = limits[accuracy] * (_LONGER if longer else 1.0)
-    flight = flight_step(model, order, limit, duration if duration > 0.0 else math.inf, resonances=longer)
+    flight = flight_step(model, order, limits[accuracy], duration if duration > 0.0 else math.inf, resonances=longer)
     if accuracy == "reference" and fastest * flight > _FREE_TURN:
         flight = _FREE_TURN / fastest
     damping = model.modal_damping
