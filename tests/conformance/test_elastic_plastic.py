@@ -231,7 +231,7 @@ CASES = {"alone": alone, "two": two, "body": sprung}
 
 
 # error of w in b and of the indentation, measured: 7e-7 and 1.6e-8 with one striker, 2e-5 and 2e-7 with two, which touch at once, 8e-6
-# and 1.8e-8 with a body; at level reference an eighth of it with half the step, since kinks of the force lie inside steps
+# and 1.8e-8 with a body; at level reference a sixth of it at most with half the step, since kinks of the force lie inside steps
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "cycles", "at_standard", "at_reference"),

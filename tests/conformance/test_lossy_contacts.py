@@ -80,7 +80,7 @@ LOSSY = {
         lambda law: lambda d, v: law.linear_stiffness * d + law.linear_damping * v,
     ),
 }
-# error of w in b, measured: level standard and reference; standard is that of the flight steps, a sixtieth with half their length
+# error of w in b, measured: level standard and reference; a quarter of the step leaves a fiftieth at most of standard's
 CASES = [
     ("hunt-crossley", 1, 5, 4e-6, 5e-11),
     ("hunt-crossley", 3, 2, 6e-7, 4e-11),
