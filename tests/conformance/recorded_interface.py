@@ -177,6 +177,8 @@ VARYING = re.compile(
     r"|(?<=\"snapbeam_version\": ).*"
 )
 """What differs from call to call: durations, sizes of files, the version."""
+LONG = re.compile(r"-?\d+\.\d{6,}(?:e[-+]?\d+)?")
+"""Numbers of which four digits are kept: the others are those of the steps."""
 
 
 def printed() -> dict[str, list[str]]:
@@ -189,7 +191,10 @@ def printed() -> dict[str, list[str]]:
             warnings.simplefilter("ignore")
             result = CliRunner().invoke(command_app(), line.split())
         assert result.exit_code == 0, f"{line}: {result.output}"
-        found[line] = [VARYING.sub("...", text.rstrip()) for text in result.stdout.splitlines()]
+        found[line] = [
+            LONG.sub(lambda number: f"{float(number[0]):.4g}", VARYING.sub("...", text.rstrip()))
+            for text in result.stdout.splitlines()
+        ]
     return found
 
 

@@ -126,7 +126,6 @@ def ledger(run: sb.Run) -> Array:
     return (stored + data.energy_dissipated - data.striker_work).values
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.05, 1.0])
 def test_free_mass(speed) -> None:
     """The restitution does not depend on the speed, and a return at the rebound speed is elastic."""
@@ -231,11 +230,12 @@ def sprung() -> tuple[sb.System, Callable, Array, list[Surface]]:
 CASES = {"alone": alone, "two": two, "body": sprung}
 
 
-# error of w in b and of the indentation, measured: 2e-6 and 4e-9 with one striker; 9e-6 and 1e-6 with two, which touch at once
+# error of w in b and of the indentation, measured: 7e-7 and 1.6e-8 with one striker, 2e-5 and 2e-7 with two, which touch at once, 8e-6
+# and 1.8e-8 with a body; at level reference a sixth of it at most with half the step, since kinks of the force lie inside steps
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "cycles", "at_standard", "at_reference"),
-    [("alone", 6, 1e-5, 2e-8), ("two", 3, 3e-5, 4e-6), ("body", 6, 1e-5, 1e-8)],
+    [("alone", 6, 3e-6, 3e-8), ("two", 3, 4e-5, 6e-7), ("body", 6, 2e-5, 3e-8)],
 )
 def test_trajectory(name, cycles, at_standard, at_reference) -> None:
     system, rate, start, surfaces = CASES[name]()

@@ -35,15 +35,8 @@ def ledger(run: sb.Run) -> np.ndarray:
     return (data.energy_beam + data.energy_contact + data.energy_dissipated - data.striker_work).values
 
 
-LAWS = [
-    pytest.param(name, e, marks=[pytest.mark.slow] if e == 0.9 or name == "kelvin_voigt" else [])
-    for name in ("hunt_crossley", "kelvin_voigt")
-    for e in (0.9, 0.5, 0.05)
-]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "e"), LAWS)
+@pytest.mark.parametrize("e", [0.9, 0.5, 0.05])
+@pytest.mark.parametrize("name", ["hunt_crossley", "kelvin_voigt"])
 def test_restitution_of_a_free_mass(name, e) -> None:
     law = (
         sb.HuntCrossley.from_restitution(4e8, e, SPEED)
@@ -59,7 +52,6 @@ def test_restitution_of_a_free_mass(name, e) -> None:
     assert run.dataset.energy_lost_contact.values[-1] == run.summary.energy_lost_contact
 
 
-@pytest.mark.slow
 def test_no_loss_is_hertz() -> None:
     """chi -> 0: Hertz's law, but for the rounding of its kicks."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
@@ -88,20 +80,22 @@ LOSSY = {
         lambda law: lambda d, v: law.linear_stiffness * d + law.linear_damping * v,
     ),
 }
-# error of w in b, measured: level standard and reference
+# error of w in b, measured: level standard and reference; a quarter of the step leaves a fiftieth at most of standard's
 CASES = [
-    ("hunt-crossley", 1, 5, 6e-5, 2e-11),
-    ("hunt-crossley", 3, 2, 1e-5, 3e-11),
-    ("hunt-crossley", 8, 1, 1.3e-6, 5e-10),
+    ("hunt-crossley", 1, 5, 4e-6, 5e-11),
+    ("hunt-crossley", 3, 2, 6e-7, 4e-11),
+    ("hunt-crossley", 8, 1, 1e-7, 1e-11),
     # the force begins with a jump, whose onset lies between two ticks
-    ("kelvin-voigt", 1, 5, 1.1e-6, 8e-11),
-    ("kelvin-voigt", 3, 2, 4.2e-9, 4e-12),
-    ("kelvin-voigt", 8, 1, 3.1e-9, 4e-11),
+    ("kelvin-voigt", 1, 5, 1.3e-6, 4e-11),
+    ("kelvin-voigt", 3, 2, 1e-7, 4e-12),
+    ("kelvin-voigt", 8, 1, 3.4e-8, 1e-11),
 ]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "modes", "cycles", "at_standard", "at_reference"), CASES)
+@pytest.mark.parametrize(
+    ("name", "modes", "cycles", "at_standard", "at_reference"),
+    [pytest.param(*case, marks=[] if case[1] == 1 else pytest.mark.slow) for case in CASES],
+)
 def test_trajectory(name, modes, cycles, at_standard, at_reference) -> None:
     law, force, edge = LOSSY[name]
     beam, ratio, velocity = PaperBeam(modes), 1.21, 0.18
@@ -137,7 +131,6 @@ def test_trajectory(name, modes, cycles, at_standard, at_reference) -> None:
         )
 
 
-@pytest.mark.slow
 def test_the_force_at_the_onset_counts_as_the_maximum() -> None:
     """A damper alone stops a free mass: its force c v is maximum at the onset, and falls from there."""
     law = sb.KelvinVoigt(1.0, 2.0)

@@ -211,7 +211,7 @@ def mixture(seed: int, modes: int) -> Mixture:
         base_excitation=base,
         axial_load=axial,
     )
-    around = Around(base_row, striker_on_base, load, coupling, inertia, loss, tuple(sorted(breaks)))
+    around = Around(base_row, striker_on_base, load, coupling, inertia, loss, breaks=tuple(sorted(breaks)))
     return Mixture(system, beam, tips, around, words)
 
 

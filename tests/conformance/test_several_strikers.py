@@ -166,7 +166,7 @@ def test_two_of_half_the_stiffness_are_one() -> None:
 
 @pytest.mark.slow
 def test_order() -> None:
-    """Half the step, impacts of both on the way: order 3.8 measured; a finer one is as good as the reference."""
+    """Steps of an eighth, impacts of both on the way: order 3.9 measured; of one halving 2.8 to 4.6, since steps end at contacts."""
     system = sb.System(
         model(1),
         contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())],
@@ -176,10 +176,10 @@ def test_order() -> None:
         system, sb.Integration(cycles=2, accuracy="reference"), sample_times=times
     ).dataset.displacement_at_striker
     errors = []
-    for step in (1e-4, 5e-5):
+    for step in (1e-4, 1.25e-5):
         run = sb.simulate(system, sb.Integration(cycles=2, step=step), sample_times=times)
         errors.append(float(np.abs(run.dataset.displacement_at_striker - exact).max()))
-    assert math.log2(errors[0] / errors[1]) > 3.3, errors
+    assert math.log2(errors[0] / errors[1]) / 3.0 > 3.6, errors
 
 
 @pytest.mark.slow

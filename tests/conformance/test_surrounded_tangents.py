@@ -26,13 +26,13 @@ SYSTEMS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("modes", [1, 3])
 @pytest.mark.parametrize("name", list(SYSTEMS))
 def test_tangents_are_the_derivatives(name: str, modes: int) -> None:
     """Every column of the derivative after two periods, impacts on the way: central differences at level *reference*.
 
-    The determinant is that of damping, exp(-2 T sum zeta omega), at every level, since kicks are shears.
+    The determinant is that of damping, exp(-2 T sum zeta omega); derivatives are differences of runs, whose steps end at
+    contacts, so that it is as exact as the steps are: its logarithm to 2.5e-5 at level standard, 2.1e-8 at reference.
     """
     around, drive, ratio = SYSTEMS[name]
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
@@ -49,14 +49,14 @@ def test_tangents_are_the_derivatives(name: str, modes: int) -> None:
     steps = CHANGE * size * np.concatenate((changes, -changes))
     batch = sb.State(amplitude=at + steps[:, 0], velocity=rate + steps[:, 1])
     exact = -2.0 * float((model.damping_ratio * model.omega).sum()) * 2 * 2.0 * math.pi / (ratio * omega)
-    for accuracy in ("standard", "reference"):
+    for accuracy, bound in (("standard", 7e-5), ("reference", 6e-8)):
         how = sb.Integration(accuracy=accuracy)
         start = sb.State(amplitude=at, velocity=rate)
         gone = sb.advance(system, start, 2, changes, integration=how)
         assert gone.statistics is not None and int(gone.statistics["impacts"]) > 0
         assert gone.tangent is not None
         columns = np.concatenate((gone.tangent[:, 0], gone.tangent[:, 1] / omega), axis=1)
-        assert np.linalg.slogdet(columns)[1] == pytest.approx(exact, rel=1e-8)
+        assert np.linalg.slogdet(columns)[1] == pytest.approx(exact, abs=bound)
     there = sb.advance(system, batch, 2, integration=how)
     for name, found in (("amplitude", gone.tangent[:, 0]), ("velocity", gone.tangent[:, 1])):
         values = getattr(there, name)
