@@ -45,7 +45,10 @@ template <class L> void write_sample(Group<L> &run, double time, bool within) {
         const auto pressed = max(x, typename L::Number(0.0));
         const auto stored = c.timed ? typename L::Number(0.0) : with_law(c.law, [&](auto law) { return law.potential(c.contact ? pressed : x, c.P); });
         own[SAMPLE_DEPTH] = lane(value(x), 0);
-        own[SAMPLE_FORCE] = c.circuit ? lane(value(x), 0) : c.contact && !c.impulsive && !(lane(value(x), 0) > 0.0) ? 0.0 : c.impulsive ? lane(value(select(acting(c), c.f, typename L::Number(0.0))), 0) : lane(value(c.timed ? signal_of(z, c) : force_at(c, x, y)), 0);
+        typename L::Number force = x;
+        if (c.impulsive) force = select(acting(c), pressed_by(z, c, z.q1, z.p1, z.k1) / c.M[j], typename L::Number(0.0));
+        else if (!c.circuit) force = c.timed ? signal_of(z, c) : c.contact && !(lane(value(x), 0) > 0.0) ? typename L::Number(0.0) : force_at(c, x, y);
+        own[SAMPLE_FORCE] = lane(value(force), 0);
         own[SAMPLE_POTENTIAL] = c.contact && !lane(typename L::Marks(acting(c)), 0) ? 0.0 : lane(value(stored), 0);
         own[SAMPLE_WORK] = lane(value(c.sums[WORK]), 0) + share * lane(value(c.work), 0);
         own[SAMPLE_STATE] = c.state < 0 ? 0.0 : lane(value(c.circuit ? x : c.P[c.state]), 0);
