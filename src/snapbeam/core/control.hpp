@@ -1,7 +1,7 @@
 // The controller, once for every layout: propose a step, take it, inspect it, accept it or take a shorter one.
 //
-// In free flight a step is the flight step, halved where the beam is stretched far beyond its wells, or once for every factor of
-// four by which the energy of the beam alone exceeds what the flight step was tried with.  In contact, steps grow from the onset
+// In free flight a step is the flight step, halved once for every factor of four by which the beam is stretched beyond its wells, or by
+// which the energy of the beam alone exceeds what the flight step was tried with.  In contact, steps grow from the onset
 // and shrink towards the release.  By a force of stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN; towards the end of
 // the range of a law a step covers NEARER of the way.
 //
@@ -386,7 +386,7 @@ template <class L> struct Group {
         Real want = step, reach = Real(STRETCH_LIMIT) * stretch_at_rest;
         Marks far = (abs(stretch) > reach) & (stretch_at_rest > Real(0.0));
         for (int i = 0; i < problem->levels && any(far); ++i) {
-            want = select(far, Real(0.5) * want, want), reach += reach;
+            want = select(far, Real(0.5) * want, want), reach = Real(3.0) * reach;
             far = far & (abs(stretch) > reach);
         }
         Real most = calm, by_energy = step;

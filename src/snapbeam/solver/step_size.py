@@ -29,7 +29,7 @@ _FEWEST = 30.0
 """Flight steps in a period of the first mode, at least."""
 _MOST = 2.0**17
 _PER_OCTAVE = 20
-_IN_A_ROW = 2
+_IN_A_ROW = 3
 """So many of the numbers that are tried must serve, the one that is taken and those above it: steps are made shorter to
 fit the cycle, and modes that come in step with the kicks spoil single lengths."""
 _FINER = 2.0
