@@ -148,7 +148,7 @@ PARTS: dict[str, dict[str, Any]] = {
     "kelvin_voigt": {"law": sb.KelvinVoigt(2e5, 3.0)},
     "hunt_crossley": {"law": sb.HuntCrossley(4e8, 1.0)},
     "plastic": {"law": sb.ElasticPlasticContact(loading_stiffness=2e5, unloading_stiffness=8e5)},
-    "newton": {"law": sb.Restitution(0.7)},
+    "newton": {"law": sb.Restitution(0.7), "modes": 1},
     "body": {"striker": BODY},
     "circuits": {"harvesters": [PIEZO, COIL]},
     "spring": {"forces": [SPRING]},
@@ -165,11 +165,12 @@ PARTS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("name", PARTS)
 def test_tangents_are_differences_between_neighbours(name: str) -> None:
     """Of every coordinate, through impacts: releases, yields, jumps of forces and of velocities."""
-    drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.2)
-    flow = Stroboscope(system_of(**({"drive": drive, "modes": 1 if name == "newton" else 2} | PARTS[name])), PRECISE)
+    drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=1.0)
+    flow = Stroboscope(system_of(**({"drive": drive} | PARTS[name])), PRECISE)
     x = settled(flow)[None]
-    while not (came := flow.advance(x)).statistics["impacts"][0]:
-        x = came.states
+    hits = flow.advance(x, 40, every=True)
+    assert hits.every is not None
+    x = next(each for each in hits.every[0] if flow.advance(each[None]).statistics["impacts"][0])[None]
 
     def advance_rows(rows: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         beside = flow.advance(rows)
@@ -180,6 +181,30 @@ def test_tangents_are_differences_between_neighbours(name: str) -> None:
     assert error.max() < 1e-6
     assert came.tangents is not None
     np.testing.assert_allclose(came.tangents, found, rtol=0.0, atol=1e-6 * np.abs(found).max())
+
+
+@pytest.mark.parametrize(
+    ("part", "name"),
+    [
+        ("hertz", "velocity_amplitude"), ("hertz", "frequency_ratio"), ("hertz", "location"), ("hunt_crossley", "velocity_amplitude"),
+        ("base", "base_excitation.acceleration_amplitude"), ("force", "force.amplitude"), ("load", "axial_load.amplitude"),
+        ("circuits", "harvester.resistance"),
+    ],
+)  # fmt: skip
+def test_derivatives_by_parameters(part: str, name: str) -> None:
+    """Of the map over two periods, against differences between runs."""
+    drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=1.0)
+    flow = Stroboscope(system_of(**({"drive": drive} | PARTS[part])), PRECISE)
+    x, value = settled(flow), flow.value(name)
+
+    def advance_rows(rows: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        beside = flow.advance(np.repeat(x[None], len(rows), axis=0), 2, points={name: value * rows[:, 0]})
+        return beside.states, beside.statistics["impacts"]
+
+    found = flow.slope(x, 2, name, value, 1e-5 * value)
+    expected, error = differences(advance_rows, np.ones((1, 1)), np.ones((1, 1, 1)))
+    assert error.max() < 1e-6
+    np.testing.assert_allclose(found * value, expected[0, 0], rtol=0.0, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.slow

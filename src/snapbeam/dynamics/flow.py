@@ -628,11 +628,17 @@ class Stroboscope:
     ) -> AdvancedStates:
         """Advance as :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
         begun = states.hidden if isinstance(states, AdvancedStates) else self._begun(states)
-        if tangents is not None and periods > 1:  # along this motion, not along one with finer steps that leaves it
+        if (
+            tangents is not None and periods > 1
+        ):  # along this motion, not along one with finer steps that leaves it
             came = self.advance(states, periods, every=True, points=points)
             for start in (begun, *(came.hidden_every or ())[:-1]):
                 tangents = self._advance_part(start, 1, False, points, tangents).tangents
-            return replace(came, tangents=tangents) if every else replace(came, tangents=tangents, every=None, hidden_every=None)
+            return (
+                replace(came, tangents=tangents)
+                if every
+                else replace(came, tangents=tangents, every=None, hidden_every=None)
+            )
         count, size = begun.batch[0], 2 * 8 * (self.modes + 16)
         share = max(1, _BYTES // (size * periods * self.cycles_per_period))
         parts = [slice(at, min(at + share, count)) for at in range(0, count, share)]
@@ -666,6 +672,33 @@ class Stroboscope:
             **self._own_arrays(full),
         )
 
+    def _ensemble(self, begun: State, periods: int, points: Mapping[str, _Array]) -> Ensemble:
+        """Runs of some periods from a batch of states."""
+        for name in points:
+            self._require_free(name)
+        named = {self.system.parameter(name).name: np.asarray(each) for name, each in points.items()}
+        own = ratios_of(self.system, named)
+        if own:
+            self._require_period(own)
+        how = self.integration.replace(early_termination=False)
+        return make_ensemble(
+            self.system, how, own, start=begun.flat(), periods=periods * self.cycles_per_period
+        )
+
+    def slope(self, x: _Array, periods: int, name: str, value: float, step: float) -> _Array:
+        """Derivative by a parameter of the runs of where the map brings one state, shape (d,), exact but for a *step* in the assembly."""
+        begun, moved = self._begun(x[None]), np.zeros((1, 1, self.dimension))
+        for _ in range(periods):
+            here, above, below = (
+                self._ensemble(begun, 1, {name: np.array([at])}) for at in (value, value + step, value - step)
+            )
+            moved = self._moved(here, moved, np.zeros(1, bool), (above, below, 2.0 * step))
+            begun = self._advance_part(begun, 1, False, {name: np.array([value])}, None).hidden
+            # the gap says where the tip is, whatever the parameter moves
+            begun = replace(begun, striker_position=np.array(np.nan), modal=None)
+        found: _Array = moved[0, 0]
+        return found
+
     def _advance_part(
         self,
         begun: State,
@@ -675,19 +708,7 @@ class Stroboscope:
         tangents: _Array | None,
     ) -> AdvancedStates:
         lost = None if begun.statistics is None else ~np.isin(begun.statistics["status"], _REACHED)
-        for name in points or ():
-            self._require_free(name)
-        named = {self.system.parameter(name).name: np.asarray(each) for name, each in (points or {}).items()}
-        own = ratios_of(self.system, named)
-        if own:
-            self._require_period(own)
-        ensemble = make_ensemble(
-            self.system,
-            self.integration.replace(early_termination=False),
-            own,
-            start=begun.flat(),
-            periods=periods * self.cycles_per_period,
-        )
+        ensemble = self._ensemble(begun, periods, points or {})
         output_states = engine_of(ensemble).integrate_with_output_states(ensemble, self.integration.threads)
         failed = ~np.isin(output_states.accumulators_of_runs["status"], _REACHED)
         if lost is not None:
@@ -735,7 +756,13 @@ class Stroboscope:
             tuple(after(index) for index in ends) if every else None,
         )
 
-    def _moved(self, ensemble: Ensemble, tangents: _Array, failed: NDArray[np.bool_]) -> _Array:
+    def _moved(
+        self,
+        ensemble: Ensemble,
+        tangents: _Array,
+        failed: NDArray[np.bool_],
+        beside: tuple[Ensemble, Ensemble, float] | None = None,
+    ) -> _Array:
         """Small changes of shape (runs, k, d) of the coordinates at the end of runs, NaN of those that failed."""
         structure, full, n = ensemble.structure, np.diag(self.scales), self.modes
         units = np.array([each.unit for each in ensemble.circuits] or [1.0])
@@ -746,7 +773,7 @@ class Stroboscope:
         )
         modal = modal_of(structure, along, units)
         q, p = native.tangents(
-            ensemble, tangents @ modal[:, 0], tangents @ modal[:, 1], self.integration.threads
+            ensemble, tangents @ modal[:, 0], tangents @ modal[:, 1], self.integration.threads, beside
         )
         one, none = np.ones(q.shape[:2], np.int64), np.zeros_like(q)
         found: _Array = self._rows(ensemble, q, p, one) - self._rows(ensemble, none, none, one)

@@ -125,13 +125,10 @@ class Family:
 
     def slope(self, x: _Array, periods: int, value: float, step: float) -> _Array:
         """Derivative by the parameter of where the flow brings one state, shape (d,)."""
-        if not self._beside or self.name is None:
-            above, below = (
-                self.advance(x[None], periods, value + sign * step).states[0] for sign in (1.0, -1.0)
-            )
-        else:
-            points = {self.name: np.array([value + step, value - step])}
-            above, below = self.flow.advance(np.repeat(x[None], 2, axis=0), periods, points=points).states
+        if self._beside and isinstance(self.flow, Stroboscope):
+            assert self.name is not None
+            return self.flow.slope(x, periods, self.name, value, step)
+        above, below = (self.advance(x[None], periods, value + sign * step).states[0] for sign in (1.0, -1.0))
         change: _Array = (above - below) / (2.0 * step)
         return change
 

@@ -134,7 +134,9 @@ def advance(
     return _shaped(found, state.batch, save_every_period, kept, vectors)
 
 
-def _tangents(system: System, begun: State, span: float, tangents: _Array, integration: Integration) -> _Array:
+def _tangents(
+    system: System, begun: State, span: float, tangents: _Array, integration: Integration
+) -> _Array:
     """Tangents of shape (runs, k, 2, N) some periods on, period by period: their own steps are finer than those of the motion."""
     modes, how = system.model.linear_modes, integration.replace(early_termination=False)
     while span > 0.0:

@@ -223,6 +223,35 @@ class _Arrays:
             q[..., mode] = laws[..., contact]
         return q, p
 
+    def no_change(self) -> dict[str, _Array]:
+        """Derivatives of what runs begin with, all of them 0, and room for those of the outputs."""
+        batch, channels, n = self.batch, self.channels.laws.size, self.order.size
+        shapes: dict[str, tuple[int, ...]] = {
+            "q": (n,), "p": (n,), "numbers": batch["numbers"].shape[1:], "laws": (channels,), "offset": (channels,), "rest": (channels,),
+            "rows": (channels, n), "signals": batch["signals"].shape[1:], "end": (),
+        }  # fmt: skip
+        found = {
+            name: np.zeros((self.ensemble.size, _core.DIRECTIONS, *shape)) for name, shape in shapes.items()
+        }
+        room = (self.ensemble.size, batch["outputs"], _core.DIRECTIONS, 2 * n + channels)
+        return found | {"states": np.full(room, np.nan)}
+
+    def changes(self, above: Ensemble, below: Ensemble, distance: float) -> dict[str, _Array]:
+        """Derivatives of the arrays by a parameter: differences of what is assembled, which no run is in."""
+        parts = []
+        for arrays in (_Arrays(above), _Arrays(below)):
+            batch = arrays.batch
+            places = batch["row_of"][:, :-1]
+            end = batch["run"][:, RUN.index("end")] * batch["run"][:, RUN.index("tick")]
+            parts.append(
+                {"rows": batch["rows"][places], "rest": batch["rest"][:, :-1], "end": end}
+                | {name: batch[name] for name in ("numbers", "offset", "signals")}
+            )
+        found = {name: (parts[0][name] - parts[1][name]) / distance for name in parts[0]}
+        found["signals"][:, self.problem["signal_kinds"] == 0, 4] = 0.0  # periods in ticks of another clock
+        found["signals"][:, :, 6:] = 0.0  # bounds
+        return found
+
     def laws_of(self, q: _Array) -> dict[int, _Array]:
         """States of laws in q of shape (..., N), by their channel: the inverse of :meth:`modes_of`."""
         structure = self.ensemble.structure
@@ -341,8 +370,14 @@ def integrate_with_output_states(
     )
 
 
-def tangents(ensemble: Ensemble, q: _Array, p: _Array, threads: int | None = None) -> tuple[_Array, _Array]:
-    """Derivatives of the state at the end along changes of the first one.
+def tangents(
+    ensemble: Ensemble,
+    q: _Array,
+    p: _Array,
+    threads: int | None = None,
+    beside: tuple[Ensemble, Ensemble, float] | None = None,
+) -> tuple[_Array, _Array]:
+    """Derivatives of the state at the end along changes of the first one, and of a parameter of the runs.
 
     Parameters
     ----------
@@ -350,6 +385,8 @@ def tangents(ensemble: Ensemble, q: _Array, p: _Array, threads: int | None = Non
     q, p : array of shape (runs, k, N)
         Changes of the modes, with those of circuits and indentations.
     threads : int, optional
+    beside : tuple, optional
+        The ensembles at a larger and at a smaller value of a parameter and their distance: every direction changes that parameter too.
 
     Returns
     -------
@@ -361,20 +398,17 @@ def tangents(ensemble: Ensemble, q: _Array, p: _Array, threads: int | None = Non
     runs, count = q.shape[:2]
     batch["outputs"], batch["run"][:, RUN.index("output_interval")] = 1, batch["run"][:, RUN.index("end")]
     batch["states"] = np.full((runs, 1, 2 * n + 1 + 2 * channels), np.nan)
-    laws = arrays.laws_of(q)
+    laws, changes = arrays.laws_of(q), {} if beside is None else arrays.changes(*beside)
     found_q, found_p = np.zeros((2, *q.shape))
     for first in range(0, count, most):
         own = slice(first, first + most)
         some = q[:, own].shape[1]
-        shapes: dict[str, tuple[int, ...]] = {
-            "q": (n,), "p": (n,), "numbers": batch["numbers"].shape[1:], "offset": (channels,), "rest": (channels,), "laws": (channels,),
-            "rows": (channels, n), "signals": batch["signals"].shape[1:], "end": (),
-        }  # fmt: skip
-        seeds = {name: np.zeros((runs, most, *shape)) for name, shape in shapes.items()}
+        seeds = arrays.no_change()
+        for name, change in changes.items():
+            seeds[name][:, :some] = change[:, None]
         seeds["q"][:, :some], seeds["p"][:, :some] = arrays.row(q[:, own]), arrays.row(p[:, own])
         for channel, change in laws.items():
             seeds["laws"][:, :some, channel] = change[:, own]
-        seeds["states"] = np.full((runs, 1, most, 2 * n + channels), np.nan)
         _core.integrate_tangents(
             arrays.problem, batch, seeds, os.environ.get("SNAPBEAM_SET", ""),
             1 if arrays.calls_python else threads or usable_cores(), None,

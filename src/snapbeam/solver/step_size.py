@@ -420,7 +420,9 @@ def choose_base_step(
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * _first_frequency(model)
         duration = contact.time_scale(mass, speed)
     longer = order == 4 and not (contact is not None and contact.impulsive)
-    flight = flight_step(model, order, limits[accuracy], duration if duration > 0.0 else math.inf, resonances=longer)
+    flight = flight_step(
+        model, order, limits[accuracy], duration if duration > 0.0 else math.inf, resonances=longer
+    )
     if accuracy == "reference" and fastest * flight > _FREE_TURN:
         flight = _FREE_TURN / fastest
     damping = model.modal_damping
