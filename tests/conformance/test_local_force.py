@@ -40,7 +40,8 @@ def friction(tmp_path_factory):
         )
     finally:
         sys.path.remove(str(folder))
-        del sys.modules["own_force"], LOCAL_FORCES["dry_friction"]
+        del sys.modules["own_force"]
+        LOCAL_FORCES.pop("dry_friction", None)
 
 
 def independent(system, start, times):

@@ -81,7 +81,7 @@ def test_integrate(made, layout):
 
 def test_integrate_tangents():
     rng, refused = np.random.default_rng(11), 0
-    for _ in range(150):
+    for _ in range(50):
         fresh = arrays(crowded(2), 1, {"drive.frequency_ratio": [1.0, 1.1, 1.2]}, max_steps=20_000)
         seeds = {name: rng.normal(size=each.shape) for name, each in fresh.no_change().items()}
         problem, batch, seeds = changed(rng, fresh.problem, fresh.batch, seeds)
@@ -89,7 +89,7 @@ def test_integrate_tangents():
             _core.integrate_tangents(problem, batch, seeds, "", 2, None)
         except REFUSED:
             refused += 1
-    assert refused > 30
+    assert refused > 10
 
 
 class _Given(Exception):

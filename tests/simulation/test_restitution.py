@@ -87,7 +87,7 @@ def test_a_plastic_landing_is_one_impact(one_mode):
         during = (time >= onset) & (time <= onset + duration)
         pushed = np.trapezoid(force.values[during], time[during])
         assert impulse > pushed * (1.0 - 1e-3)  # the landing adds to it
-        assert peak >= force.values[during].max() * (1.0 - 1e-6)
+        assert peak >= force.values[during].max() * (1.0 - 1e-5)  # at the ends of steps
     assert run.summary.impulse == pytest.approx(float(impacts.impulse.sum()), rel=1e-12)
 
 

@@ -645,6 +645,7 @@ template <class L> struct Group {
                 const bool held = c.impulsive && any(c.closed);
                 const Number end_f = held ? pressed_by(z, c, z.q1, z.p1, z.k1) : c.f, begin_f = held ? c.M[j] * c.first_f : c.first_f;
                 const Real f1 = value(going_on(c, c.d1, c.r1, end_f));
+                if (held) c.f = select(c.closed, end_f / c.M[j], c.f);
                 const Marks wrong = alive & c.closed & (f1 < Real(0.0)) & (active | (d1 > Real(0.0)));
                 const Marks cut_before = mine & c.closed & (!differ(e.at_force, Real(1.0)));
                 const Marks first = wrong & (!cut_before);

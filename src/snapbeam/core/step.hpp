@@ -526,7 +526,7 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
             }
         } else {
             c.x = c.contact ? penetration(z, c, z.q1) : along(z, c, z.q1);
-            if (!c.lossy) c.f = force_at(c, c.x, c.memory ? select(c.pressing, Number(1.0), Number(-1.0)) : Number(0.0));
+            if (!c.lossy) c.f = force_at(c, c.x, L::directions && c.memory ? select(c.pressing, Number(1.0), Number(-1.0)) : Number(0.0));
             if (c.circuit) c.f = c.early = steady_force(c), c.lost = fma(w * c.P[0] * c.f, c.f, c.lost);
         }
     }
