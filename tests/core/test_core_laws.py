@@ -46,7 +46,12 @@ def test_law(law):
         held = held._replace(indentation=3e-7)
     x = np.geomspace(1e-9, 1e-5, 9) if contact else np.linspace(-5e-4, 5e-4, 9)
     for speed in SPEEDS:
-        found = values(number, [getattr(held, name) for name in names], x, np.full(x.size, 0.0 if contact and law.memory else speed))
+        found = values(
+            number,
+            [getattr(held, name) for name in names],
+            x,
+            np.full(x.size, 0.0 if contact and law.memory else speed),
+        )
         if contact:
             loss = [kind.damping_coefficient(held, d) for d in x] if law.rate_dependent else np.zeros(x.size)
             force = [kind.force(held, d) + c * speed for d, c in zip(x, loss, strict=True)]
