@@ -131,10 +131,13 @@ template <class L> struct Signal {
     }
     SNAPBEAM_FN void set_length(Number h) { ahead(WHOLE, h), formed = false; }
     SNAPBEAM_FN void act(const Composition &c, Number h) {
+        act_alone(c, h);
+        if (window) window->act_alone(c, h);
+    }
+    SNAPBEAM_FN void act_alone(const Composition &c, Number h) {
         acts = true;
         for (int f = 0; f < c.distinct && !formed; ++f) ahead(f, h * Number(c.flow[f]));
         formed = true;
-        if (window) window->act(c, h);
     }
     SNAPBEAM_FN void ahead(int f, Number time) {
         if (is_tone()) {
