@@ -21,7 +21,7 @@ def integrate_tangents(
     threads: int,
     progress: Callable[[int, int], object] | None,
 ) -> None:
-    """Integrate runs with derivatives along so many directions; writes into the arrays of *batch* and *tangent*."""
+    """Integrate runs with derivatives along ``DIRECTIONS`` directions; writes into the arrays of *batch* and *tangent*."""
 
 def record(
     problem: Mapping[str, Any], batch: Mapping[str, Any], recorder: Mapping[str, Any], layout: str, set: str
@@ -38,10 +38,11 @@ COMPOSITIONS: list[tuple[list[float], list[float]]]
 """Weights of the flows and of the kicks of a step, by the number of a composition."""
 SOURCES: str
 """SHA-256 of the sources of the core."""
+DIRECTIONS: int
+"""Directions of derivatives in one pass."""
 LOSSY: list[int]
 """Numbers of the laws whose force depends on a velocity."""
 RUN_NUMBERS: int
 """Numbers of a run, statistics of a run, and sums of a channel: the lengths of rows."""
-DIRECTIONS: int
 STATISTICS: int
 OF_CHANNEL: int

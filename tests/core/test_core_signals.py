@@ -11,6 +11,7 @@ from core_systems import arrays, beam, stop
 
 import snapbeam as sb
 from snapbeam import _core
+from snapbeam.dynamics.flow import Stroboscope
 from snapbeam.model import default_values
 from snapbeam.model.drive.base import DRIVES, Drive, Timed
 from snapbeam.model.drive.components import Tone, fitted, in_pieces
@@ -216,6 +217,21 @@ def test_a_users_motion_begins_at_its_phase(monkeypatch, engine, beside):
     wanted = 1e-6 * (np.sin(x) + 0.2 * np.sin(2.0 * x))
     moved = run.striker_displacement.values * system.scale.length
     np.testing.assert_allclose(moved - moved[0], wanted - wanted[0], rtol=0.0, atol=1e-13)
+
+
+def test_a_derivative_by_a_users_motion(monkeypatch):
+    """Its table of pieces depends on the parameter: differences between runs, not the table held still."""
+    monkeypatch.setitem(DRIVES, "own_cycle", OwnCycle)
+    flow = Stroboscope(driven(OwnCycle(height=1e-4), 2), sb.Integration(accuracy="reference"))
+    x = flow.advance(flow.coordinates(), 9).states[0]
+    found = flow.slope(x, 2, "drive.height", 1e-4, 1e-9)
+    ends = [
+        flow.advance(x[None], 2, points={"drive.height": np.array([at])}).states[0]
+        for at in (1e-4 + 3e-9, 1e-4 - 3e-9)
+    ]
+    expected = (ends[0] - ends[1]) / 6e-9
+    assert np.abs(expected).max() > 1e3
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())
 
 
 def test_a_discontinuity_that_no_number_has_is_refused(monkeypatch):

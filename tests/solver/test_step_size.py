@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,6 +29,16 @@ def test_steps_in_contact_resolve_the_impact_and_the_fastest_mode(modes: int, ac
     mass = min(model.contact_mass(x) for x in np.linspace(0.02, 0.5, 25))
     assert longest <= default_values.CONTACT.impact_duration(mass, speed) / 6.0 * (1.0 + 1e-12)
     assert plan.max_halvings > plan.min_contact_halvings
+
+
+def test_steps_a_period_are_those_of_the_page() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "method.md").read_text(encoding="utf-8").splitlines()
+    at = next(i for i, line in enumerate(page) if line.startswith("| steps a period"))
+    columns = zip(*([int(x) for x in page[k].split("|")[2:-1]] for k in (at - 2, at)), strict=True)
+    for modes, steps in columns:
+        model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=0.005)
+        plan = choose_base_step(model, default_values.CONTACT)
+        assert round(1.0 / (plan.step * model.natural_frequencies[0])) == steps
 
 
 # without damping the highest of 128 modes keep what an impact gives them: the warning about the energy balance is right

@@ -1,7 +1,7 @@
 // The controller, once for every layout: propose a step, take it, inspect it, accept it or take a shorter one.
 //
-// In free flight a step is the flight step, halved once for every factor of four by which the beam is stretched beyond its wells, or by
-// which the energy of the beam alone exceeds what the flight step was tried with.  In contact, steps grow from the onset
+// In free flight a step is the flight step.  It is halved where the tension is far beyond that in the wells (STRETCH_LIMIT), again for
+// every factor STRETCH_FACTOR, or where the energy of the beam alone is beyond CALM_ENERGY, again for every factor of four.  In contact, steps grow from the onset
 // and shrink towards the release.  By a force of stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN; towards the end of
 // the range of a law a step covers NEARER of the way.
 //
@@ -15,7 +15,7 @@
 
 namespace SNAPBEAM_SET {
 
-constexpr double GRADING = 0.5, RELEASE = 0.5, CONTACT_TURN = 0.35, NEARER = 0.2, STRETCH_LIMIT = 4.0, NOISE = 1e-12;
+constexpr double GRADING = 0.5, RELEASE = 0.5, CONTACT_TURN = 0.35, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 
 template <class L> struct Group;
@@ -265,14 +265,23 @@ template <class L> struct Group {
             for (int x = 0; x < channels; ++x) c.M[x] = dot<L>(c.row, z.channel[x].row, s->size());
             for (int x = 0; c.circuit && x < channels; ++x) c.along_M[x] = Number(0.0);
             for (int m = 0; c.circuit && m < s->size(); ++m) {
-                const Number omega2 = Number(s->omega[m] * s->omega[m]), D = c.P[0] * c.P[0] - Number(2.0 * s->sigma[m]) * c.P[0] + omega2;
-                const Number t = value(c.row[m]) != 0.0 ? c.row[m] / D : Number(0.0);
-                c.along_q[m] = t * omega2, c.along_p[m] = t * c.P[0];
+                const OfMode<Number> of(c.P[0], c.row[m], s->omega[m], s->sigma[m]);
+                c.along_q[m] = of.along_q, c.along_p[m] = of.along_p;
                 for (int x = 0; x < channels && value(c.row[m]) != 0.0; ++x)
-                    c.along_M[x] = value(D) > 0.0 ? c.along_M[x] + c.along_p[m] * z.channel[x].row[m] : Number(INFINITY);
+                    c.along_M[x] = of.slower ? c.along_M[x] + of.along_p * z.channel[x].row[m] : Number(INFINITY);
             }
         }
     }
+
+    // What of a circuit of rate lam a mode carries along (step.hpp); slower: it does not decay as fast as an overdamped mode.
+    template <class T> struct OfMode {
+        T along_q, along_p;
+        bool slower;
+        OfMode(T lam, T row, double omega, double sigma) {
+            const T D = lam * lam - T(2.0 * sigma) * lam + T(omega * omega), t = value(row) != 0.0 ? row / D : T(0.0);
+            along_q = t * T(omega * omega), along_p = t * lam, slower = value(D) > 0.0;
+        }
+    };
 
     // What carries a circuit of run l along with the beam.
     void load_circuit(Channel<L> &c, int l, const double *row, const int *row_of) {
@@ -288,10 +297,10 @@ template <class L> struct Group {
         for (int k = 0; k < z.channels; ++k) set_lane(c.along_M[k], l, 0.0);
         for (int m = 0; m < problem->modes; ++m) {
             // beside an overdamped mode that decays as fast a circuit never follows
-            const double square = problem->omega[m] * problem->omega[m], D = lam * lam - 2.0 * problem->sigma[m] * lam + square, t = row[m] != 0.0 ? row[m] / D : 0.0;
-            set_element<L>(c.along_q, s->place[m], l, t * square), set_element<L>(c.along_p, s->place[m], l, t * lam);
+            const OfMode<double> of(lam, row[m], problem->omega[m], problem->sigma[m]);
+            set_element<L>(c.along_q, s->place[m], l, of.along_q), set_element<L>(c.along_p, s->place[m], l, of.along_p);
             for (int k = 0; k < z.channels; ++k)
-                set_lane(c.along_M[k], l, row[m] != 0.0 && !(D > 0.0) ? INFINITY : lane(value(c.along_M[k]), l) + t * lam * batch->rows[long(row_of[k]) * problem->modes + m]);
+                set_lane(c.along_M[k], l, row[m] != 0.0 && !of.slower ? INFINITY : lane(value(c.along_M[k]), l) + of.along_p * batch->rows[long(row_of[k]) * problem->modes + m]);
         }
     }
 
@@ -386,7 +395,7 @@ template <class L> struct Group {
         Real want = step, reach = Real(STRETCH_LIMIT) * stretch_at_rest;
         Marks far = (abs(stretch) > reach) & (stretch_at_rest > Real(0.0));
         for (int i = 0; i < problem->levels && any(far); ++i) {
-            want = select(far, Real(0.5) * want, want), reach = Real(3.0) * reach;
+            want = select(far, Real(0.5) * want, want), reach = Real(STRETCH_FACTOR) * reach;
             far = far & (abs(stretch) > reach);
         }
         Real most = calm, by_energy = step;

@@ -628,17 +628,13 @@ class Stroboscope:
     ) -> AdvancedStates:
         """Advance as :meth:`Flow.advance`; a run does not depend on the runs that are integrated with it."""
         begun = states.hidden if isinstance(states, AdvancedStates) else self._begun(states)
-        if (
-            tangents is not None and periods > 1
-        ):  # along this motion, not along one with finer steps that leaves it
+        if tangents is not None and periods > 1:
+            # period by period along this motion, which that of the finer steps of derivatives would leave
             came = self.advance(states, periods, every=True, points=points)
             for start in (begun, *(came.hidden_every or ())[:-1]):
                 tangents = self._advance_part(start, 1, False, points, tangents).tangents
-            return (
-                replace(came, tangents=tangents)
-                if every
-                else replace(came, tangents=tangents, every=None, hidden_every=None)
-            )
+            kept = came if every else replace(came, every=None, hidden_every=None)
+            return replace(kept, tangents=tangents)
         count, size = begun.batch[0], 2 * 8 * (self.modes + 16)
         share = max(1, _BYTES // (size * periods * self.cycles_per_period))
         parts = [slice(at, min(at + share, count)) for at in range(0, count, share)]
@@ -686,12 +682,23 @@ class Stroboscope:
         )
 
     def slope(self, x: _Array, periods: int, name: str, value: float, step: float) -> _Array:
-        """Derivative by a parameter of the runs of where the map brings one state, shape (d,), exact but for a *step* in the assembly."""
+        """Derivative by a parameter of the runs of where the map brings one state, shape (d,).
+
+        The numbers of a run are differentiated by a difference over twice the *step*, the run itself exactly.  A motion whose table of
+        pieces depends on the parameter, or that jumps, takes differences between runs.
+        """
         begun, moved = self._begun(x[None]), np.zeros((1, 1, self.dimension))
         for _ in range(periods):
             here, above, below = (
                 self._ensemble(begun, 1, {name: np.array([at])}) for at in (value, value + step, value - step)
             )
+            if not native.differentiable(above, below):
+                ends = [
+                    self.advance(x[None], periods, points={name: np.array([at])})
+                    for at in (value + step, value - step)
+                ]
+                change: _Array = (ends[0].states - ends[1].states)[0] / (2.0 * step)
+                return change
             moved = self._moved(here, moved, np.zeros(1, bool), (above, below, 2.0 * step))
             begun = self._advance_part(begun, 1, False, {name: np.array([value])}, None).hidden
             # the gap says where the tip is, whatever the parameter moves

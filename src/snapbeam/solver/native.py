@@ -370,6 +370,13 @@ def integrate_with_output_states(
     )
 
 
+def differentiable(above: Ensemble, below: Ensemble) -> bool:
+    """Return whether two ensembles differ only in numbers of which the core takes derivatives: no other pieces of signals, no jumps that move."""
+    one, other = above.channels, below.channels
+    assert one is not None and other is not None
+    return np.array_equal(one.pieces, other.pieces) and not one.jumps.size and not other.jumps.size
+
+
 def tangents(
     ensemble: Ensemble,
     q: _Array,
