@@ -533,8 +533,10 @@ class Potential:
         It is that of the structure if the system has another number of wells.
         """
         own = self.structure.dividing_height
+        if not self.local_forces or len(self.wells) != 2:
+            return own
         between = [each for each in self.saddles if set(each.wells) == {0, 1}]
-        if not self.local_forces or len(self.wells) != 2 or not between:
+        if not between:
             return own
         found = self.center(min(between, key=lambda each: each.equilibrium.energy).equilibrium)
         return own if abs(found - own) <= _SAME * self._length else found
