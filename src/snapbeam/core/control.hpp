@@ -225,16 +225,11 @@ template <class L> struct Group {
         const int n = s->cells, distinct = s->composition.distinct;
         double length = of_run(i, STEP), next = shorter_than_flight(length, of_run(i, CONTACT_STEP));
         for (int level = 0; level < problem->levels; ++level) {
-            const double h = length * of_run(i, TICK);
-            for (int f = 0; f < distinct; ++f)
-                for (int m = 0; m < n; ++m) {
-                    Plain *to = tables + ((long(level) * distinct + f) * n + m) * 4;
-                    typename L::Coef a[4];
-                    set_flow(typename L::Coef(s->composition.flow[f] * h), s->sigma[m], s->omega[m], a);
-                    for (int x = 0; x < 4; ++x)
-                        if constexpr (L::runs > 1) set_lane(to[x], l, a[x]);
-                        else to[x] = a[x];
-                }
+            Plain *to = tables + long(level) * distinct * n * 4;
+            flows_over(length * of_run(i, TICK), [&](long item, int x, typename L::Coef a) {
+                if constexpr (L::runs > 1) set_lane(to[item * 4 + x], l, a);
+                else to[item * 4 + x] = a;
+            });
             const double after = shorter(next, of_run(i, CONTACT_STEP));
             length = next, next = after;
         }
@@ -480,23 +475,35 @@ template <class L> struct Group {
                 z.channel[j].decay[f] = decay_of(select(follows(z.channel[j], j, x), Number(0.0), x) * Number(s->composition.flow[f]));
             }
     }
-    SNAPBEAM_FN void form_flows(Plain *to, Marks which) {
-        if constexpr (L::runs > 1 && L::fixed != 1) {  // few runs at a time: their modes side by side
-            const unsigned some = bits(which);
-            const int n = s->size(), distinct = s->composition.distinct;
-            for (int l = 0; l < L::runs; ++l) {
-                if (!(some >> l & 1u)) continue;
-                for (int m = 0; m < n; m += L::runs) {
-                    const int count = n - m < L::runs ? n - m : L::runs;
-                    Pack<L::runs> omega(1.0), sigma(0.0), a[4];
-                    for (int k = 0; k < count; ++k) set_lane(omega, k, s->omega[m + k]), set_lane(sigma, k, s->sigma[m + k]);
-                    for (int f = 0; f < distinct; ++f) {
-                        set_flow(Pack<L::runs>(lane(value(z.h), l) * s->composition.flow[f]), sigma, omega, a);
-                        for (int k = 0; k < count; ++k)
-                            for (int x = 0; x < 4; ++x) set_lane(to[(long(f) * n + m + k) * 4 + x], l, lane(a[x], k));
-                    }
-                }
+    // Flows of the modes of one run over a step of *length*, modes and flows side by side: *put* gets each number of each.
+    template <class F> SNAPBEAM_FN void flows_over(double length, F put) {
+        const int n = s->size(), all = s->composition.distinct * n;
+        if constexpr (L::lanes > 1) {
+            for (long i = 0; i < all; ++i) {
+                typename L::Coef a[4];
+                set_flow(typename L::Coef(s->composition.flow[i / n] * length), s->sigma[i % n], s->omega[i % n], a);
+                for (int x = 0; x < 4; ++x) put(i, x, a[x]);
             }
+        } else {
+            constexpr int W = SNAPBEAM_WIDTH;
+            for (int from = 0, f = 0, m = 0; from < all; from += W) {
+                const int count = all - from < W ? all - from : W;
+                Pack<W> time(0.0), omega(1.0), sigma(0.0), a[4];
+                for (int k = 0; k < count; ++k) {
+                    set_lane(time, k, length * s->composition.flow[f]), set_lane(omega, k, s->omega[m]), set_lane(sigma, k, s->sigma[m]);
+                    if (++m == n) m = 0, ++f;
+                }
+                set_flow(time, sigma, omega, a);
+                for (int k = 0; k < count; ++k)
+                    for (int x = 0; x < 4; ++x) put(long(from + k), x, lane(a[x], k));
+            }
+        }
+    }
+    SNAPBEAM_FN void form_flows(Plain *to, Marks which) {
+        if constexpr (L::lanes == 1 && L::fixed != 1) {  // few runs at a time
+            const unsigned some = bits(which);
+            for (int l = 0; l < L::runs; ++l)
+                if (some >> l & 1u) flows_over(lane(value(z.h), l), [&](long item, int x, double a) { set_lane(to[item * 4 + x], l, a); });
             return;
         }
         for (int f = 0; f < s->composition.distinct; ++f)
