@@ -231,6 +231,8 @@ def _finite_where_known(name: str, value: ArrayLike, passed: Mapping[str, _Array
 
 
 def _spread(name: str, array: _Array, batch: tuple[int, ...]) -> _Array:
+    if array.shape == batch or not array.ndim:
+        return np.full(batch, array, dtype=np.float64)
     try:
         return np.array(np.broadcast_to(array, batch), dtype=np.float64)
     except ValueError:
@@ -256,7 +258,7 @@ def _of_parts(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
     """One number for the striker or circuit of every state, or one for each of several."""
     given = _numbers(name, value)
     several = given.ndim == len(batch) + 1 and given.shape[:-1] == batch and given.shape[-1] > 1
-    return given if several else _spread(name, given, batch)
+    return np.array(given) if several else _spread(name, given, batch)
 
 
 def _maybe(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
@@ -272,7 +274,7 @@ def _numbers(name: str, value: ArrayLike) -> _Array:
         raise InputError(f"{name} = {shown(value)}: must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or np.isinf(array).any():
         raise InputError(f"{name} = {shown(value)}: must be finite numbers, or NaN for none")
-    return array.astype(np.float64)
+    return array.astype(np.float64, copy=False)
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -34,11 +34,11 @@ def to_dataset(work: PointWork, points: Points, rows: ResultRows, attrs: dict[st
     from snapbeam.util.datasets import xr
 
     table = rows.read(0, points.size)
-    dataset = xr.Dataset(coords=_coordinates(work, points), attrs=attrs)
-    for name, (_, by_class, labels) in work.variables().items():
-        dims = (*points.dims, _CLASS_DIM) if by_class else points.dims
-        dataset[name] = (dims, points.arranged(work.values(name, table)), labels)
-    return dataset
+    variables = {
+        name: ((*points.dims, _CLASS_DIM) if by_class else points.dims, points.arranged(work.values(name, table)), labels)
+        for name, (_, by_class, labels) in work.variables().items()
+    }  # fmt: skip
+    return xr.Dataset(variables, _coordinates(work, points), attrs)
 
 
 def _coordinates(work: PointWork, points: Points) -> dict[str, Any]:

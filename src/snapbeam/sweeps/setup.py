@@ -430,6 +430,8 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
 
 _PROBES, _GOLDEN = 64, 0.6180339887498949
 """Points that the duration of a sweep is estimated from."""
+_FEW = 5000
+"""Cycles of one mode that never take a minute."""
 
 
 def announce_long_sweep(setup: SweepSetup, repeats: int = 1, *, by_cluster: bool = False) -> None:
@@ -439,6 +441,8 @@ def announce_long_sweep(setup: SweepSetup, repeats: int = 1, *, by_cluster: bool
     over the limits of its axes if each point has a model of its own.
     """
     size, alike = setup.points.size, all(lookup(name).is_run for name in setup.points.names)
+    if size * repeats * setup.integration.cycles * setup.system.model.modes <= _FEW and alike:
+        return
     # multiples of the golden section fall on the columns of no grid
     spread = np.unique((np.arange(min(size, _PROBES)) * _GOLDEN % 1.0 * size).astype(np.int64))
     columns = setup.points.take(spread if alike else np.array(_ends(setup.points)))

@@ -189,7 +189,7 @@ class PointWork:
             counts = columns.integers[:, first : first + len(CLASSES)]
             total = counts.sum(axis=1, keepdims=True)
             return np.where(total > 0, counts / np.maximum(total, 1), np.nan)
-        kind = self.variables()[name][0]
+        kind = "int8" if name == _HALVED else self.statistics[name].dtype
         if name in self.numbers:
             return columns.numbers[:, self.numbers.index(name)].astype(kind)
         return columns.integers[:, self.integers.index(name)].astype(kind)
