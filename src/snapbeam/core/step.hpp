@@ -445,7 +445,7 @@ template <class L> struct Flow {
         const int n = s.size();
         const typename L::Plain *a = flows;
         Channel<L> *const circuit[2] = {one, other};
-        Cell before = Cell(0.0), after = Cell(0.0), gq = Cell(0.0), carried[2] = {Cell(0.0), Cell(0.0)}, moved[2] = {Cell(0.0), Cell(0.0)};
+        Cell lost_p = Cell(0.0), lost_q = Cell(0.0), gq = Cell(0.0), carried[2] = {Cell(0.0), Cell(0.0)}, moved[2] = {Cell(0.0), Cell(0.0)};
         for (int i = 0; i < n; ++i, a += 4) {
             const Cell q = from_q[i], p = first ? fma(weight, from_k[i], from_p[i]) : fma(by_g, s.g[i], fma(by_r, z.r[i], from_p[i]));
             Cell dq = fma(a[0], q, a[1] * p), dp = fma(a[3], p, a[2] * q), q1 = q + dq, p1 = p + dp;
@@ -458,10 +458,7 @@ template <class L> struct Flow {
                 carried[k] = fma(by_q, q, fma(by_p, p, carried[k])), moved[k] = fma(by_q, dq, fma(by_p, dp, moved[k]));
             }
             if constexpr (MODES) {
-                if (z.account) {
-                    const Cell oq = s.omega[i] * q, oq1 = s.omega[i] * q1;
-                    before = fma(p, p, fma(oq, oq, before)), after = fma(p1, p1, fma(oq1, oq1, after));
-                }
+                if (z.account) lost_p = fma(dp, p + p1, lost_p), lost_q = fma(s.omega[i] * dq, s.omega[i] * (q + q1), lost_q);
                 gq = fma(s.g[i], q1, gq);
                 z.q1[i] = q1, z.p1[i] = p1;
             }
@@ -474,7 +471,7 @@ template <class L> struct Flow {
         }
         if (!MODES) return;
         z.next_gq = gq;
-        if (z.account) z.dissipated = fma(Number(0.5), L::total(before - after), z.dissipated);
+        if (z.account) z.dissipated = fma(Number(-0.5), L::total(lost_p + lost_q), z.dissipated);  // of p^2 + omega^2 q^2
     }
 };
 

@@ -269,10 +269,13 @@ IMPACT_COLUMNS = (
 def joined(pieces: list[Recorded]) -> Recorded:
     """Join pieces of a run, with the samples in the order of time."""
     times, q, p, contacts, values, impacts = (
-        np.concatenate(parts) for parts in zip(*(piece[:6] for piece in pieces), strict=True)
+        np.concatenate(parts) if len(pieces) > 1 else parts[0]
+        for parts in zip(*(piece[:6] for piece in pieces), strict=True)
     )
-    order = np.argsort(times, kind="stable")
-    order = order[np.append(True, np.diff(times[order]) > 0.0)] if order.size else order
+    order: NDArray[np.intp] | slice = slice(None)
+    if not (np.diff(times) > 0.0).all():
+        order = np.argsort(times, kind="stable")
+        order = order[np.append(True, np.diff(times[order]) > 0.0)]
     return Recorded(
         times[order],
         q[order],

@@ -81,8 +81,8 @@ _STEEP = 7
 """Further halvings of the shortest step where a force grows without bound."""
 _GRADED = 6
 """The same where derivatives are wanted: at both ends of a contact that of the force is a root, whose integral errs by h^1.5."""
-_SAMPLES, _IMPACTS, _BUDGET = 20_000, 4096, 200_000
-"""Room for samples and impacts, and steps, of one piece of a recorded run."""
+_SAMPLES, _NUMBERS, _IMPACTS, _BUDGET = 50_000, 4_000_000, 4096, 200_000
+"""Room for samples, their numbers and impacts, and steps, of one piece of a recorded run."""
 
 
 def layout_of(ensemble: Ensemble) -> str:
@@ -440,7 +440,8 @@ def record(
     # one step may hold many instants
     span = 2.0 * float(ensemble.step_times[0])
     most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
-    samples = max(_SAMPLES, most + 8)
+    width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
+    samples = max(min(_SAMPLES, _NUMBERS // width), most + 8)
     saved = np.zeros(
         (3 * (n + 64) + count * (11 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
     )
