@@ -58,11 +58,16 @@ _PACKING = (
 _COMMENT = ("#", "%", "//", "!")
 _LOOK = 400  # lines in which the table must begin
 _ABOVE = 20
-"""Rows at the end whose numbers are compared."""
+"""Rows at the start or at the end that are looked at."""
 _STAMP = re.compile(
     r"(?<![\d.])(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]+\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)?|\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)"
 )
-_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?")
+_GROUPED = {
+    sign: re.compile(rf"[-+]?[1-9]\d{{0,2}}([{others}])\d{{3}}(?:\1\d{{3}})*(?:[{sign}]\d*)?")
+    for sign, others in ((".", ",' "), (",", ".' "))
+}
+"""Numbers with signs between groups of three digits, by their decimal sign."""
+_SIGNS = str.maketrans("\u2212\u00a0\u2009\u202f\u2019", "-   '")
 _SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
 _END = "***end_of_header***"
 _RATES = (
@@ -75,8 +80,12 @@ _STEPS = (
 )  # fmt: skip
 _LONGEST_LINE = 2000
 """Letters of a line of a header that is looked into."""
-_PER_SECOND = dict.fromkeys(("", "hz", "s/s", "sa/s", "1/s"), 1.0)
-_PER_SECOND |= {"khz": 1e3, "ks/s": 1e3, "mhz": 1e6, "ms/s": 1e6}
+_PER_SECOND = {"": 1.0, "1/s": 1.0, "samples/s": 1.0, "samples/sec": 1.0, "samples/second": 1.0} | {
+    prefix + unit: scale
+    for prefix, scale in (("", 1.0), ("k", 1e3), ("m", 1e6), ("g", 1e9))
+    for unit in ("hz", "s/s", "sa/s", "sps")
+}
+"""Samples per second in units in small letters; none is smaller than 1 Hz."""
 _LONGEST_NAME = 500
 """Letters of a name of a column that a unit is looked for in."""
 _SUFFIX_UNITS = {
@@ -282,10 +291,10 @@ def _refuse_scales(name: str, data: NDArray[Any], values: Mapping[str, Any]) -> 
         neutral = 1.0 if _key(key) in _SCALES else 0.0 if _key(key) in _OFFSETS else None
         if neutral is None or (data.dtype.kind == "f" and key not in ("scale_factor", "add_offset")):
             continue
-        number = _quantity(_text(value))[0]
-        if math.isfinite(number) and number != neutral:
+        numbers = _quantity(_text(value))[0]
+        if any(number != neutral for number in numbers):
             raise InputError(
-                f"{name}: {key} = {number:g} may scale its numbers: store the scaled numbers without it, or make it the "
+                f"{name}: {key} = {_text(value)} may scale its numbers: store the scaled numbers without it, or make it the "
                 "attributes scale_factor and add_offset of an array in an HDF5 or NetCDF file"
             )
 
@@ -499,15 +508,34 @@ class TextBlock:
 
 def to_number(cell: str, decimal_comma: bool = False) -> float:
     """The number in a cell; NaN if it holds none."""
-    text = cell.strip()
+    text = cell.strip().translate(_SIGNS)
     if decimal_comma and "," in text:
-        if text.count(",") > 1 or ("." in text and not _GROUPED.fullmatch(text)):
-            return math.nan
-        text = text.replace(".", "").replace(",", ".")
+        text = _with_point(text, ",")
     try:
         return float(text) if "_" not in text else math.nan
     except ValueError:
         return math.nan
+
+
+def _with_point(text: str, sign: str) -> str:
+    """A number whose decimal sign is *sign* as Python writes it; empty if it is none."""
+    found = _GROUPED[sign].fullmatch(text)
+    text = text.replace(found[1], "") if found else text
+    return "" if sign == "," and "." in text else text.replace(",", ".") if sign == "," else text
+
+
+def readings(text: str, decimal_comma: bool = False) -> tuple[float, ...]:
+    """The numbers that a number of a header may be, none if it is no number.
+
+    ``51,200`` may be 51200 or 51.2.  ``51.200`` may be 51200 only in a file of decimal commas: points between groups of
+    digits are seldom, and decimals that end in zeros are not.
+    """
+    text = text.strip().translate(_SIGNS)
+    signs = (".", ",") if "," in text or decimal_comma else (".",)
+    if text.count(".") > 1:
+        signs = (",",)
+    numbers = (to_number(_with_point(text, sign)) for sign in signs)
+    return tuple(dict.fromkeys(number for number in numbers if math.isfinite(number)))
 
 
 def _cells(lines: list[str], separator: str | None) -> list[list[str]]:
@@ -825,17 +853,27 @@ def header_values(lines: Iterable[str]) -> dict[str, str]:
     for line in lines:
         if len(line) > _LONGEST_LINE:
             continue
-        found = re.match(r'\s*"?([^:=,;\t"]+?)"?\s*([:=,;\t])\s*"?(.*?)"?\s*[,;\t]*\s*$', line)
+        found = re.match(r'\s*"?([^:=,;\t"]+?)"?\s*([:=,;\t])\s*(?:"([^"]*)"|(.*))', line)
         if found:
-            key = re.sub(r"[^a-z0-9]", "", found[1].lower())
-            ends = r"[,;\t]" if found[2] == "," else r"[;\t]"  # else a comma may be the decimal sign
-            values.setdefault(key, re.split(ends, found[3])[0].strip().strip('"'))
+            # else a comma may be the decimal sign; one before three digits may part groups of them
+            ends = r"[;\t]|(?<!\d),|,(?!\d{3}(?!\d|\.))" if found[2] == "," else r"[;\t]"
+            value = re.split(ends, found[4])[0] if found[3] is None else found[3]
+            values.setdefault(_key(found[1]), value.strip(' ,;\t"'))
     return values
 
 
-def header_rate(values: dict[str, str], where: str) -> float | None:
-    """Samples per second [Hz] that a header states; None if it does not."""
-    found = {key: rate for key, value in values.items() if (rate := _rate_of(key, value)) is not None}
+def header_rate(
+    values: dict[str, str], where: str, decimal_comma: bool = False, known: float | None = None
+) -> float | None:
+    """Samples per second [Hz] that a header states; None if it does not.
+
+    *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
+    """
+    found = {
+        key: rate
+        for key, value in values.items()
+        if (rate := _rate_of(key, value, decimal_comma, known)) is not None
+    }
     return _one_rate(found, f"{where}: the header") if found else None
 
 
@@ -847,24 +885,37 @@ def _one_rate(found: Mapping[str, float], where: str) -> float:
     return next(iter(found.values()))
 
 
-def _rate_of(name: str, value: Any) -> float | None:
-    """Samples per second [Hz] that a named value states; None if it states none, or is 0 or no number."""
-    word, suffix = (name, None) if len(name) > _LONGEST_NAME else split_unit(name)
-    key = _key(name)
-    if key not in _RATES and key not in _STEPS:
-        units = (end for end in ("hz", "s") if key.endswith(end) and key[: -len(end)] in _RATES + _STEPS)
-        ending = next(units, "")
-        key = _key(word) if suffix else key[: -len(ending)] if ending else ""
-    if key not in _RATES and key not in _STEPS:
+def _rate_of(name: str, value: Any, decimal_comma: bool = False, known: float | None = None) -> float | None:
+    """Samples per second [Hz] that a named value states; None if it states none, or is 0 or no number.
+
+    Raises
+    ------
+    InputError
+        If the number has two readings and *known* [Hz] is neither.
+    """
+    word, suffix = (name, "") if len(name) > _LONGEST_NAME else split_unit(name)
+    for key in (_key(name), _key(word)):
+        of_name = max((one for one in _RATES + _STEPS if key.startswith(one)), key=len, default="")
+        suffix = suffix or key[len(of_name) :]
+        if of_name and (key == of_name or suffix in _PER_SECOND or _time_unit(name, suffix)):
+            break
+    else:
         return None
-    number, unit = _quantity(_text(value))
-    unit = unit or suffix or ""
-    step = key in _STEPS
+    numbers, unit = _quantity(_text(value), decimal_comma)
+    step = of_name in _STEPS
+    unit = unit or ("" if suffix == "s" and not step else suffix) or ""
     factor = _time_unit(name, unit or "s") if step else _PER_SECOND.get(unit.lower())
-    if factor is None or number == 0.0 or math.isnan(number):
+    if factor is None or not numbers or 0.0 in numbers:
         return None
-    rate = 1.0 / (number * factor) if step else number * factor
-    return positive(f"{name}: sampling rate", rate, "Hz")
+    rates = [1.0 / (number * factor) if step else number * factor for number in numbers]
+    near = [rate for rate in rates if known and abs(rate / known - 1.0) < 0.05] or rates
+    if len(near) > 1:
+        both = " or ".join(f"{number:.12g}" for number in numbers)
+        raise InputError(
+            f"{name} = {_text(value)!r}: the comma or point may part thousands or decimals, so that it is {both}; write "
+            f"{both} into the file"
+        )
+    return positive(f"{name}: sampling rate", near[0], "Hz")
 
 
 def header_unit(values: dict[str, str], *keys: str) -> str | None:
@@ -873,13 +924,13 @@ def header_unit(values: dict[str, str], *keys: str) -> str | None:
     return next((word for word in words if word), None)
 
 
-def _quantity(text: str) -> tuple[float, str]:
-    """Number and unit of ``"12 kHz"``, ``"CH1:2e-8"`` or ``"0,5 ms"``."""
-    found = re.fullmatch(r"(?:\w+:)?\s*([-+]?[0-9][0-9.,]*(?:[eE][-+]?\d+)?)\s*\[?([^\]]*)\]?", text.strip())
-    if not found:
-        return math.nan, ""
-    comma = "," in found[1] and "." not in found[1]
-    return to_number(found[1], comma), found[2].strip()
+def _quantity(text: str, decimal_comma: bool = False) -> tuple[tuple[float, ...], str]:
+    """Readings and unit of ``"12 kHz"``, ``"CH1:2e-8"``, ``"51 200"`` or ``"0,5 ms"``."""
+    found = re.fullmatch(
+        r"(?:\w+:)?\s*([-+]?\.?[0-9][0-9.,' ]*(?:[eE][-+]?\d+)?)\s*\[?([^\]]*)\]?",
+        text.strip().translate(_SIGNS),
+    )
+    return (readings(found[1], decimal_comma), found[2].strip()) if found else ((), "")
 
 
 class Table(NamedTuple):
@@ -952,16 +1003,23 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
     if len(times) > 1:
         raise InputError(f"{path}: columns {times}: only one may be the time")
     values = header_values(table.block.header)
-    rate = header_rate(values, str(path))
     first, (word, unit) = next(iter(columns.items()))
     if not times and (unit == "Hz" or word.lower().startswith("freq")):
         raise InputError(
             f"{path}: its first column, {first!r}, is a frequency, so that this is a spectrum; export the time signal"
         )
     common: dict[str, Any] = {}
+    known = told.rate
     if times:
         word, unit = columns[times[0]]
         common["time"] = table.numbers(times[0]) * _seconds(f"{path}: column {word!r}", unit)
+        if known is None and common["time"].size > 2:
+            known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
+    commas = table.block.decimal_comma and any(
+        "," in cell for row in table.block.rows[:_ABOVE] for cell in row
+    )
+    rate = header_rate(values, str(path), commas, known)
+    if times:
         if rate is not None:
             way_out = "correct the header, or name the times otherwise in columns (--columns), such as "
             agree(str(path), common["time"], rate, f"{way_out}'number [1],velocity [m/s]'")
