@@ -114,7 +114,7 @@ def is_time(name: str) -> bool:
     return _key(name) in TIME_NAMES
 
 
-def _seconds(name: str, unit: str | None) -> float:
+def seconds_in(name: str, unit: str | None) -> float:
     """Seconds in a unit of a time axis, also as in ``milliseconds since 2024-01-01``."""
     last = name.rpartition("/")[2]
     word = (unit or split_unit(last)[1] or "").strip()
@@ -138,7 +138,7 @@ def _time_unit(name: str, unit: str) -> float | None:
     return factor if base == "s" else None
 
 
-def _stated_unit(attributes: Mapping[str, Any]) -> str:
+def stated_unit(attributes: Mapping[str, Any]) -> str:
     """Unit among attributes; empty if there is none."""
     return next((_text(attributes[key]).strip() for key in UNIT_NAMES if key in attributes), "")
 
@@ -154,7 +154,7 @@ def with_time(channels: list[Channel]) -> list[Channel]:
     for channel in channels:
         name = channel["name"]
         if name in stated or is_time(split_unit(name.rpartition("/")[2])[0]):
-            axes[name] = np.asarray(channel["data"], dtype=np.float64) * _seconds(name, channel["unit_str"])
+            axes[name] = np.asarray(channel["data"], dtype=np.float64) * seconds_in(name, channel["unit_str"])
         else:
             signals.append(channel)
     for channel in signals:
@@ -307,7 +307,7 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         if item.data.size == 1 and item.data.dtype.kind in "iufUSO":
             folder, _, last = name.rpartition("/")
             value = item.data.reshape(-1)[0]
-            stated = _stated_unit(item.attributes)
+            stated = stated_unit(item.attributes)
             texts[name] = _text(value)
             levels.setdefault(folder, {})[last] = f"{_text(value)} {stated}" if stated else value
     vectors = {
@@ -345,7 +345,7 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
         for k, row in enumerate(rows):
             own = name if rows.shape[0] == 1 else f"{name} {k + 1}"
-            unit = _stated_unit(item.attributes) or _unit(texts, name)
+            unit = stated_unit(item.attributes) or _unit(texts, name)
             channel: Channel = {"data": row, "name": own, "unit_str": unit, "axis": item.axis}
             if rates:
                 channel["fs"] = _one_rate(rates, own)
@@ -454,10 +454,10 @@ def _stating(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 def _is_axis(name: str, attributes: Mapping[str, Any]) -> bool:
     """Return whether a dimension scale contains times."""
-    stated = _stated_unit(attributes)
+    stated = stated_unit(attributes)
     try:
         return is_time(split_unit(name.rpartition("/")[2])[0]) or (
-            stated != "" and _seconds(name, stated) > 0.0
+            stated != "" and seconds_in(name, stated) > 0.0
         )
     except InputError:
         return False
@@ -1012,7 +1012,7 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
     known = told.rate
     if times:
         word, unit = columns[times[0]]
-        common["time"] = table.numbers(times[0]) * _seconds(f"{path}: column {word!r}", unit)
+        common["time"] = table.numbers(times[0]) * seconds_in(f"{path}: column {word!r}", unit)
         if known is None and common["time"].size > 2:
             known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
     commas = table.block.decimal_comma and any(
@@ -1156,7 +1156,7 @@ def read_uff(path: Path, told: Told) -> list[Channel]:
             )
         if np.iscomplexobj(data):
             raise InputError(f"{name}: complex numbers are no time series")
-        factor = _seconds(f"{name}: the abscissa", _first(entry.get("abscissa_axis_units_lab"), "s"))
+        factor = seconds_in(f"{name}: the abscissa", _first(entry.get("abscissa_axis_units_lab"), "s"))
         unit = _first(entry.get("ordinate_axis_units_lab"), "") or None
         channel: Channel = {"data": data, "name": name, "unit_str": unit}
         if entry["abscissa_spacing"] == 1:

@@ -49,7 +49,8 @@ _WORDS = {
     "second": "s", "seconds": "s", "millisecond": "ms", "milliseconds": "ms", "microsecond": "us",
     "microseconds": "us", "nanosecond": "ns", "nanoseconds": "ns", "volt": "V", "volts": "V",
     "millivolts": "mV", "inch": "in", "inches": "in", "hertz": "Hz", "pascal": "Pa", "newton": "N",
-    "meter": "m", "metre": "m",
+    "meter": "m", "metre": "m", "micron": "um", "microns": "um", "micrometer": "um", "micrometre": "um",
+    "millimeter": "mm", "millimetre": "mm",
 }  # fmt: skip
 KNOWN_UNITS = (
     "m, m/s, m/s^2, N, V, s, Hz or Pa with a prefix k, c, m, u or n, g, in, in/s, in/s^2, or FS (fraction of full "
