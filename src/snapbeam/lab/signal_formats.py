@@ -9,7 +9,7 @@ import tempfile
 import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -94,6 +94,9 @@ _SUFFIX_UNITS = {
 }  # fmt: skip
 _INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (128.0, 128.0)}
 _FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
+_EXPONENT = re.compile(r"(\.\d*)[Dd]([-+]?\d{1,3})$")  # of Fortran
+_DURATIONS = {"sec": 1.0, "min": 60.0, "hr": 3600.0, "day": 86400.0, "days": 86400.0}
+_DURATION = re.compile(rf"([-+\d][^ ]*) ({'|'.join(_DURATIONS)})")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -507,12 +510,15 @@ class TextBlock:
 
 
 def to_number(cell: str, decimal_comma: bool = False) -> float:
-    """The number in a cell; NaN if it holds none."""
+    """The number in a cell, a duration of MATLAB such as ``0.5 min`` in seconds; NaN if it holds none."""
     text = cell.strip().translate(_SIGNS)
+    duration = _DURATION.fullmatch(text)
+    if duration:
+        return to_number(duration[1], decimal_comma) * _DURATIONS[duration[2]]
     if decimal_comma and "," in text:
         text = _with_point(text, ",")
     try:
-        return float(text) if "_" not in text else math.nan
+        return float(_EXPONENT.sub(r"\1e\2", text)) if "_" not in text else math.nan
     except ValueError:
         return math.nan
 
@@ -582,7 +588,16 @@ def _dialects(lines: list[str]) -> list[_Dialect]:
                 used = tuple(i for i, cell in enumerate(row) if cell)
                 following = cells[k : k + 3]
                 if all(_is_row(one, used, comma) and sum(map(bool, one)) == len(used) for one in following):
-                    found.append(_Dialect(separator, comma, k, used))
+                    one = _Dialect(separator, comma, k, used)
+                    before = replace(one, first=k - 1)
+                    # the first row may have more cells, such as the settings of an instrument
+                    wide = (
+                        k
+                        and separator
+                        and len(cells[k - 1]) > used[-1] + 1
+                        and _is_row(cells[k - 1], used, comma)
+                    )
+                    found.append(before if wide and _heads(lines, before)[0] else one)
                     break
     return found
 
@@ -599,7 +614,7 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     """Take a text file apart; *columns* is the number of columns, if the user gives it."""
     text = decoded(path.read_bytes(), str(path))
     numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
-    comments = [line.strip().lstrip("#%/!").strip() for _, line in numbered if line.startswith(_COMMENT)]
+    marked = [(i, line.strip().lstrip("#%/!").strip()) for i, line in numbered if line.startswith(_COMMENT)]
     numbered = [(i, line) for i, line in numbered if not line.startswith(_COMMENT)]
     lines = [line for _, line in numbered]
     if not lines:
@@ -618,7 +633,12 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
             f"{path}: no row of numbers in its first {min(len(lines), _LOOK)} lines; its columns may not be separated "
             "by semicolons, tabs, commas or blanks"
         )
-    dialect, names, units, taken = _best(path, lines, dialects, columns)
+    places = [0, *(i for i, _ in numbered)]
+    above = {
+        one.first: [text for i, text in marked if places[one.first] < i < places[one.first + 1]]
+        for one in dialects
+    }
+    dialect, names, units, taken = _best(path, lines, dialects, columns, above)
     first = _earlier(lines, dialect)
     try:
         cells = _cells(lines[first:], dialect.separator)
@@ -631,23 +651,28 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
         tell([KINDS_SIGNAL["cut_in_number"].found(told=last)])
     return TextBlock(
         path=path,
-        header=(*comments, *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken)),
+        header=(
+            *(text for _, text in marked),
+            *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken),
+        ),
         names=names,
         units=units,
-        rows=[_kept(row, dialect, numbered[first + k][0], path, names) for k, row in enumerate(cells)],
+        rows=[
+            _kept(row, dialect, numbered[first + k][0], path, names, k == 0) for k, row in enumerate(cells)
+        ],
         lines=[i for i, _ in numbered[first:]],
         decimal_comma=dialect.decimal_comma,
     )
 
 
 def _kept(
-    cells: list[str], dialect: _Dialect, line: int, path: Path, names: tuple[str, ...] | None
+    cells: list[str], dialect: _Dialect, line: int, path: Path, names: tuple[str, ...] | None, first: bool
 ) -> list[str]:
     """The cells of a row that belong to the table's columns."""
     last = max(dialect.used)
     whole = len(cells) > last
     extra = dialect.separator is None and len(cells) != len(dialect.used)
-    stray = any(cells[last + 1 :])
+    stray = any(cells[last + 1 :]) and not first
     if not whole or extra or stray:
         count = len([cell for cell in cells if cell]) if stray or extra else len(cells)
         told = "the header names" if names else "the first has"
@@ -667,10 +692,23 @@ def _earlier(lines: list[str], dialect: _Dialect) -> int:
 
 
 def _best(
-    path: Path, lines: list[str], dialects: list[_Dialect], columns: int
+    path: Path, lines: list[str], dialects: list[_Dialect], columns: int, above: Mapping[int, list[str]]
 ) -> tuple[_Dialect, tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
-    """The dialect whose header fits its columns, its names and units, and the lines these stand on."""
-    seen = [(one, *_heads(lines, one)) for one in dialects]
+    """The dialect whose header fits its columns, its names and units, and the lines these stand on.
+
+    *above* are the comments before the first row of each; the last may name the columns.
+    """
+    seen = []
+    for one in dialects:
+        names, units, taken = _heads(lines, one)
+        comments = above[one.first]
+        if names is None and comments:
+            following = lines[one.first : one.first + 3]
+            names, units, _ = _heads([*comments, *following], replace(one, first=len(comments)))
+            parts = [split_unit(name) for name in names or ()]
+            stated = any(is_time(word) or (unit and _like_unit(unit)) for word, unit in parts)
+            names = names if stated and not re.search("[=:]", "".join(names or ())) else None
+        seen.append((one, names, units if names else None, taken))
     if columns:
         seen = [entry for entry in seen if len(entry[0].used) == columns] or seen
     named = [entry for entry in seen if entry[1] is not None]
@@ -695,12 +733,13 @@ def _heads(
     above: list[tuple[int, list[str]]] = []
     count = len(dialect.used)
     for k in range(dialect.first - 1, max(dialect.first - 3, -1), -1):
-        blanks = dialect.separator is None
-        cells = [lines[k].strip()] if blanks and count == 1 else _cells([lines[k]], dialect.separator)[0]
+        cells = _cells_of_names(lines[k], dialect)
         row = dialect.row_of(cells)
-        fits = len([cell for cell in cells if cell]) >= count and all(row)
+        if len([cell for cell in cells if cell]) < count or not all(row):
+            rows = _cells(lines[dialect.first : dialect.first + 3], dialect.separator)
+            row = _wider([cell for cell in cells if cell], [dialect.row_of(one) for one in rows])
         text = any(re.search(r"[^\W\d_]", cell) and not math.isfinite(to_number(cell)) for cell in row)
-        if not fits or not text or (blanks and len(cells) != count):
+        if not text or (dialect.separator is None and len(cells) > count):
             break
         above.append((k, row))
     if not above:
@@ -709,6 +748,39 @@ def _heads(
     if len(above) == 2 and all(_like_unit(cell) for cell in last):
         return tuple(above[1][1]), tuple(last), {at, above[1][0]}
     return tuple(last), None, {at}
+
+
+def _cells_of_names(line: str, dialect: _Dialect) -> list[str]:
+    """Cells of a line that may name the columns; above blanks names may have commas between them, and units in brackets."""
+    count = len(dialect.used)
+    if dialect.separator is not None or count == 1:
+        return [line.strip()] if dialect.separator is None else _cells([line], dialect.separator)[0]
+    ways = [[cell.strip() for cell in line.split(mark)] for mark in ",;\t"]
+    ways.append(re.sub(r"\s+(?=[\[(])", "", line).split())
+    return next((cells for cells in ways if len(cells) == count), line.split())
+
+
+def _wider(words: list[str], rows: list[list[str]]) -> list[str]:
+    """Names of all columns where one is not named: ``""`` for an index in front, as pandas and R write it; else empty.
+
+    Without an index the first name must be the time and fit the first column alone.
+    """
+    values = [[to_number(cell) for cell in row] for row in rows]
+    if len(words) != len(rows[0]) - 1 or not words or len(rows) < 3:
+        return []
+    if any(math.isfinite(to_number(word)) or re.search("[=:]", word) for word in words):
+        return []
+    steps = [
+        [after - before for before, after in zip(*pair, strict=True)] for pair in (values[:2], values[1:])
+    ]
+    if values[0][0] in (0.0, 1.0) and steps[0][0] == steps[1][0] == 1.0:
+        return ["", *words]
+    rising = [min(one[k] for one in steps) > 0.0 for k in (0, 1)]
+    return (
+        [*words, f"column {len(rows[0])}"]
+        if is_time(split_unit(words[0])[0]) and rising == [True, False]
+        else []
+    )
 
 
 def _like_unit(cell: str) -> bool:
@@ -970,9 +1042,16 @@ def read_table(path: Path, columns: str | None = None) -> Table:
         raise InputError(
             f"{path}: columns (--columns) = {columns!r} names {len(names)}, the rows have {width}"
         )
+    columns_of = list(zip(*block.rows, strict=True))
+    if (
+        not names[0]
+        and len(names) > 1
+        and (np.diff([to_number(cell) for cell in columns_of[0]]) == 1.0).all()
+    ):
+        names, columns_of = names[1:], columns_of[1:]  # the index of a data frame
     if "" in names or len(set(names)) < len(names):
         raise InputError(f"{path}: columns {list(names)}: each must have a name of its own")
-    return Table(block, dict(zip(names, zip(*block.rows, strict=True), strict=True)))
+    return Table(block, dict(zip(names, columns_of, strict=True)))
 
 
 def _names(block: TextBlock) -> tuple[str, ...] | None:
@@ -988,7 +1067,7 @@ def _names(block: TextBlock) -> tuple[str, ...] | None:
     joined = []
     for name, unit in zip(block.names, block.units, strict=True):
         word = unit.strip().strip("[]()").strip()
-        known = split_unit(name)[1] is not None or word in ("", "-")
+        known = not name or split_unit(name)[1] is not None or word in ("", "-")
         joined.append(name if known else f"{name} [{word}]")
     return tuple(joined)
 
@@ -1012,6 +1091,11 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
     known = told.rate
     if times:
         word, unit = columns[times[0]]
+        duration = _DURATION.fullmatch(table.columns[times[0]][0])
+        if duration and unit not in (None, "s"):
+            raise InputError(
+                f"{path}: column {times[0]!r} has times such as {duration[0]!r}: remove one of the units"
+            )
         common["time"] = table.numbers(times[0]) * seconds_in(f"{path}: column {word!r}", unit)
         if known is None and common["time"].size > 2:
             known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
