@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 import re
 import tempfile
 import warnings
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,8 +24,9 @@ from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import decoded, refuse_inflated
 from snapbeam.util.netcdf import hdf5_stream
+from snapbeam.util.packages import needing
 from snapbeam.util.tables import universal_record, write_universal
-from snapbeam.util.validation import InputError, positive
+from snapbeam.util.validation import InputError, file_path, positive
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,6 +99,11 @@ _FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
 _EXPONENT = re.compile(r"(\.\d*)[Dd]([-+]?\d{1,3})$")  # of Fortran
 _DURATIONS = {"sec": 1.0, "min": 60.0, "hr": 3600.0, "day": 86400.0, "days": 86400.0}
 _DURATION = re.compile(rf"([-+\d][^ ]*) ({'|'.join(_DURATIONS)})")
+SPECTRA = {
+    2: "auto spectrum", 3: "cross spectrum", 4: "frequency response", 5: "transmissibility", 6: "coherence",
+    9: "power spectral density", 10: "energy spectral density", 12: "spectrum",
+}  # fmt: skip
+"""Functions over frequency in a record of dataset 58, by their codes."""
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -1206,38 +1213,11 @@ def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
         writer.write_segment([ChannelObject("snapbeam", str(signal.name), values, properties=properties)])
 
 
-def read_uff(path: Path, told: Told) -> list[Channel]:
+def read_uff(path: Path, _told: Told) -> list[Channel]:
     """Return the channels of a universal file (dataset 58)."""
-    import pyuff
-
-    content = path.read_bytes()
-    # exponents as Fortran writes them, which pyuff does not read
-    if _FORTRAN.search(content) and b"58b" not in content:
-        with tempfile.TemporaryDirectory() as folder:
-            copy = Path(folder) / path.name
-            copy.write_bytes(_FORTRAN.sub(rb"\1E\2", content))
-            return read_uff(copy, told)
-    file = pyuff.UFF(str(path))
-    kinds, bodies = file.get_set_types(), _bodies(content)
     channels: list[Channel] = []
-    for number, kind in enumerate(kinds):
-        if kind != 58:
-            continue
-        entry = file.read_sets(number, header_only=True)
-        if entry.get("func_type") not in (0, 1):
-            continue
-        name = _first(entry["id1"], f"channel {len(channels) + 1}")
-        if not entry["binary"]:
-            if len(bodies) != kinds.tolist().count(58):
-                raise InputError("mixes binary and ASCII datasets 58: write each kind to a file of its own")
-            entry |= _numbers_58(name, bodies[kinds[:number].tolist().count(58)], entry)
-        else:
-            entry = file.read_sets(number)
-        data = np.asarray(entry["data"])
-        if data.size != entry["num_pts"]:
-            raise InputError(
-                f"{name}: the header promises {entry['num_pts']} samples, the file has {data.size}"
-            )
+    for name, entry in _records_58(path, (0, 1)):
+        data = entry["data"]
         if np.iscomplexobj(data):
             raise InputError(f"{name}: complex numbers are no time series")
         factor = seconds_in(f"{name}: the abscissa", _first(entry.get("abscissa_axis_units_lab"), "s"))
@@ -1253,8 +1233,110 @@ def read_uff(path: Path, told: Told) -> list[Channel]:
             channel["time"] = np.asarray(entry["x"]) * factor
         channels.append(channel)
     if not channels:
-        raise InputError("holds no whole time response in a dataset 58")
+        spectra = len(list(_records_58(path, tuple(SPECTRA))))
+        way_out = f"; read its {spectra} spectra by lab.read_spectra" if spectra else ""
+        raise InputError(f"holds no whole time response in a dataset 58{way_out}")
     return numbered(channels)
+
+
+def _records_58(path: Path, functions: tuple[int, ...]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and entry of each dataset 58 of these kinds of function, with its numbers."""
+    import pyuff
+
+    content = path.read_bytes()
+    # exponents as Fortran writes them, which pyuff does not read
+    if _FORTRAN.search(content) and b"58b" not in content:
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / path.name
+            copy.write_bytes(_FORTRAN.sub(rb"\1E\2", content))
+            yield from _records_58(copy, functions)
+        return
+    file = pyuff.UFF(str(path))
+    kinds, bodies = file.get_set_types().tolist(), _bodies(content)
+    count = 0
+    for number, kind in enumerate(kinds):
+        entry = file.read_sets(number, header_only=True) if kind == 58 else {}
+        if entry.get("func_type") not in functions:
+            continue
+        count += 1
+        name = _first(entry["id1"], f"channel {count}")
+        if not entry["binary"]:
+            if len(bodies) != kinds.count(58):
+                raise InputError("mixes binary and ASCII datasets 58: write each kind to a file of its own")
+            entry |= _numbers_58(name, bodies[kinds[:number].count(58)], entry)
+        else:
+            entry = file.read_sets(number)
+        entry["data"] = np.asarray(entry["data"])
+        if entry["data"].size != entry["num_pts"]:
+            raise InputError(
+                f"{name}: the header promises {entry['num_pts']} samples, the file has {entry['data'].size}"
+            )
+        yield name, entry
+
+
+def read_spectra(path: str | os.PathLike[str]) -> list[xr.DataArray]:
+    """Read the frequency responses and spectra of a universal file (dataset 58).
+
+    Parameters
+    ----------
+    path : path
+        ``.uff`` or ``.unv``, ASCII or binary.
+
+    Returns
+    -------
+    list of xarray.DataArray
+        Over ``frequency`` [Hz], complex where the file is, in the units of the file, as ``"m/s/N"``.  The attribute
+        ``function`` is the kind, such as "frequency response" or "coherence".
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or has none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab
+    >>> force = lab.make_signal(np.random.default_rng(0).standard_normal(20_000), "N", 2000.0, name="force")
+    >>> motion = lab.make_signal(0.002 * force.values, "m", 2000.0, name="tip")
+    >>> left_out = sb.write_table(lab.frequency_response(force, motion, resolution=5.0), "frf.uff")
+    >>> response, coherence = lab.read_spectra("frf.uff")
+    >>> print(f"{abs(response.sel(frequency=100.0).item()):.4f} {response.attrs['units']}")
+    0.0020 m/N
+    """
+    from snapbeam.util.datasets import xr
+
+    file = file_path("path", path)
+    if not file.is_file():
+        raise InputError(f"{file}: no such file")
+    found = []
+    with needing(f"{file}: reading it", "lab"):
+        import pyuff  # noqa: F401
+    try:
+        for name, entry in _records_58(file, tuple(SPECTRA)):
+            over = _first(entry.get("abscissa_axis_units_lab"), "Hz")
+            factor, base = si_unit(f"abscissa of {name}", over)
+            if base != "Hz":
+                raise InputError(f"{name}: its abscissa is in {over!r}, not in Hz")
+            count = entry["data"].size
+            even = float(entry["abscissa_min"]) + float(entry["abscissa_inc"]) * np.arange(count)
+            lines = factor * (even if entry["abscissa_spacing"] == 1 else np.asarray(entry["x"]))
+            units = [
+                _first(entry.get(f"{which}_axis_units_lab"), "").strip() for which in ("ordinate", "orddenom")
+            ]
+            unit = "/".join(each for each in (units[0] or "1", units[1]) if each)
+            axis = ("frequency", lines, {"units": "Hz", "long_name": "frequency"})
+            words = SPECTRA[entry["func_type"]]
+            attrs = {"units": unit, "long_name": words, "function": words, "source": file.name}
+            found.append(xr.DataArray(entry["data"], {"frequency": axis}, ("frequency",), name, attrs))
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    except Exception as error:  # a damaged file makes pyuff raise many kinds
+        raise InputError(f"{file}: cannot be read as a universal file ({error})") from error
+    if not found:
+        raise InputError(f"{file}: has no spectrum in a dataset 58")
+    return found
 
 
 def _bodies(content: bytes) -> list[list[str]]:
@@ -1267,19 +1349,23 @@ def _bodies(content: bytes) -> list[list[str]]:
 
 def _numbers_58(name: str, body: list[str], entry: Mapping[str, Any]) -> dict[str, Any]:
     """``data`` and ``x`` of an ASCII dataset 58, whatever the width of its numbers, without zeros that fill its last line."""
-    if entry["ord_data_type"] not in (2, 4):
-        raise InputError(f"{name}: complex numbers, or of a type that is not known, are no time series")
+    if entry["ord_data_type"] not in (2, 4, 5, 6):
+        raise InputError(f"{name}: numbers of type {entry['ord_data_type']}: must be 2 or 4, complex 5 or 6")
+    parts = 2 if entry["ord_data_type"] > 4 else 1
     rows = []
     for line in body:
         if _NUMBER.sub("", line).strip():
             raise InputError(f"{name}: {line.strip()[:60]!r} is no line of numbers")
         rows.append([float(word) for word in _NUMBER.findall(line)])
     values = np.array([number for row in rows for number in row])
-    each = 1 if entry["abscissa_spacing"] == 1 else 2
+    each = parts if entry["abscissa_spacing"] == 1 else parts + 1
     count = each * int(entry["num_pts"])
     if values.size > count and count > values.size - len(rows[-1]) and not values[count:].any():
         values = values[:count]
-    return {"data": values[each - 1 :: each], "x": values[::each]}
+    data = values[each - 1 :: each]
+    if parts == 2 and values.size % each == 0:
+        data = values[each - 2 :: each] + 1j * data
+    return {"data": data, "x": values[::each]}
 
 
 def _undo_rounding(step: float) -> float:
