@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.util.validation import InputError
+from snapbeam.lab.signals import grid_of
+from snapbeam.util.validation import InputError, finite_array
 
 _UNEVEN = 0.3  # of the time between frames by which a stamp may be off
 _TIME_BLOCK = 1002  # kind of the block of a .cine file that holds a time for each frame
@@ -26,6 +27,7 @@ def numbers_of_stamps(
     InputError
         If the stamps do not increase, are uneven, or tell lost frames without their place.
     """
+    times = finite_array(f"{path}: time stamps", times, 1)
     plain, steps = np.arange(times.size), np.diff(times)
     if times.size < 3:
         return plain, step or float(steps.sum())
@@ -52,13 +54,13 @@ def numbers_of_stamps(
     else:
         numbers = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(steps / step), 1.0))])
     for _ in range(3):
-        step, start = (float(each) for each in np.polyfit(numbers, times - times[0], 1))
-        numbers = np.rint((times - times[0] - start) / step)
+        step, off = grid_of(times, numbers)
+        numbers = np.rint(numbers + off)
         numbers -= numbers[0]
     gaps = np.diff(numbers)
-    off = np.abs(steps - gaps * step)
-    at = int(np.argmax(off))
-    if (gaps < 1.0).any() or off[at] > max(1.01 * tick, _UNEVEN * step):
+    uneven = np.abs(steps - gaps * step)
+    at = int(np.argmax(uneven))
+    if (gaps < 1.0).any() or uneven[at] > max(1.01 * tick, _UNEVEN * step):
         raise InputError(
             f"{path}: its time stamps are uneven: {steps[at]:.6g} s between frames {at} and {at + 1}, {step:.6g} s between the "
             "others; record at an even frame rate, or save the frames as numbered images"

@@ -144,13 +144,14 @@ def even_sampling(name: str, time: ArrayLike) -> tuple[float, float]:
         )
     typical = float(np.median(steps))
     counted = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(steps / typical), 1.0))])
-    if counted[-1] >= times.size and _off_grid(times, counted)[1].max() < _ON_GRID:
+    if counted[-1] >= times.size and np.abs(grid_of(times, counted)[1]).max() < _ON_GRID:
         at = int(np.argmax(steps > 1.5 * typical))
         raise InputError(
             f"{name}: gap of {steps[at]:.6g} s after time[{at}] = {times[at]:.9g} s where the step is "
             f"{typical:.6g} s: samples are missing; cut the signal there"
         )
-    step, off = _off_grid(times, np.arange(times.size))
+    step, off = grid_of(times, np.arange(times.size))
+    off = np.abs(off)
     if off.max() > 0.2:
         at = int(np.argmax(off))
         raise InputError(
@@ -162,11 +163,11 @@ def even_sampling(name: str, time: ArrayLike) -> tuple[float, float]:
     return float(times.mean() - step * (times.size - 1) / 2), 1.0 / step
 
 
-def _off_grid(times: NDArray[np.float64], number: NDArray[Any]) -> tuple[float, NDArray[np.float64]]:
-    """Step of the grid of these numbers that fits the times best, and how far each time is off it, in steps."""
+def grid_of(times: NDArray[np.float64], number: NDArray[Any]) -> tuple[float, NDArray[np.float64]]:
+    """Step of the grid of these numbers that fits the times best, and by how many steps each time lies after it."""
     count = number - number.mean()
     step = float(count @ times / (count @ count))
-    return step, np.abs(times - (times.mean() + step * count)) / step
+    return step, (times - (times.mean() + step * count)) / step
 
 
 def make_signal(
