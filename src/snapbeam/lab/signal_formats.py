@@ -656,9 +656,13 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     if not text.endswith("\n") and _is_short(cells):
         last = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
         tell([KINDS_SIGNAL["cut_in_number"].found(told=last)])
+    beyond = " ".join(
+        cell for cell in cells[0][max(dialect.used) + 1 :] if cell
+    )  # settings behind the first row
     return TextBlock(
         path=path,
         header=(
+            beyond,
             *(text for _, text in marked),
             *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken),
         ),
