@@ -9,14 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import (
-    AdvancedStates,
-    Flow,
-    Stroboscope,
-    fixed_parameters,
-    flow_of,
-    settling_periods,
-)
+from snapbeam.dynamics.flow import AdvancedStates, Flow
+from snapbeam.dynamics.results import fixed_parameters
+from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
@@ -61,8 +56,7 @@ def lyapunov_spectrum(
     """The largest Lyapunov exponents, by tangents with a QR factorisation at every whole period.
 
     The linearised time steps of the run advance k small changes, which are orthonormalised once a period (Benettin,
-    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  Differences of order six between neighbouring states replace
-    them for strikers with mass, local forces, harvesters, and contact forces that jump or depend on the velocity.  The
+    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  The
     exponents are the logarithms of the growth, divided by the time.  A run that snaps and then settles has two kinds: those
     of the transient, and those of the settled motion.  Set ``transient=0`` to obtain both: the default transient is
     usually longer than the snap-through.
@@ -97,7 +91,7 @@ def lyapunov_spectrum(
     Raises
     ------
     InputError
-        If a number is out of range, or a user-defined flow has no tangents: see :func:`largest_lyapunov`.
+        If a number is out of range.
 
     Examples
     --------
@@ -114,10 +108,6 @@ def lyapunov_spectrum(
     count = integer("k", k, 1, flow.dimension)
     total = integer("periods", periods, _BLOCKS, 10**7)
     before, rule = _transient(flow, transient, 0)
-    if not flow.smooth:
-        raise InputError(
-            "system: the flow advances no tangents; use largest_lyapunov for the largest exponent"
-        )
     begun, points, columns = _runs(flow, states, axes)
     advanced = (
         flow.advance(begun, before, points=columns) if before else flow.advance(begun, 1, points=columns)
@@ -294,7 +284,7 @@ def _periods(flow: Flow, points: Points) -> _Array:
     columns = points.take(np.arange(points.size))
     rows, which = np.unique(np.stack([columns[name] for name in names], axis=1), axis=0, return_inverse=True)
     systems = [flow.system.replace(**dict(zip(names, map(float, row), strict=True))) for row in rows]
-    return flow.cycles_per_period * np.array([cycle_of(system) for system in systems])[which.ravel()]
+    return flow.clock.cycles_per_period * np.array([cycle_of(system) for system in systems])[which.ravel()]
 
 
 @checked
