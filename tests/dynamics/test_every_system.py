@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, jacobian
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model import default_values as paper
 from snapbeam.util.differences import differences
 

@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 from scipy.special import beta
 
 import snapbeam as sb
-from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.dynamics.approaches import passage_of
+from snapbeam.dynamics.stroboscope import Stroboscope
 
 SWING = 1.0
 STIFFNESS = 1e9

@@ -241,15 +241,17 @@ class _Structure:
     def _stiffness(self, z: _Array) -> _Array:
         """Second derivative of the potential energy without contacts."""
         found, n = self.linear.copy(), self.model.modes
-        found[:n, :n] += self.potential.tangent(z[:n])
+        found[:n, :n] += self.potential._tangent(z[:n])
         return found
 
     def acceleration(self, y: _Array) -> _Array:
         """y'' of coordinates about the well, per omega_1^2."""
         away = self.back @ y
         z, n = self.rest + away, self.model.modes
+        if self.potential.local_forces and not self.potential._holds(z[:n]):
+            raise OrbitNotFoundError("the motion leaves the range of the law of a local force")
         force = -self.linear @ away
-        force[:n] -= self.potential.gradient(z[:n])
+        force[:n] -= self.potential._gradient(z[:n])
         for law, row, begin in self.stops:
             depth = begin + float(row @ z)
             if depth > 0.0:
@@ -295,6 +297,8 @@ class _Structure:
 
         def rate(_: float, z: _Array) -> _Array:
             y, v = z[:n], z[n : 2 * n]
+            if not columns:
+                return np.concatenate((v, self.acceleration(y)))
             carried = z[2 * n :].reshape(2 * n, columns)
             bent = self.slope(y) @ carried[:n]
             return np.concatenate((v, self.acceleration(y), carried[n:].ravel(), bent.ravel()))
@@ -331,6 +335,7 @@ class _Motions(Equations):
     """Motions that begin at rest and turn back half a period later.  A point is (y, half period)."""
 
     tolerance = _CONVERGED
+    easy, hard = 8, 12
 
     def __init__(self, structure: _Structure, amplitude_limit: float, longest: float) -> None:
         self.structure, self.amplitude_limit, self.longest = structure, amplitude_limit, longest
@@ -338,10 +343,7 @@ class _Motions(Equations):
     def _half(self, point: _Array, columns: int) -> tuple[_Array, _Array, _Array]:
         if not 0.0 < point[-1] < 1e4 or not np.isfinite(point).all():
             raise OrbitNotFoundError("no half period is left")
-        try:
-            return self.structure.half(point[:-1], float(point[-1]), columns)
-        except InputError as error:
-            raise OrbitNotFoundError(f"the motion leaves the range of a law ({error})") from None
+        return self.structure.half(point[:-1], float(point[-1]), columns)
 
     def residual(self, y: _Array) -> _Array:
         """Velocity where the motion turns back, shape (n,)."""
@@ -352,6 +354,10 @@ class _Motions(Equations):
         n = self.structure.size
         turned, v, carried = self._half(y, n)
         return v, turned, np.column_stack([carried[n:], self.structure.acceleration(turned)])
+
+    def prepare(self, last: Point, is_first: bool) -> _Array | None:
+        """None: that of another motion serves for few steps."""
+        return None
 
     def require_next(self, last: Point, point: Point) -> None:
         """Refuse a point around too sharp a bend."""
