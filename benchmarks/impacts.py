@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import snapbeam as sb
-from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.stroboscope import Stroboscope
 
 __all__ = ["Way", "ways"]
 

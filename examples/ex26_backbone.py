@@ -15,7 +15,9 @@ for modes in (1, 3):
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
     for well, limit in (("lower", 1.2), ("both", 2.0)):
         curves.append(
-            sb.dynamics.backbone_curve(model, well=well, amplitude_limit=limit)
+            sb.dynamics.backbone_curve(
+                sb.System(model), well=well, amplitude_limit=limit
+            )
         )
         labels.append(
             f"{'one well' if well == 'lower' else 'both wells'}, {modes} mode{'s' if modes > 1 else ''}"

@@ -381,9 +381,9 @@ def _plain_text(text: str) -> str:
 def _questions() -> dict[str, Any]:
     """Functions of a system that return a word, or None for yes, and raise an InputError for no."""
     import snapbeam as sb
-    from snapbeam.dynamics.flow import Stroboscope
     from snapbeam.dynamics.lifetimes import require_excitation
-    from snapbeam.dynamics.periodic_orbits import require_isolated_orbits
+    from snapbeam.dynamics.shooting import require_isolated_orbits
+    from snapbeam.dynamics.stroboscope import Stroboscope
     from snapbeam.solver.assemble import make_ensemble
 
     def advance(system: Any) -> None:

@@ -12,7 +12,7 @@ from mixed_oracle import Around, MixedBeam, Tip, solve
 from oracle import LEVEL, LOCATION, PaperBeam
 
 import snapbeam as sb
-from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model import default_values
 
 SLOW = pytest.mark.slow
@@ -48,7 +48,7 @@ def system_of(names: tuple[str, ...], **phases: float) -> sb.System:
 
 def advanced(system: sb.System, flow: Stroboscope, **how) -> np.ndarray:
     found = sb.advance(system, periods=PERIODS, save_every_period=True, **how)
-    return np.concatenate([found.amplitude, found.velocity], axis=1) / flow.scales
+    return np.concatenate([found.amplitude, found.velocity], axis=1) / flow.space.scales
 
 
 @pytest.mark.parametrize("names", MIXTURES)
@@ -107,7 +107,7 @@ def test_against_an_independent_solution(names) -> None:
     else:
         own = {name: motion for name, motion in (("base", base), ("load", load)) if name in names}
         truth = live(PaperBeam(2), Surroundings(**own), times).midspan_displacement
-    every = flow.advance(flow.coordinates(), PERIODS, every=True).every[0] * flow.scales
+    every = flow.advance(flow.coordinates(), PERIODS, every=True).every[0] * flow.space.scales
     found = every[:, :2] @ MODEL.midspan_shape / MODEL.length_scale
     np.testing.assert_allclose(found, truth[40::40], rtol=0.0, atol=2e-6)
 
@@ -119,7 +119,7 @@ def test_sections_orbits_and_diagrams_begin_at_the_phase() -> None:
     exact = sb.Integration(accuracy="reference")
     flow = Stroboscope(system, exact)
     section = sb.dynamics.poincare_section(system, periods=PERIODS, transient=0, integration=exact)
-    wanted = advanced(system, flow, integration=exact)[:, :2] * flow.scales[:2]
+    wanted = advanced(system, flow, integration=exact)[:, :2] * flow.space.scales[:2]
     size = float(np.abs(wanted).max())
     np.testing.assert_allclose(section.modal_amplitude[1:], wanted, rtol=0.0, atol=1e-6 * size)
     turned = (section.drive_phase.values - PHASES["base"] + 1.0) % (2.0 * math.pi)
@@ -133,7 +133,7 @@ def test_sections_orbits_and_diagrams_begin_at_the_phase() -> None:
     rows = np.repeat(flow.coordinates(), 3, axis=0)
     found = flow.advance(rows, PERIODS, points={"base_excitation.phase": phases}).states
     for phase, row in zip(phases, found, strict=True):
-        one = flow.neighbour("base_excitation.phase", float(phase))
+        one = flow.changed({"base_excitation.phase": float(phase)})
         np.testing.assert_allclose(one.advance(one.coordinates(), PERIODS).states[0], row, atol=1e-12)
     assert np.abs(np.diff(found, axis=0)).max(axis=1).min() > 1e-3
 
@@ -150,7 +150,7 @@ def test_the_phase_of_a_start_counts() -> None:
 def test_phases_that_would_be_ignored_are_refused() -> None:
     flow = Stroboscope(system_of(("striker",)), phase=1.0)
     with pytest.raises(sb.InputError, match=r"phase = 1: must not be given if drive.phase changes"):
-        flow.neighbour("drive.phase", 0.3)
+        flow.changed({"drive.phase": 0.3})
     with pytest.raises(
         sb.InputError, match=r"state phase = .*: must be the phase at which the system is observed"
     ):

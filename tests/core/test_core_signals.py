@@ -11,7 +11,7 @@ from core_systems import arrays, beam, stop
 
 import snapbeam as sb
 from snapbeam import _core
-from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model import default_values
 from snapbeam.model.drive.base import DRIVES, Drive, Timed
 from snapbeam.model.drive.components import Tone, fitted, in_pieces

@@ -15,8 +15,6 @@ Map = Callable[[np.ndarray, dict], np.ndarray]
 class KnownMap:
     """A map and its derivative, for batches of states; parameters are numbers or one for each state."""
 
-    smooth = True
-
     def __init__(self, step: Map, slope: Map, dimension: int, period: float = 1.0, **values: float) -> None:
         self._step, self._slope = step, slope
         self.dimension, self.period, self.values = dimension, period, values
@@ -33,8 +31,8 @@ class KnownMap:
             seen.append(x)
         return AdvancedStates(x, np.stack(seen, axis=1) if every else None, moved, {}, x)
 
-    def neighbour(self, name, value):
-        return KnownMap(self._step, self._slope, self.dimension, self.period, **(self.values | {name: value}))
+    def changed(self, values):
+        return KnownMap(self._step, self._slope, self.dimension, self.period, **(self.values | dict(values)))
 
     def value(self, name):
         return self.values[name]

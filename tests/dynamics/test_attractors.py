@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from test_orbits import system_of
 
 import snapbeam as sb
-from snapbeam.dynamics.flow import Stroboscope, settling_periods
+from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.util import diagnostics
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.dynamics.flow import Stroboscope
-from snapbeam.dynamics.periodic_orbits import Family, OrbitNotFoundError, jacobian
+from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, jacobian
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model import default_values as paper
 from snapbeam.util.differences import differences
 
@@ -112,7 +112,7 @@ def test_coordinates_hold_the_whole_state() -> None:
     x = settled(flow)
     assert np.abs(x[4:]).min() > 1e-6
     assert flow.coordinates(flow.state(x)) == pytest.approx(x[None], abs=1e-15)
-    run = sb.simulate(flow.starting(flow.state(x)), PRECISE.replace(cycles=1, early_termination=False))
+    run = sb.simulate(flow.starting(x), PRECISE.replace(cycles=1, early_termination=False))
     ended = flow._coordinates_of(run.final_state.flat())[0]
     assert flow.advance(x[None]).states[0] == pytest.approx(ended, abs=1e-8)
     once, twice = flow.advance(x[None]), flow.advance(x[None], 2)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model import default_values
 from snapbeam.model.drive.base import HORIZON
 
@@ -243,14 +243,16 @@ def test_exponents_and_the_map(ratio: float, cycles: int) -> None:
     """The exponents add up to the damping; the map is ``advance`` over the common period."""
     system = struck(ratio=ratio)
     flow = Stroboscope(system)
-    assert flow.cycles_per_period == cycles
+    assert flow.clock.cycles_per_period == cycles
     found = sb.dynamics.lyapunov_spectrum(system, periods=20, transient=5, k=4)
     expected = -2.0 * float((system.model.damping_ratio * system.model.omega).sum())
     assert float(found.exponent.sum()) == pytest.approx(
         expected, rel=2e-6
     )  # times of impacts at level standard
     every = sb.advance(flow.system, periods=4 * cycles, save_every_period=True)
-    wanted = np.concatenate([every.amplitude, every.velocity], axis=1)[cycles - 1 :: cycles] / flow.scales
+    wanted = (
+        np.concatenate([every.amplitude, every.velocity], axis=1)[cycles - 1 :: cycles] / flow.space.scales
+    )
     once = flow.advance(flow.coordinates(), 4, every=True).every[0]
     np.testing.assert_array_equal(once, wanted)
     here = flow.coordinates()
@@ -268,9 +270,9 @@ def test_an_orbit_is_one_of_the_run_itself(ratio: float, velocity: float) -> Non
     flow = Stroboscope(system, EXACT)
     lost = math.exp(-0.1 * float(system.model.omega.sum()) * flow.period)
     assert float(np.prod(orbit.multipliers).real) == pytest.approx(lost, rel=1e-8)
-    how = EXACT.replace(cycles=6 * flow.cycles_per_period)
+    how = EXACT.replace(cycles=6 * flow.clock.cycles_per_period)
     run = sb.simulate(orbit.system, how, sample_times=flow.period * np.arange(6))
-    assert np.ptp(run.dataset.modal_amplitude.values, axis=0).max() < 1e-9 * flow.scales[0]
+    assert np.ptp(run.dataset.modal_amplitude.values, axis=0).max() < 1e-9 * flow.space.scales[0]
     assert set(run.impacts.striker.values.astype(int)) == {1, 2}
     seen = orbit.contact_summary
     assert 5 * seen.impacts <= run.summary.impacts <= 7 * seen.impacts
@@ -305,7 +307,7 @@ def test_phases_of_each_striker_count(shift: float) -> None:
     flow, other = Stroboscope(system, EXACT, phase=at[0] + shift), Stroboscope(shifted, EXACT)
     x = other.coordinates()
     np.testing.assert_allclose(flow.advance(x, 1).states, other.advance(x, 1).states, atol=1e-9)
-    assert flow.striker_phase == pytest.approx(other.striker_phase)
+    assert flow.clock.striker_phase == pytest.approx(other.clock.striker_phase)
     section = sb.dynamics.poincare_section(
         system, periods=3, transient=2, phase=at[0] + shift, integration=EXACT
     )
@@ -313,7 +315,7 @@ def test_phases_of_each_striker_count(shift: float) -> None:
         (section.drive_phase.values - at[0] - shift + 1.0) % (2.0 * math.pi), 1.0, atol=1e-9
     )
     with pytest.raises(sb.InputError, match=r"phase = .*: must not be given if drive.phase changes"):
-        flow.neighbour("drive.phase", 0.3)
+        flow.changed({"drive.phase": 0.3})
 
 
 @SLOW
@@ -365,13 +367,13 @@ def test_a_single_striker_with_two_tones() -> None:
     )
     system = sb.System(model(2, 0.05), contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))])
     flow = Stroboscope(system)
-    assert flow.cycles_per_period == 2
+    assert flow.clock.cycles_per_period == 2
     found = sb.dynamics.lyapunov_spectrum(system, periods=20, transient=5, k=4)
     assert float(found.exponent.sum()) == pytest.approx(-0.1 * float(system.model.omega.sum()), rel=1e-6)
     summed = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.05) + sb.Sine(
         frequency_ratio=1.6, velocity_amplitude=0.02
     )
-    assert Stroboscope(system.replace(drive=summed)).cycles_per_period == 3
+    assert Stroboscope(system.replace(drive=summed)).clock.cycles_per_period == 3
 
 
 @SLOW

@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 from scipy.special import beta
 
 import snapbeam as sb
-from snapbeam.dynamics.flow import Stroboscope
-from snapbeam.dynamics.periodic_orbits import passage_of
+from snapbeam.dynamics.approaches import passage_of
+from snapbeam.dynamics.stroboscope import Stroboscope
 
 SWING = 1.0
 STIFFNESS = 1e9
@@ -73,7 +73,7 @@ def test_the_clearance_of_a_motion_that_does_not_repeat(start: tuple[float, floa
         forces=[sb.ExternalForce(shape=[1.0], history=history)],
     )  # fmt: skip
     flow = Stroboscope(system, sb.Integration(accuracy="reference"))
-    found = passage_of(flow, np.array(start) / flow.scales, 1)
+    found = passage_of(flow, np.array(start) / flow.space.scales, 1)
     w = math.sqrt(1.0 - zeta**2)
     time = np.linspace(0.0, flow.period, 400_001)
     x = np.exp(-zeta * time) * (

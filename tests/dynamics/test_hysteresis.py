@@ -52,7 +52,7 @@ def test_the_runs_after_a_failed_one_are_marked(shaken, monkeypatch):
         | {"status": sb.RunStatus.DIVERGED, "response_class": -1, "harvested_power": np.nan}
     )
     of_failed = dataclasses.replace(done, summary=failed, final_state=None)
-    monkeypatch.setattr("snapbeam.dynamics.swept_statistics.simulate", lambda *_, **__: of_failed)
+    monkeypatch.setattr("snapbeam.dynamics.swept.simulate", lambda *_, **__: of_failed)
     found = sb.dynamics.hysteresis(shaken, NAME, [0.02, 0.06], STEPS)
     status = found["status"].values
     assert status[0, 0] == sb.RunStatus.DIVERGED
@@ -129,9 +129,7 @@ def test_a_record_restarts_at_every_value(shaken):
 
 def test_a_record_that_is_too_short_is_refused_before_the_first_run(shaken, monkeypatch):
     """Also where only a later value makes the run longer than the record."""
-    monkeypatch.setattr(
-        "snapbeam.dynamics.swept_statistics.simulate", lambda *_, **__: pytest.fail("computed")
-    )
+    monkeypatch.setattr("snapbeam.dynamics.swept.simulate", lambda *_, **__: pytest.fail("computed"))
     lasts = 12 / shaken.model.reference_frequency
     with pytest.raises(sb.InputError, match=r"cycles: the run ends after .* but the recorded acceleration"):
         sb.dynamics.hysteresis(recorded(shaken, 0.9 * lasts), "harvester.resistance", [1e4, 1e5], STEPS)

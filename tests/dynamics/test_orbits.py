@@ -231,7 +231,7 @@ def test_what_does_not_converge_says_why() -> None:
     free = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, 1))
     with pytest.raises(sb.InputError, match=r"contacts = \[\]"):
         sb.dynamics.periodic_orbit(free)
-    with pytest.raises(sb.InputError, match="guess of 3 numbers"):
+    with pytest.raises(sb.InputError, match=r"guess of shape \(3,\)"):
         sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03), [0.1, 0.2, 0.3])
     with pytest.raises(sb.InputError, match="period = 0"):
         sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03), period=0)

@@ -151,7 +151,7 @@ def test_refusals(call, words: str) -> None:
 
 
 def test_points_of_a_period() -> None:
-    from snapbeam.dynamics.bifurcation import minimal_period
+    from snapbeam.dynamics.flow import minimal_period
 
     turn = np.arange(24) * 2.0 * math.pi
     for m in (1, 2, 3, 5):

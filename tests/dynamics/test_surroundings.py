@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model import default_values
 
 DAMPING = 0.02

@@ -27,7 +27,7 @@ KINDS = {
     "bifurcation diagram": lambda: sb.dynamics.bifurcation_diagram(
         SYSTEM, "velocity_amplitude", np.linspace(0.02, 0.04, 3)
     ),
-    "backbone curve": lambda: sb.dynamics.backbone_curve(SYSTEM.model, lowest_frequency_ratio=0.9),
+    "backbone curve": lambda: sb.dynamics.backbone_curve(sb.System(SYSTEM.model), lowest_frequency_ratio=0.9),
     "run": lambda: sb.simulate(SYSTEM, SHORT).dataset,
     "attractors": lambda: sb.dynamics.find_attractors(SYSTEM, 12).to_dataset(),
     "basins of attraction": lambda: sb.dynamics.basins_of_attraction(

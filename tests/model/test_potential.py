@@ -249,13 +249,6 @@ def test_laws_of_the_package(law):
         assert one.stiffness_at(u, 1.0) == pytest.approx(-bend, rel=1e-7, abs=1e-10)
 
 
-def test_other_questions_refuse_a_local_force():
-    """What does not know the force says so by its name."""
-    system = sb.System(model_of(2), forces=[sb.LocalSpring(stiffness=100.0, location=0.4)])
-    with pytest.raises(sb.InputError, match="system with forces"):
-        sb.dynamics.backbone_curve(system)
-
-
 def test_a_law_with_a_force_has_an_energy():
     """The energy balance of a run would be wrong without it."""
     with pytest.raises(sb.InputError, match=r"Bare\.energy: must be given for a law with a force"):

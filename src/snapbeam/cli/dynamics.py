@@ -241,7 +241,7 @@ def bifurcation_diagram(
 
     Example: snapbeam dynamics bifurcation-diagram --modes 8 --frequency-ratio 1.4 --values 0.01:0.3:400 --plot diagram.png
     """
-    from snapbeam.dynamics.bifurcation import bifurcation_diagram as diagram_of
+    from snapbeam.dynamics.swept import bifurcation_diagram as diagram_of
     from snapbeam.model.parameter_file import parsed_axis
 
     settings = configured(given)
@@ -282,7 +282,7 @@ def hysteresis(
     """
     from snapbeam.cli.console import check_pictures, draw_computed, write_map
     from snapbeam.cli.summary import initial_well_lines
-    from snapbeam.dynamics.swept_statistics import hysteresis as swept
+    from snapbeam.dynamics.swept import hysteresis as swept
     from snapbeam.model.parameter_file import parsed_axis
     from snapbeam.solver.statistics import STATISTICS
     from snapbeam.util.files import check_writable
@@ -349,7 +349,7 @@ def backbone_curve(
     with progress(None, "backbone curve", "points") as report:
         chosen = {"mode": mode, "amplitude_limit": amplitude_limit, "max_points": max_points}
         named = {name: value for name, value in chosen.items() if value is not None}
-        curve = curve_of(settings.free_structure, well=well, progress=report, **named)  # type: ignore[arg-type]
+        curve = curve_of(settings.free_system, well=well, progress=report, **named)  # type: ignore[arg-type]
     hertz, stable = curve["frequency"].values, curve["stable"].values
     lines = [
         f"{hertz.size} motions in {duration(time.monotonic() - begun)}, {hertz[0]:.5g} to {hertz[-1]:.5g} Hz; "
@@ -467,7 +467,8 @@ def branch(
     Example: snapbeam dynamics branch --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --bounds 0.005:0.3
     """
     from snapbeam.dynamics.branches import continuation
-    from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, periodic_orbit
+    from snapbeam.dynamics.periodic_orbits import periodic_orbit
+    from snapbeam.dynamics.shooting import OrbitNotFoundError
 
     settings = configured(given)
     _checked(output, plot)
@@ -515,7 +516,8 @@ def manifold(
     Example: snapbeam dynamics manifold --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --plot manifold.png
     """
     from snapbeam.dynamics.manifolds import invariant_manifold
-    from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, periodic_orbit
+    from snapbeam.dynamics.periodic_orbits import periodic_orbit
+    from snapbeam.dynamics.shooting import OrbitNotFoundError
     from snapbeam.util.validation import InputError
 
     settings = configured(given)
@@ -584,7 +586,8 @@ def bifurcation_curve(
     from snapbeam.dynamics.bifurcation_curves import CURVES
     from snapbeam.dynamics.bifurcation_curves import bifurcation_curve as curve_of
     from snapbeam.dynamics.branches import continuation
-    from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, periodic_orbit
+    from snapbeam.dynamics.periodic_orbits import periodic_orbit
+    from snapbeam.dynamics.shooting import OrbitNotFoundError
     from snapbeam.util.validation import InputError
 
     settings = configured(given)
@@ -739,7 +742,7 @@ def edge(
     --plot edge.png
     """
     from snapbeam.dynamics.edge_states import edge_tracking, kicked
-    from snapbeam.dynamics.flow import Stroboscope
+    from snapbeam.dynamics.stroboscope import Stroboscope
 
     settings = configured(given)
     _checked(output, plot)

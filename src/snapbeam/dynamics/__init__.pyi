@@ -8,7 +8,6 @@ from .basins import basin_entropy as basin_entropy
 from .basins import basins_of_attraction as basins_of_attraction
 from .basins import dynamical_integrity as dynamical_integrity
 from .basins import uncertainty_exponent as uncertainty_exponent
-from .bifurcation import bifurcation_diagram as bifurcation_diagram
 from .bifurcation_curves import bifurcation_curve as bifurcation_curve
 from .branches import Branch as Branch
 from .branches import SpecialPoint as SpecialPoint
@@ -24,8 +23,9 @@ from .lyapunov import lyapunov_spectrum as lyapunov_spectrum
 from .manifolds import homoclinic_points as homoclinic_points
 from .manifolds import homoclinic_tangency as homoclinic_tangency
 from .manifolds import invariant_manifold as invariant_manifold
-from .periodic_orbits import OrbitNotFoundError as OrbitNotFoundError
 from .periodic_orbits import PeriodicOrbit as PeriodicOrbit
 from .periodic_orbits import periodic_orbit as periodic_orbit
 from .sections import poincare_section as poincare_section
-from .swept_statistics import hysteresis as hysteresis
+from .shooting import OrbitNotFoundError as OrbitNotFoundError
+from .swept import bifurcation_diagram as bifurcation_diagram
+from .swept import hysteresis as hysteresis

@@ -13,23 +13,18 @@ from scipy.linalg import solve_discrete_lyapunov
 from scipy.spatial import cKDTree
 from scipy.stats import beta
 
-from snapbeam.dynamics.bifurcation import minimal_period
-from snapbeam.dynamics.flow import (
-    AdvancedStates,
-    Flow,
-    Stroboscope,
-    fixed_parameters,
-    flow_of,
-    settling_periods,
-)
+from snapbeam.dynamics.flow import AdvancedStates, Flow, minimal_period
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
-from snapbeam.dynamics.periodic_orbits import (
+from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, in_unit, labelled
+from snapbeam.dynamics.shooting import (
+    Family,
     OrbitNotFoundError,
-    PeriodicOrbit,
+    jacobian,
     orbit_tolerance,
     require_isolated_orbits,
-    shoot,
 )
+from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
@@ -91,23 +86,13 @@ class Ball:
 
 def balls_of(orbit: PeriodicOrbit) -> list[Ball]:
     """A ball about every point of a stable orbit, in the order of its points; radius 0 where none was found."""
-    points, found = orbit.points, []
     size = orbit.coordinates.size
-    generator = np.random.Generator(np.random.Philox(_SEED))
-    directions = generator.standard_normal((_TRIED, size))
+    directions = np.random.Generator(np.random.Philox(_SEED)).standard_normal((_TRIED, size))
     directions /= np.sqrt((directions**2).sum(axis=1))[:, None]
-    ball = _ball(orbit, orbit.coordinates, orbit.jacobian, directions)
-    found.append(ball)
-    if orbit.period > 1:
-        from snapbeam.dynamics.periodic_orbits import Family, jacobian
-
-        for point in points[1:]:
-            try:
-                came = jacobian(Family(orbit.flow), point, orbit.period)
-            except OrbitNotFoundError:  # an impact is at the phase of observation
-                found.append(Ball(point, np.eye(size), 0.0))
-                continue
-            found.append(_ball(orbit, point, came.jacobian, directions))
+    found = [_ball(orbit, orbit.coordinates, orbit.jacobian, directions)]
+    for point in orbit.points[1:]:
+        came = jacobian(Family(orbit.flow), point, orbit.period)
+        found.append(_ball(orbit, point, came.jacobian, directions))
     return found
 
 
@@ -118,7 +103,6 @@ def _ball(orbit: PeriodicOrbit, point: _Array, slope: _Array, directions: _Array
     # on a shell of |e|_Q = r: e = r L^-T u for unit vectors u
     shell = np.linalg.solve(factor.T, directions.T).T
     longest = float(np.sqrt((shell**2).sum(axis=1)).max())
-    ball = Ball(point, factor, 0.0)
     radius = 0.0
     for level in range(_SHELLS, -1, -1):
         size = _LARGEST / longest * 0.5**level
@@ -127,7 +111,7 @@ def _ball(orbit: PeriodicOrbit, point: _Array, slope: _Array, directions: _Array
         if not (np.sqrt((away**2).sum(axis=1)) < size).all():
             break
         radius = size
-    return Ball(ball.center, ball.factor, radius)
+    return Ball(point, factor, radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,36 +240,31 @@ class Attractors:
 
     def to_dataset(self) -> xr.Dataset:
         """Kinds, periods, exponents, shares and points, labelled."""
-        from snapbeam.util.datasets import xr
-
-        size = max((len(each.points) for each in self.attractors), default=1)
-        points = np.full((len(self.attractors), size, self.flow.dimension), np.nan)
-        for i, each in enumerate(self.attractors):
-            points[i, : len(each.points)] = each.points
-        names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.flow.dimension)))
-
-        def labels(words: str, unit: str = "1") -> dict[str, str]:
-            return {"units": unit, "long_name": words}
-
         unit = "1/s" if isinstance(self.flow, Stroboscope) else "1"
-        return xr.Dataset(
-            {
-                "kind": ("attractor", [each.kind for each in self.attractors], {"long_name": "kind of attractor"}),
-                "period": ("attractor", [each.period for each in self.attractors], labels("periods; 0: chaotic")),
-                "exponent": ("attractor", [each.exponent for each in self.attractors], labels("largest exponent", unit)),
-                "exponent_error": (
-                    "attractor", [each.exponent_error for each in self.attractors], labels("standard error", unit)
-                ),
-                "share": ("attractor", self.shares, labels("fraction of the states that converge to it")),
-                "points": (("attractor", "point", "coordinate"), points, labels("the attractor once a period")),
-                "label": ("state", self.labels, labels("attractor that a state goes to; -1: undecided")),
-            },
-            {"coordinate": list(names)},
-            {
-                **fixed_parameters(self.flow), "title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods,
-                "unseen_share_95": self.unseen_share(), "termination_reason": self.termination_reason,
-            },
-        )  # fmt: skip
+        of, every = "attractor", self.attractors
+        attrs = fixed_parameters(self.flow) | {
+            "title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods,
+            "unseen_share_95": self.unseen_share(), "termination_reason": self.termination_reason,
+        }  # fmt: skip
+        variables: dict[str, tuple[Any, Any, Any]] = {
+            "kind": (of, [each.kind for each in every], {"long_name": "kind of attractor"}),
+            "period": (of, [each.period for each in every], "periods; 0: chaotic"),
+            "exponent": (of, [each.exponent for each in every], in_unit(unit, "largest exponent")),
+            "exponent_error": (of, [each.exponent_error for each in every], in_unit(unit, "standard error")),
+            "share": (of, self.shares, "fraction of the states that converge to it"),
+            "points": ((of, "point", "coordinate"), self.every_point, "the attractor once a period"),
+            "label": ("state", self.labels, "attractor that a state goes to; -1: undecided"),
+        }  # fmt: skip
+        return labelled(variables, {"coordinate": coordinate_names(self.flow)}, attrs)
+
+    @property
+    def every_point(self) -> _Array:
+        """Points of every attractor, shape (attractors, points, d), NaN beyond those that it has."""
+        size = max((len(each.points) for each in self.attractors), default=1)
+        found = np.full((len(self.attractors), size, self.flow.dimension), np.nan)
+        for i, each in enumerate(self.attractors):
+            found[i, : len(each.points)] = each.points
+        return found
 
 
 def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
@@ -295,21 +274,16 @@ def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
     is added, of at most 0.2 omega_1/omega_j in amplitude and 0.2 in velocity.  State s comes from Philox with the key
     (seed, s) alone.
     """
-    model = flow.system.model
-    rest = flow.coordinates(None)[0] * 0.0
-    size = flow.scales[0]
-    rows = np.empty((count, flow.dimension))
+    model, n = flow.system.model, flow.space.modes
+    rows = np.zeros((count, flow.dimension))
+    reach = 0.2 * flow.space.scales[0] / np.sqrt((model.linear_modes**2).sum(axis=0))
+    reach = reach * np.stack([model.omega[0] / model.omega, np.full(n, model.omega[0])])
     for s in range(count):
         draw = np.random.Generator(np.random.Philox(key=[seed, s]))
-        q = draw.uniform(-1.0, 1.0, (2, model.modes))
-        reach = 0.2 * size / np.sqrt((model.linear_modes**2).sum(axis=0))
-        modal = q * reach * np.stack([model.omega[0] / model.omega, np.full(model.modes, model.omega[0])])
-        alpha, velocity = modal @ model.linear_modes.T
-        row = rest.copy()
-        row[: 2 * model.modes] += np.concatenate([alpha, velocity]) / flow.scales[: 2 * model.modes]
-        row[0] += draw.uniform(-1.4, 1.4)
-        row[model.modes] += draw.uniform(-0.6, 0.6)
-        rows[s] = row
+        modal = draw.uniform(-1.0, 1.0, (2, n)) * reach
+        rows[s, : 2 * n] = (modal @ model.linear_modes.T).ravel() / flow.space.scales[: 2 * n]
+        rows[s, 0] += draw.uniform(-1.4, 1.4)
+        rows[s, n] += draw.uniform(-0.6, 0.6)
     return rows
 
 
@@ -469,9 +443,9 @@ def _orbits(
         if _nearest(found, x) != UNDECIDED or any(np.abs(x - other).max() < _REPEATS for other in missed):
             continue
         try:
-            orbit = shoot(flow, x, int(repeats[s]), tolerance, 40)
+            orbit = shoot(flow, x, int(repeats[s]), tolerance)
             if orbit.minimal_period != orbit.period:
-                orbit = shoot(flow, orbit.coordinates, orbit.minimal_period, tolerance, 40)
+                orbit = shoot(flow, orbit.coordinates, orbit.minimal_period, tolerance)
         except OrbitNotFoundError as error:
             missed.append(x)
             reasons.append(str(error))
@@ -492,7 +466,7 @@ def _verify(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:
     if not isinstance(orbit.flow, Stroboscope) or orbit.flow.integration.accuracy == "reference":
         return orbit
     try:
-        fine = shoot(orbit.flow.refined, orbit.coordinates, orbit.period, tolerance, 40)
+        fine = shoot(orbit.flow.refined, orbit.coordinates, orbit.period, tolerance)
     except OrbitNotFoundError:
         return None
     near = float(np.abs(fine.coordinates - orbit.coordinates).max()) < 10.0 * _REPEATS
@@ -529,7 +503,7 @@ def _chaotic(
     orbits: list[PeriodicOrbit],
 ) -> tuple[list[Attractor], list[NDArray[np.int64]]]:
     """Groups of runs that never repeat, those of them that last and diverge."""
-    if not which.size or not flow.smooth:
+    if not which.size:
         return [], []
     later = flow.advance(flow.advance(seen.states[which], lasts), 2 * most + 62, every=True)
     assert later.every is not None

@@ -8,22 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.dynamics.arclength import Equations, Path, Point, follow
+from snapbeam.dynamics.results import in_unit, labelled
+from snapbeam.dynamics.shooting import OrbitNotFoundError
 from snapbeam.model.drive.fixed_stop import FixedStop
-from snapbeam.model.equilibria import tangent_stiffness
-from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.harvester import Harvester
+from snapbeam.model.striker import Contact
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
-from snapbeam.util.singular_values import lstsq, svd
-from snapbeam.util.validation import (
-    InputError,
-    InputTypeError,
-    checked,
-    choice,
-    integer,
-    positive,
-    shown,
-    within,
-)
+from snapbeam.util.singular_values import lstsq
+from snapbeam.util.validation import InputError, checked, choice, instance, integer, positive, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,8 +29,8 @@ _RTOL, _ATOL = 1e-11, 1e-13
 """Tolerances of the integration, in units of the well's amplitude and of 1/omega_1."""
 _CONVERGED = 1e-10
 """Velocity at the turning point, in the same units."""
-_FIRST, _SHORTEST = 0.02, 1e-5
-"""Arc lengths between two points: the first, if it is not above the maximum, and the minimum."""
+_FIRST = 0.02
+"""First arc length between two points, if it is not above the maximum."""
 _SAME_STATE = 1e-6
 """Difference of the two turning points, in units of the well's amplitude, up to which a motion has only one."""
 _NEAR_ZERO = 0.1
@@ -49,11 +43,15 @@ _SAMPLES = 64
 """Instants of half a period from which means are taken."""
 _STABLE = 1e-4
 """Tolerance of the modulus of a Floquet multiplier of a stable orbit, for rounding."""
+_OPEN = 1e30
+"""Load resistance, ohm, of a circuit without current."""
+_SLOW, _FAST = 1e-9, 1e9
+"""Rates of a circuit, over omega_1, at which it keeps what it has, and at which it has nothing."""
 
 
 @checked
 def backbone_curve(
-    system: System | ReducedModel,
+    system: System,
     *,
     well: str = "lower",
     mode: int = 1,
@@ -71,11 +69,14 @@ def backbone_curve(
     period, with tangents; Newton's method and steps of arc length follow the curve.  Floquet multipliers
     determine the stability.
 
+    Local forces act with their conservative parts.  The circuits of harvesters are open, so that no current flows and
+    nothing is lost: piezoelectric layers stiffen the beam, a coil has no force.  Strikers stand still; one with a mass moves
+    on its suspension.
+
     Parameters
     ----------
-    system : System or ReducedModel
-        Damping is ignored.  A system may have one stationary striker, a :class:`~snapbeam.FixedStop` under an
-        elastic contact law; nothing else may act on the beam.
+    system : System
+        Damping is ignored.  Its strikers are each a :class:`~snapbeam.FixedStop` under an elastic contact law.
     well : {"lower", "upper", "both"}
         Motion about a well, or across both.
     mode : int
@@ -98,16 +99,17 @@ def backbone_curve(
     xarray.Dataset
         Over ``point``: ``frequency`` (Hz), ``frequency_ratio``, ``energy`` (J, above the well), ``min_midspan``
         and ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``; over ``point`` and
-        ``mode`` ``initial_amplitude`` (of the buckling modes, at rest) and ``participation``, the share of each
-        linear mode in the mean kinetic energy; over ``point`` and ``multiplier`` their size and angle.  The
-        attribute ``end`` gives the reason why the curve ends: among others at an equilibrium or where the two
-        turning points meet, since from there on the same motions would follow again.
+        ``mode`` ``participation``, the share of each linear mode in the mean kinetic energy; where the motion turns back,
+        ``initial_amplitude`` over ``point`` and ``buckling_mode``, and ``initial_shift`` of strikers with mass over ``striker``;
+        over ``point`` and ``multiplier`` their size and angle.  The attribute ``end`` gives the reason why the curve ends:
+        among others at an equilibrium or where the two turning points meet, since from there on the same motions would
+        follow again.
 
     Raises
     ------
     InputError
-        For a system with an excitation, a lossy contact, or a beam without two wells if both are requested.
-    RuntimeError
+        For a system with an excitation, a lossy contact, a striker that nothing holds, or without two wells if both are requested.
+    OrbitNotFoundError
         If no motion is found where the curve begins.
 
     Notes
@@ -122,124 +124,167 @@ def backbone_curve(
     >>> import snapbeam as sb
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
-    >>> curve = sb.dynamics.backbone_curve(model, amplitude_limit=0.3)
+    >>> curve = sb.dynamics.backbone_curve(sb.System(model), amplitude_limit=0.3)
     >>> bool(curve.frequency[0] > curve.frequency[-1])  # the motion about a well softens
     True
     """
     choice("well", well, _WELLS)
     within("lowest_frequency_ratio", lowest_frequency_ratio, 0.0, 1.0)
-    positive("amplitude_limit", amplitude_limit)
+    limit = positive("amplitude_limit", amplitude_limit)
     within("max_step", max_step, 1e-4, 1.0)
     integer("max_points", max_points, 3, 100_000)
     structure = _Structure(system, well)
     integer("mode", mode, 1, structure.size)
+    motions = _Motions(structure, limit, np.pi / lowest_frequency_ratio)
     report = counting(progress, "backbone curve", "points")
-    start = structure.start_about_well(mode) if well != "both" else structure.start_across()
-    limits = amplitude_limit, np.pi / lowest_frequency_ratio, max_step
-    if well == "both":
-        back, _ = _follow(structure, start, -1.0, limits, max_points // 2, report, 0, max_points)
-        ahead, end = _follow(
-            structure, start, 1.0, limits, max_points - len(back), report, len(back), max_points
-        )
-        points = [*reversed(back[1:]), *ahead]
-    else:
-        points, end = _follow(structure, start, 1.0, limits, max_points, report, 0, max_points)
-    return _dataset(structure, points, end)
+    first = motions.about_well(mode) if well != "both" else motions.across()
+
+    def branch(way: float, before: int, most: int) -> Path[_Motions]:
+        def told(done: int, _: int) -> object:
+            return report(before + done, max_points) if report is not None else None
+
+        start = first._replace(tangent=way * first.tangent)
+        path = follow(
+            motions, start, limits=np.empty((0, 2)), max_points=most, step=min(_FIRST, max_step), max_step=max_step,
+            progress=told, what="motion",
+        )  # fmt: skip
+        path.events = [*begun, *path.events][: len(path.points)]
+        return path
+
+    begun = [_measures(structure, first)]
+    if report is not None:
+        report(1, max_points)
+    if well != "both":
+        path = branch(1.0, 0, max_points)
+        return _dataset(structure, path.events, path.end)
+    back = branch(-1.0, 0, max_points // 2).events
+    ahead = branch(1.0, len(back) - 1, max_points - len(back) + 1)
+    return _dataset(structure, [*reversed(back[1:]), *ahead.events], ahead.end)
 
 
 class _Structure:
-    """Equations of free motion in the linear modes about a well, in units of its amplitude and of 1/omega_1."""
+    """Equations of free motion in the linear modes about a well, in units of its amplitude and of 1/omega_1.
 
-    def __init__(self, system: System | ReducedModel, well: str) -> None:
-        if isinstance(system, ReducedModel):
-            model, stop = system, None
-        elif isinstance(system, System):
-            model, stop = system.model, _stop_of(system)
-        else:
-            raise InputTypeError(f"system = {shown(system)}: must be a System or a ReducedModel")
-        if well != "lower":
-            model.require_bistable(f"a backbone curve with well = {well!r}")
+    The generalised coordinates are the amplitudes of the buckling modes and the displacements of strikers with mass.
+    """
+
+    def __init__(self, system: System, well: str) -> None:
+        self.system = system = instance("system", system, System, "a System")
+        moving = [name for name, drive in system.moving if not isinstance(drive, FixedStop)]
+        if moving:
+            raise InputError(
+                f"system with {', '.join(moving)}: a backbone curve is of free motion; leave {'it' if len(moving) == 1 else 'them'} out, "
+                "or give a FixedStop"
+            )
+        model, potential = system.model, system.potential
         if model.length_scale is None:
             raise InputError(
                 "system: a straight beam has no length scale; give a buckled beam or a length_scale"
             )
-        self.model, self.well, self.size = model, well, model.modes
-        self.rest = _rest(model, "upper" if well == "upper" else "lower")
-        tangent = tangent_stiffness(
-            model.stiffness, model.nonlinear_stiffness, self.rest, model.elongation_matrix
-        )
+        if not potential.wells:
+            raise InputError("system: its equilibrium is not stable; a backbone curve needs a well")
+        alone = well == "lower" and len(potential.wells) == 1
+        self.model, self.potential, self.well = model, potential, well
+        amplitude = potential.well(0 if alone else "lower" if well == "both" else well).amplitude
+        self.bodies = [i for i, each in enumerate(system.contacts) if each.striker.mass is not None]
+        self.size, n = model.modes + len(self.bodies), model.modes
+        self.rest = np.append(amplitude, np.zeros(len(self.bodies)))
+        self.stops = [self._stop(i, each) for i, each in enumerate(system.contacts)]
+        mass, self.linear = np.zeros((2, self.size, self.size))
+        mass[:n, :n] = model.mass
+        for place, i in enumerate(self.bodies, n):
+            striker = system.contacts[i].striker
+            mass[place, place], self.linear[place, place] = striker.mass, striker.suspension_stiffness
+            if striker.suspension_stiffness == 0.0:
+                raise InputError(
+                    f"contact {i + 1}: nothing holds its striker with mass = {striker.mass:g} kg, so that it has no free "
+                    "vibration; give suspension_stiffness"
+                )
+        reference = 2.0 * np.pi * model.reference_frequency
+        for harvester in system.harvesters:
+            row = np.append(harvester.row(model), np.zeros(len(self.bodies)))
+            self.linear += np.outer(row, row) * _open_stiffness(harvester, reference)
         from scipy.linalg import eigh
 
-        squares, self.shapes = eigh(tangent, model.mass)
+        squares, self.shapes = eigh(self._stiffness(self.rest), mass)
         if squares[0] <= 0.0:
             raise InputError("system: its equilibrium is not stable; a backbone curve needs a well")
         self.omega = np.sqrt(squares)
         self.unit = float(self.omega[0])
-        self.scale = model.length_scale / float(np.abs(model.midspan_shape @ self.shapes).max())
+        self.scale = model.length_scale / float(np.abs(model.midspan_shape @ self.shapes[:n]).max())
         """Length of a coordinate of 1: it moves mid-span by about the length scale."""
         self.back = self.shapes * self.scale
-        """Amplitudes of the buckling modes for each coordinate."""
-        self.squares = squares / self.unit**2
-        self.tension = self.shapes.T @ model.pulled(self.shapes)
-        self.pull_at_rest = self.shapes.T @ model.pulled(self.rest) / self.scale
-        self.strength = model.nonlinear_stiffness * self.scale**2 / self.unit**2
-        self.stop: tuple[Any, _Array, float] | None = None
-        if stop is not None:
-            self._add_stop(*stop)
+        """Generalised coordinates for each coordinate."""
+        for _, row, begin in self.stops:
+            if begin + float(row @ self.rest) > 1e-12 * model.length_scale:
+                raise InputError("system: the stop presses on the beam at rest; give a gap of 0 or more")
 
-    def _add_stop(self, law: Any, location: float, gap: float, side: float) -> None:
-        """A stop at a gap from the beam at rest: below it in the lower well (side 1), or above it in the upper one (-1)."""
-        shape = np.asarray(self.model.shape_at(location))
-        facing = _rest(self.model, "lower" if side > 0.0 else "upper")
-        begin = -gap - side * float(shape @ (self.rest - facing))
-        if begin > 0.0:
-            raise InputError("system: the stop presses on the beam at rest; give a gap of 0 or more")
-        self.stop = law, -side * (shape @ self.back), begin
+    def _stop(self, number: int, contact: Contact) -> tuple[Any, _Array, float]:
+        """Law of a contact, and its penetration by the generalised coordinates, a row and a constant."""
+        law, striker = contact.law, contact.striker
+        if law.is_dissipative or law.impulsive:
+            raise InputError(f"contact = {shown(law)}: loses energy; use a HertzContact or a PowerLaw")
+        sides = [1.0 if each.side == "below" else -1.0 for each in (self.system.contacts[0].striker, striker)]
+        wells = self.potential.wells
+        facing = wells[0 if sides[0] > 0.0 else -1].amplitude
+        row = np.zeros(self.size)
+        row[: self.model.modes] = -sides[1] * np.asarray(self.model.shape_at(striker.location))
+        begin = -float(row[: self.model.modes] @ facing) - (
+            0.0 if striker.gap is None else float(striker.gap)
+        )
+        if number in self.bodies:
+            row[self.model.modes + self.bodies.index(number)] = sides[1]
+        return law, row, begin
 
     # ------------------------------------------------------------------ forces
 
+    def _stiffness(self, z: _Array) -> _Array:
+        """Second derivative of the potential energy without contacts."""
+        found, n = self.linear.copy(), self.model.modes
+        found[:n, :n] += self.potential._tangent(z[:n])
+        return found
+
     def acceleration(self, y: _Array) -> _Array:
-        """y'' of coordinates about the well, per omega_1^2, with the tension in the form of the linear modes."""
-        pulled = self.tension @ y
-        square = float(y @ pulled)
-        along = 2.0 * float(self.pull_at_rest @ y) + square
-        total: _Array = -self.squares * y - self.strength * (square * self.pull_at_rest + along * pulled)
-        if self.stop is not None:
-            law, row, begin = self.stop
-            depth = begin + float(row @ y)
+        """y'' of coordinates about the well, per omega_1^2."""
+        away = self.back @ y
+        z, n = self.rest + away, self.model.modes
+        if self.potential.local_forces and not self.potential._holds(z[:n]):
+            raise OrbitNotFoundError("the motion leaves the range of the law of a local force")
+        force = -self.linear @ away
+        force[:n] -= self.potential._gradient(z[:n])
+        for law, row, begin in self.stops:
+            depth = begin + float(row @ z)
             if depth > 0.0:
-                total = total - row * (type(law).force(law, depth) / (self.scale * self.unit) ** 2)
-        return total
+                force -= row * type(law).force(law, depth)
+        found: _Array = self.shapes.T @ force / (self.scale * self.unit**2)
+        return found
 
     def slope(self, y: _Array) -> _Array:
         """Derivative of the acceleration."""
-        pulled = self.tension @ y
-        both = self.pull_at_rest + pulled
-        along = 2.0 * float(self.pull_at_rest @ y) + float(y @ pulled)
-        matrix = 2.0 * (np.outer(self.pull_at_rest, pulled) + np.outer(pulled, both)) + along * self.tension
-        matrix *= -self.strength
-        matrix.flat[:: self.size + 1] -= self.squares
-        if self.stop is not None:
-            law, row, begin = self.stop
-            depth = begin + float(row @ y)
+        z = self.rest + self.back @ y
+        stiffness = self._stiffness(z)
+        for law, row, begin in self.stops:
+            depth = begin + float(row @ z)
             if depth > 0.0:
-                matrix -= np.outer(row, row) * (type(law).slope(law, depth) / (self.scale * self.unit) ** 2)
-        return matrix
+                stiffness += np.outer(row, row) * type(law).slope(law, depth)
+        found: _Array = -self.shapes.T @ stiffness @ self.shapes / self.unit**2
+        return found
 
     def energy(self, y: _Array) -> float:
         """Potential energy above the well, J."""
-        found = float(
-            self.model.potential_energy(self.rest + self.back @ y) - self.model.potential_energy(self.rest)
-        )
-        if self.stop is not None:
-            law, row, begin = self.stop
-            depth = begin + float(row @ y)
+        away, n = self.back @ y, self.model.modes
+        z = self.rest + away
+        found = float(self.potential.energy(z[:n]) - self.potential.energy(self.rest[:n]))
+        found += 0.5 * float(away @ self.linear @ away)
+        for law, row, begin in self.stops:
+            depth = begin + float(row @ z)
             found += float(type(law).energy(law, depth)) if depth > 0.0 else 0.0
         return found
 
     def centre(self, y: _Array) -> _Array:
-        """Displacement of the centre over the length scale, for coordinates of shape (..., N)."""
-        found: _Array = (self.rest + y @ self.back.T) @ self.model.midspan_shape / self.model.length_scale
+        """Displacement of the centre over the length scale, for coordinates of shape (..., n)."""
+        z = self.rest + y @ self.back.T
+        found: _Array = z[..., : self.model.modes] @ self.model.midspan_shape / self.model.length_scale
         return found
 
     # ------------------------------------------------------------------ half a period
@@ -252,6 +297,8 @@ class _Structure:
 
         def rate(_: float, z: _Array) -> _Array:
             y, v = z[:n], z[n : 2 * n]
+            if not columns:
+                return np.concatenate((v, self.acceleration(y)))
             carried = z[2 * n :].reshape(2 * n, columns)
             bent = self.slope(y) @ carried[:n]
             return np.concatenate((v, self.acceleration(y), carried[n:].ravel(), bent.ravel()))
@@ -273,44 +320,111 @@ class _Structure:
         )  # fmt: skip
         return done.y[:n].T, done.y[n:].T
 
+
+def _open_stiffness(harvester: Harvester, omega: float) -> float:
+    """Stiffness, along its row, of a harvester whose circuit is open: of the z that M z' = -theta . alpha' leaves, or none."""
+    rate = float(harvester.loss(np.array(_OPEN)))
+    if harvester.inertia > 0.0 and rate < _SLOW * harvester.inertia * omega:
+        return 1.0 / harvester.inertia
+    if harvester.inertia > 0.0 and rate < _FAST * harvester.inertia * omega:
+        raise InputError(f"harvester = {shown(harvester)}: loses energy without a load; leave it out")
+    return 0.0
+
+
+class _Motions(Equations):
+    """Motions that begin at rest and turn back half a period later.  A point is (y, half period)."""
+
+    tolerance = _CONVERGED
+    easy, hard = 8, 12
+
+    def __init__(self, structure: _Structure, amplitude_limit: float, longest: float) -> None:
+        self.structure, self.amplitude_limit, self.longest = structure, amplitude_limit, longest
+
+    def _half(self, point: _Array, columns: int) -> tuple[_Array, _Array, _Array]:
+        if not 0.0 < point[-1] < 1e4 or not np.isfinite(point).all():
+            raise OrbitNotFoundError("no half period is left")
+        return self.structure.half(point[:-1], float(point[-1]), columns)
+
+    def residual(self, y: _Array) -> _Array:
+        """Velocity where the motion turns back, shape (n,)."""
+        return self._half(y, 0)[1]
+
+    def derivative(self, y: _Array) -> tuple[_Array, _Array, _Array]:
+        """Velocity and state there, and the derivative of the velocity, shape (n, n + 1)."""
+        n = self.structure.size
+        turned, v, carried = self._half(y, n)
+        return v, turned, np.column_stack([carried[n:], self.structure.acceleration(turned)])
+
+    def prepare(self, last: Point, is_first: bool) -> _Array | None:
+        """None: that of another motion serves for few steps."""
+        return None
+
+    def require_next(self, last: Point, point: Point) -> None:
+        """Refuse a point around too sharp a bend."""
+        if point.tangent @ last.tangent < 0.7:
+            raise OrbitNotFoundError("the curve bends too sharply")
+
+    def events(self, last: Point, point: Point, number: int) -> list[dict[str, Any]]:
+        """Measures of a motion: they take as long as to find it, and the progress is that of both."""
+        return [_measures(self.structure, point)]
+
+    def end_at(self, last: Point, point: Point) -> tuple[str, bool] | None:
+        """Reason why the curve ends: its limits, an equilibrium, or motions that were there before."""
+        structure = self.structure
+        before, after = last.came - last.y[:-1], point.came - point.y[:-1]
+        part = _vanishing(before, after)
+        if part is not None:
+            met = ((1.0 - part) * last.y + part * point.y)[:-1]
+            near = _NEAR_ZERO * np.linalg.norm(after - before)
+            if np.linalg.norm(met) < near:
+                return _AT_REST, False
+            to_rest = lstsq(structure.slope(met), structure.acceleration(met))
+            return (_OTHER_REST if np.linalg.norm(to_rest) < near else _RETRACED), False
+        across = structure.well == "both"
+        middle = 0.0 if across else structure.centre(np.zeros(structure.size))
+        ends = structure.centre(point.y[:-1]), structure.centre(point.came)
+        if max(abs(float(each - middle)) for each in ends) > self.amplitude_limit:
+            return "amplitude_limit", True
+        if point.y[-1] > self.longest:
+            return "lowest_frequency_ratio", True
+        return (_AT_REST, True) if not across and np.abs(point.y[:-1]).max() < 5e-4 else None
+
     # ------------------------------------------------------------------ where curves begin
 
-    def start_about_well(self, mode: int) -> tuple[_Array, _Array]:
-        """A small motion of a linear mode, and the direction of the curve there."""
-        y = np.zeros(self.size + 1)
-        sign = (
-            1.0 if self.model.midspan_shape @ self.shapes[:, mode - 1] * self.centre(y[:-1]) < 0.0 else -1.0
-        )
-        y[mode - 1] = 1e-3 * sign  # towards the other well
-        y[-1] = np.pi * self.unit / float(self.omega[mode - 1])
-        direction = np.zeros(self.size + 1)
-        direction[mode - 1] = sign
-        return y, direction
+    def about_well(self, mode: int) -> Point:
+        """A small motion of a linear mode, towards the other well."""
+        structure = self.structure
+        shape = structure.model.midspan_shape @ structure.shapes[: structure.model.modes, mode - 1]
+        y, along = np.zeros((2, structure.size + 1))
+        along[mode - 1] = 1.0 if shape * structure.centre(y[:-1]) < 0.0 else -1.0
+        y[mode - 1] = 1e-3 * along[mode - 1]
+        y[-1] = np.pi * structure.unit / float(structure.omega[mode - 1])
+        return self.correct(y, along, along)
 
-    def start_across(self) -> tuple[_Array, _Array]:
-        """A motion across both wells with some times the energy of the barrier, and a direction of greater energy."""
+    def across(self) -> Point:
+        """A motion across both wells with some times the energy of the barrier, towards greater energy."""
         from scipy.integrate import solve_ivp
         from scipy.optimize import brentq
 
-        model = self.model
-        barrier = float(model.saddle_energy - model.potential_energy(self.rest))
-        saddle = None if model.landscape is None else model.landscape.saddle
-        middle = np.zeros(self.size) if saddle is None else saddle.amplitude
-        way = np.linalg.solve(self.back, middle - self.rest)
+        structure, potential = self.structure, self.structure.potential
+        between = [each.equilibrium for each in potential.saddles if set(each.wells) == {0, 1}]
+        saddle = between[0].amplitude if between else np.zeros(structure.model.modes)
+        middle = np.append(saddle, np.zeros(len(structure.bodies)))
+        way = np.linalg.solve(structure.back, middle - structure.rest)
+        norm = float(way @ way)
         for times in (3.0, 6.0, 12.0):
-            level = times * barrier
+            level = times * structure.energy(way)
 
             def above(s: float, level: float = level) -> float:
-                return self.energy(way * s) - level
+                return structure.energy(way * s) - level
 
             far = 2.0
             while above(far) < 0.0:
                 far *= 1.5
             high = brentq(above, 1.0, far)
-            norm = float(way @ way)
 
-            def rate(_: float, z: _Array, norm: float = norm) -> list[float]:
-                return [z[1], float(way @ self.acceleration(way * z[0])) / norm]
+            def rate(_: float, z: _Array) -> list[float]:
+                return [z[1], float(way @ structure.acceleration(way * z[0])) / norm]
 
             def turned(_: float, z: _Array) -> float:
                 return z[1] if z[0] < 1.0 else -1.0
@@ -319,86 +433,16 @@ class _Structure:
             done = solve_ivp(
                 rate, (0.0, 200.0), [high, 0.0], method="DOP853", events=turned, rtol=1e-9, atol=1e-11
             )
-            if not done.t_events[0].size:
-                continue
-            guess = np.append(way * high, done.t_events[0][0])
-            direction = np.append(way / np.sqrt(norm), 0.0)
-            if _corrected(self, guess, direction, guess) is not None:
-                return guess, direction
-        raise RuntimeError(
+            if done.t_events[0].size:
+                along = np.append(way / np.sqrt(norm), 0.0)
+                try:
+                    return self.correct(np.append(way * high, done.t_events[0][0]), along, along)
+                except OrbitNotFoundError:
+                    continue
+        raise OrbitNotFoundError(
             "no motion across both wells was found from the shape of the saddle; use fewer modes, or follow it from a model "
             "with one mode"
         )
-
-
-def _rest(model: ReducedModel, well: str) -> _Array:
-    """Amplitudes at rest in a well, or in the only one."""
-    if not model.is_bistable:
-        return np.asarray(model.well_amplitude, dtype=np.float64)
-    sign = 1.0 if well == "upper" else -1.0
-    return next(
-        each.amplitude
-        for each in model.equilibria
-        if each.is_stable and sign * float(model.midspan_shape @ each.amplitude) > 0.0
-    )
-
-
-def _stop_of(system: System) -> tuple[Any, float, float, float] | None:
-    """Law, location, gap and side of the one stop of a system.
-
-    Raises
-    ------
-    InputError
-        If anything else acts on the beam.
-    """
-    acting = [
-        name for name in ("base_excitation", "axial_load", "forces", "harvesters") if getattr(system, name)
-    ]
-    acting += ["more than one striker"] if system.contacts[1:] else []
-    if acting:
-        raise InputError(
-            f"system with {', '.join(acting)}: a backbone curve is of free motion; leave {'it' if len(acting) == 1 else 'them'} out"
-        )
-    striker, law = system.striker, system.contact_law
-    if striker is None or law is None:
-        return None
-    if not isinstance(striker.drive, FixedStop) or striker.mass is not None:
-        raise InputError(
-            "system: its striker moves; a backbone curve is of free motion: give system.model alone, or a striker with a "
-            "FixedStop and without a mass"
-        )
-    if law.is_dissipative or law.impulsive:
-        raise InputError(f"contact = {shown(law)}: loses energy; use a HertzContact or a PowerLaw")
-    gap = 0.0 if striker.gap is None else float(striker.gap)
-    return law, striker.location, gap, 1.0 if striker.side == "below" else -1.0
-
-
-# Newton's method and steps of arc length.  A point is (y, half period): a motion that begins at rest and turns back.
-
-
-def _corrected(
-    structure: _Structure, guess: _Array, direction: _Array, anchor: _Array
-) -> tuple[_Array, _Array, _Array, int] | None:
-    """The motion in the plane across *direction*, the direction of the curve there, where it turns back, the iterations."""
-    n, point = structure.size, guess.copy()
-    for iteration in range(12):
-        if not 0.0 < point[-1] < 1e4 or not np.isfinite(point).all():
-            return None
-        y, v, carried = structure.half(point[:-1], float(point[-1]), n)
-        matrix = np.zeros((n + 1, n + 1))
-        matrix[:n, :n], matrix[:n, n] = carried[n:], structure.acceleration(y)
-        matrix[n] = direction
-        residual = np.append(v, direction @ (point - anchor))
-        if np.abs(residual).max() < _CONVERGED and iteration:
-            along = svd(matrix[:n])[2][-1]
-            return point, along * np.sign(along @ direction or 1.0), y, iteration
-        try:
-            step = np.linalg.solve(matrix, residual)
-        except np.linalg.LinAlgError:
-            return None
-        size = float(np.abs(step[:-1]).max())
-        point = point - step * min(1.0, 0.5 / max(size, 1e-300))
-    return None
 
 
 def _vanishing(before: _Array, after: _Array) -> float | None:
@@ -414,62 +458,6 @@ def _vanishing(before: _Array, after: _Array) -> float | None:
     return part if np.linalg.norm(before + part * chord) < _NEAR_ZERO * np.sqrt(square) else None
 
 
-def _follow(
-    structure: _Structure,
-    start: tuple[_Array, _Array],
-    way: float,
-    limits: tuple[float, float, float],
-    max_points: int,
-    report: Callable[[int, int], object] | None,
-    before: int,
-    total: int,
-) -> tuple[list[dict[str, Any]], str]:
-    """Measures of the points of a curve from its start in one direction, and why it ends.
-
-    A point is measured when it is found, which takes as long as to find it: the progress is that of both.  The *limits* are the maximum displacement of the centre, half period and arc length between two points.
-    """
-    found = _corrected(structure, start[0], start[1], start[0])
-    if found is None:
-        raise RuntimeError("no motion was found where the curve begins; choose another mode")
-    point, along, turned, _ = found
-    apart = turned - point[:-1]
-    last, direction, length = point, way * along, min(_FIRST, limits[2])
-    points = [_measures(structure, point)]
-    while len(points) < max_points:
-        if report is not None:
-            report(before + len(points), total)
-        guess = last + length * direction
-        found = _corrected(structure, guess, direction, guess)
-        if found is None or found[1] @ direction < 0.7:  # lost, or around too sharp a bend
-            length *= 0.5
-            if length < _SHORTEST:
-                return points, "Newton's method no longer converges"
-            continue
-        point, direction, turned, iterations = found
-        last_apart, apart = apart, turned - point[:-1]
-        part = _vanishing(last_apart, apart)
-        if part is not None:
-            met = ((1.0 - part) * last + part * point)[:-1]
-            near = _NEAR_ZERO * np.linalg.norm(apart - last_apart)
-            if np.linalg.norm(met) < near:
-                return points, _AT_REST
-            to_rest = lstsq(structure.slope(met), structure.acceleration(met))
-            return points, _OTHER_REST if np.linalg.norm(to_rest) < near else _RETRACED
-        points.append(_measures(structure, point))
-        last = point
-        if iterations <= 3:
-            length = min(1.4 * length, limits[2])
-        ends = structure.centre(point[:-1]), structure.centre(turned)
-        middle = 0.0 if structure.well == "both" else structure.centre(np.zeros(structure.size))
-        if max(abs(each - middle) for each in ends) > limits[0]:
-            return points, "amplitude_limit"
-        if point[-1] > limits[1]:
-            return points, "lowest_frequency_ratio"
-        if structure.well != "both" and np.abs(point[:-1]).max() < 5e-4:
-            return points, _AT_REST
-    return points, "max_points"
-
-
 def _multipliers(structure: _Structure, point: _Array) -> NDArray[np.complex128]:
     """Floquet multipliers over a whole period, from the tangents of half of one: the motion retraces itself."""
     n = structure.size
@@ -479,8 +467,9 @@ def _multipliers(structure: _Structure, point: _Array) -> NDArray[np.complex128]
     return found[np.argsort(-np.abs(found))]
 
 
-def _measures(structure: _Structure, point: _Array) -> dict[str, Any]:
+def _measures(structure: _Structure, of: Point) -> dict[str, Any]:
     """Numbers of the dataset for one point."""
+    point = of.y
     y, v = structure.waveform(point[:-1], float(point[-1]))
     centre, kinetic = structure.centre(y), np.trapezoid(v**2, axis=0)
     multipliers = _multipliers(structure, point)
@@ -499,41 +488,33 @@ def _measures(structure: _Structure, point: _Array) -> dict[str, Any]:
 
 
 def _dataset(structure: _Structure, points: list[dict[str, Any]], end: str) -> xr.Dataset:
-    from snapbeam.util.datasets import xr
-
-    model, n = structure.model, structure.size
-    rows = {name: [point[name] for point in points] for name in points[0]}
-    frequency = np.array(rows["frequency"])
-    reference = model.reference_frequency
-    unstable = np.array(rows["unstable"])
-    variables: dict[str, tuple[Any, Any, str, str]] = {
-        "frequency": ("point", frequency, "Hz", "frequency of the free motion"),
-        "frequency_ratio": ("point", frequency / reference, "1", "frequency over the first natural frequency"),
-        "energy": ("point", rows["energy"], "J", "energy above the well"),
-        "min_midspan": ("point", rows["low"], "1", "minimum displacement of mid-span, over the length scale"),
-        "max_midspan": ("point", rows["high"], "1", "maximum displacement of mid-span, over the length scale"),
-        "stable": ("point", unstable == 0, "1", "whether no Floquet multiplier is outside the unit circle"),
-        "unstable_multipliers": ("point", unstable, "1", "Floquet multipliers outside the unit circle"),
-        "participation": (("point", "mode"), rows["share"], "1", "fraction of a linear mode in the mean kinetic energy"),
-        "initial_amplitude": (
-            ("point", "mode"), rows["begun"], "1" if model.beam is None else "m^0.5",
-            "amplitude of a buckling mode where the motion turns back",
+    model, n = structure.model, structure.model.modes
+    rows = {name: np.array([point[name] for point in points]) for name in points[0]}
+    unit = "1" if model.beam is None else "m^0.5"
+    words = "amplitude of a buckling mode where the motion turns back"
+    variables: dict[str, tuple[Any, Any, Any]] = {
+        "frequency": ("point", rows["frequency"], in_unit("Hz", "frequency of the free motion")),
+        "frequency_ratio": (
+            "point", rows["frequency"] / model.reference_frequency, "frequency over the first natural frequency"
         ),
-        "multiplier_size": (("point", "multiplier"), rows["size"], "1", "size of a Floquet multiplier"),
-        "multiplier_angle": (("point", "multiplier"), rows["angle"], "rad", "angle of a Floquet multiplier"),
+        "energy": ("point", rows["energy"], in_unit("J", "energy above the well")),
+        "min_midspan": ("point", rows["low"], "minimum displacement of mid-span, over the length scale"),
+        "max_midspan": ("point", rows["high"], "maximum displacement of mid-span, over the length scale"),
+        "stable": ("point", rows["unstable"] == 0, "whether no Floquet multiplier is outside the unit circle"),
+        "unstable_multipliers": ("point", rows["unstable"], "Floquet multipliers outside the unit circle"),
+        "participation": (("point", "mode"), rows["share"], "fraction of a linear mode in the mean kinetic energy"),
+        "initial_amplitude": (("point", "buckling_mode"), rows["begun"][:, :n], in_unit(unit, words)),
+        "multiplier_size": (("point", "multiplier"), rows["size"], "size of a Floquet multiplier"),
+        "multiplier_angle": (("point", "multiplier"), rows["angle"], in_unit("rad", "angle of a Floquet multiplier")),
     }  # fmt: skip
-    dataset = xr.Dataset(
-        coords={"mode": np.arange(1, n + 1)},
-        attrs={
-            "title": "backbone curve",
-            "well": structure.well,
-            "end": end,
-            "modes": n,
-            "reference_frequency": reference,
-            "length_scale": model.length_scale,
-            "natural_frequencies": (structure.omega / (2.0 * np.pi)).tolist(),
-        },
-    )
-    for name, (dims, values, unit, words) in variables.items():
-        dataset[name] = (dims, np.asarray(values), {"units": unit, "long_name": words})
-    return dataset
+    coords: dict[str, Any] = {"mode": np.arange(1, structure.size + 1), "buckling_mode": np.arange(1, n + 1)}
+    if structure.bodies:
+        words = "displacement of a striker where the motion turns back"
+        variables["initial_shift"] = (("point", "striker"), rows["begun"][:, n:], in_unit("m", words))
+        coords["striker"] = [i + 1 for i in structure.bodies]
+    attrs = {
+        "title": "backbone curve", "well": structure.well, "end": end, "modes": n,
+        "reference_frequency": model.reference_frequency, "length_scale": model.length_scale,
+        "natural_frequencies": (structure.omega / (2.0 * np.pi)).tolist(),
+    }  # fmt: skip
+    return labelled(variables, coords, attrs)

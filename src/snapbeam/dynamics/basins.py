@@ -10,11 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage, stats
 
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
-from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters, settling_periods
+from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.lifetimes import proportion
+from snapbeam.dynamics.periodic_orbits import state_of
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.state import State
 from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
-from snapbeam.util.validation import InputError, InputTypeError, axis, checked, finite_array, integer, shown
+from snapbeam.util.validation import InputError, InputTypeError, axis, checked, integer, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -185,7 +188,7 @@ def _add_sensitivity(
 def _plane(
     flow: Flow, grid: Mapping[str, ArrayLike], rest: State | ArrayLike | None
 ) -> tuple[list[str], list[_Array], _Array]:
-    known = list(getattr(flow, "names", tuple(f"x[{i + 1}]" for i in range(flow.dimension))))
+    known = coordinate_names(flow)
     if not isinstance(grid, Mapping) or len(grid) != 2:
         raise InputTypeError(f"grid = {shown(grid)}: must map two coordinates to their values")
     for name in grid:
@@ -193,13 +196,10 @@ def _plane(
             raise InputError(f"grid {name}: is not a coordinate; must be one of {', '.join(known[:4])}, ...")
     names = list(grid)
     columns = [axis(name, grid[name], -np.inf, np.inf) for name in names]
-    if isinstance(rest, State) or (rest is None and isinstance(flow, Stroboscope)):
-        assert isinstance(flow, Stroboscope)
-        base = flow.coordinates(rest)[0]
+    if rest is None and not isinstance(flow, Stroboscope):
+        base = np.zeros(flow.dimension)
     else:
-        base = np.zeros(flow.dimension) if rest is None else finite_array("fixed_coordinates", rest)
-    if base.shape != (flow.dimension,):
-        raise InputError(f"fixed_coordinates of shape {base.shape}: must have the shape ({flow.dimension},)")
+        base = state_of(flow, "fixed_coordinates", rest)
     first, second = np.meshgrid(*columns, indexing="ij")
     rows = np.repeat(base[None], first.size, axis=0)
     rows[:, known.index(names[0])] = first.ravel()
@@ -256,41 +256,30 @@ def _dataset(
     after: _Array,
     total: int,
 ) -> xr.Dataset:
-    from snapbeam.util.datasets import xr
-
     shape = tuple(column.size for column in columns)
-    words = {"units": "1", "long_name": "number of the attractor that a state goes to; -1: undecided"}
-    meanings = [
-        "undecided",
-        *(f"period_{each.period}" if each.orbit else "chaotic" for each in found.attractors),
-    ]
-    words |= {"flag_values": np.arange(-1, len(found.attractors)), "flag_meanings": " ".join(meanings)}  # type: ignore[dict-item]
-    of: dict[str, Any] = {
+    kinds = [f"period_{each.period}" if each.orbit else "chaotic" for each in found.attractors]
+    words = {"units": "1", "long_name": "number of the attractor that a state goes to; -1: undecided",
+             "flag_values": np.arange(-1, len(kinds)), "flag_meanings": " ".join(["undecided", *kinds])}  # fmt: skip
+    places = [coordinate_names(found.flow).index(name) for name in names]
+    coords = {
         name: (name, column, {"units": "1", "long_name": _long_name(name)})
         for name, column in zip(names, columns, strict=True)
     }
-    return xr.Dataset(
+    attrs = {
+        "title": "basins of attraction",
+        "periods": total,
+        "undecided": float((label == UNDECIDED).mean()),
+    }
+    return labelled(
         {
             "basin": (names, label.reshape(shape), words),
-            "captured_after": (names, after.reshape(shape), {"units": "1", "long_name": "periods until certain"}),
+            "captured_after": (names, after.reshape(shape), "periods until certain"),
             "attractor_points": (
-                ("attractor", "point", "coordinate"), _shown(found, names), {"units": "1", "long_name": "attractors there"}
+                ("attractor", "point", "coordinate"), found.every_point[..., places], "attractors there"
             ),
         },
-        of,
-        fixed_parameters(found.flow) | {"title": "basins of attraction", "periods": total, "undecided": float((label == UNDECIDED).mean())},
+        coords, fixed_parameters(found.flow) | attrs,
     )  # fmt: skip
-
-
-def _shown(found: Attractors, names: list[str]) -> _Array:
-    """The two coordinates of the points of every attractor."""
-    known = list(getattr(found.flow, "names", tuple(f"x[{i + 1}]" for i in range(found.flow.dimension))))
-    at = [known.index(name) for name in names]
-    size = max((len(each.points) for each in found.attractors), default=1)
-    table = np.full((len(found.attractors), size, 2), np.nan)
-    for i, each in enumerate(found.attractors):
-        table[i, : len(each.points)] = each.points[:, at]
-    return table
 
 
 def _long_name(name: str) -> str:

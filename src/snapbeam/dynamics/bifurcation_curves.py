@@ -20,24 +20,26 @@ a fold) and 1:2 (of a flip); w C(v, v, v)/6 + w B(v, (I - J)^-1 B(v, v))/2 = 0 a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.dynamics.approaches import penetrations, turning_points
+from snapbeam.dynamics.arclength import OrbitEquations, Point, follow, tangent_of
 from snapbeam.dynamics.branches import SpecialPoint
-from snapbeam.dynamics.flow import AdvancedStates, Flow, Stroboscope, dimensionless, fixed_parameters
-from snapbeam.dynamics.periodic_orbits import (
+from snapbeam.dynamics.flow import Flow
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels
+from snapbeam.dynamics.shooting import (
     Family,
     OrbitNotFoundError,
     Return,
+    impacts_of,
     jacobian,
-    newton,
     orbit_tolerance,
-    penetrations,
-    turning_points,
 )
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.parameters import ratio_of
 from snapbeam.model.quantity import numbered, split_name
@@ -54,10 +56,6 @@ _TOLERANCE = 1e-9
 _SHORTEST, _LONGEST = 1e-6, 1.0
 _DIFFERENCE = 1e-5
 """Step of differences, in units of the well's amplitude and of the ranges of the parameters."""
-_EASIER = (1.0, 30.0, 1000.0)
-"""Factors of the tolerance that are tried one after the other."""
-_ITERATIONS = 25
-_EASY, _HARD = 5, 10
 _HALVINGS = 40
 _FINE = 1e-5
 """Relative error of tangents at level "reference"."""
@@ -69,44 +67,17 @@ _ROOM = 1e-6
 """Gap of a grazing orbit with other impacts under Newton's law, over b: beyond the tip there is no such orbit."""
 
 
-class _Plane(Family):
-    """A flow over two parameters that differ between runs."""
+@dataclass(eq=False)
+class _Curve(OrbitEquations):
+    """Equations of the orbits over two parameters that have a special point."""
 
-    def __init__(self, flow: Flow, names: tuple[str, str]) -> None:
-        super().__init__(flow)
-        self.names = names
+    iterations, easy, hard = 25, 5, 10
+    easier = (1.0, 30.0, 1000.0)
 
-    def advance(
-        self, x: _Array, periods: int, value: Any = None, tangents: _Array | None = None
-    ) -> AdvancedStates:
-        """Take states some periods on, at values of the two parameters, shape (2,) or (runs, 2)."""
-        values = np.broadcast_to(value, (len(x), 2))
-        points = {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(self.names)}
-        return self.flow.advance(x, periods, tangents=tangents, points=points)
-
-
-class _CurvePoint(NamedTuple):
-    """One point of a curve."""
-
-    y: _Array
-    """State, and the parameters over their ranges."""
-    tangent: _Array
-    came: Return
-    table: _Array
-    """Derivative of the equations, shape (d + 1, d + 2)."""
-    iterations: int
-    residual: float
-
-
-class _Curve:
-    """The equations of one curve."""
-
-    def __init__(self, plane: _Plane, kind: str, period: int, spans: _Array, tolerance: float) -> None:
-        self.plane, self.kind, self.period = plane, kind, period
-        self.spans, self.tolerance = spans, tolerance
-        flow = plane.flow
+    def __post_init__(self) -> None:
+        flow = self.family.flow
         rigid = isinstance(flow, Stroboscope) and any(each.law.impulsive for each in flow.system.contacts)
-        self.room = _ROOM if kind == "grazing" and rigid else 0.0
+        self.room = _ROOM if self.kind == "grazing" and rigid else 0.0
         # no difference may reach across the gap that is kept
         self.difference = 0.1 * _ROOM if self.room else _DIFFERENCE
         self.borders: tuple[_Array, _Array] | None = None
@@ -115,7 +86,16 @@ class _Curve:
 
     def came(self, y: _Array) -> Return:
         """The return map and its derivative by the state."""
-        return jacobian(self.plane, y[:-2], self.period, y[-2:] * self.spans)  # type: ignore[arg-type]
+        return jacobian(self.family, y[:-2], self.period, self.values(y))
+
+    def begin(self, y: _Array) -> None:
+        """Take the singular vectors at a point of the curve as borders."""
+        self.border(self.came(y))
+
+    def prepare(self, last: Point, is_first: bool) -> _Array | None:
+        """The derivative at the last point, with whose borders the next one is sought."""
+        self.border(last.came)
+        return None if is_first else last.table
 
     def border(self, came: Return) -> None:
         """Take the singular vectors at a point of the curve as borders: the bordered matrix is regular nearby."""
@@ -149,7 +129,7 @@ class _Curve:
         known = self._approaches.get(y.tobytes())
         if known is not None:
             return known
-        turns = turning_points(self._stroboscope(y), y[:-2], self.period)
+        turns = turning_points(self._seen(y), y[:-2], self.period)
         if not turns.depth.size or not np.isfinite(turns.depth).all():
             raise OrbitNotFoundError("no gap turns back")
         at = int(np.argmin(np.abs(turns.depth)))
@@ -167,22 +147,22 @@ class _Curve:
             # the instant of a turning point changes the gap in second order only
             time, contact, _ = self._approach(y)
             tests = [
-                -penetrations(self._stroboscope(each), each[:-2], self.period, np.array([time]))[0, contact]
+                -penetrations(self._seen(each), each[:-2], self.period, np.array([time]))[0, contact]
                 for each in np.concatenate([y + moves, y - moves])
             ]
         above, below = np.array(tests).reshape(2, -1)
         slope: _Array = (above - below) / (2.0 * self.difference)
         return slope
 
-    def _stroboscope(self, y: _Array) -> Stroboscope:
-        flow = self.at(y)
+    def _seen(self, y: _Array) -> Stroboscope:
+        flow = self.flow_at(y)
         assert isinstance(flow, Stroboscope)
         return flow
 
-    def equations(self, y: _Array) -> tuple[_Array, Return]:
+    def residual(self, y: _Array) -> _Array:
         """Residual of the orbit and of the condition, shape (d + 1,)."""
         came = self.came(y)
-        return np.append(came.x - y[:-2], self.test(y, came)), came
+        return np.append(came.x - y[:-2], self.test(y, came))
 
     def derivative(self, y: _Array) -> tuple[_Array, Return, _Array]:
         """Residual, return map and the derivative of the residual, shape (d + 1, d + 2)."""
@@ -198,94 +178,45 @@ class _Curve:
 
     def _all(self, y: _Array) -> list[Return]:
         """The return map and its derivative at several states and values at once."""
-        if not self.plane.flow.smooth:
-            return [self.came(each) for each in y]
-        runs, size = len(y), y.shape[1] - 2
-        tangents = np.tile(np.eye(size), (runs, 1, 1))
-        advanced = self.plane.advance(y[:, :-2], self.period, y[:, -2:] * self.spans, tangents)
+        tangents = np.tile(np.eye(y.shape[1] - 2), (len(y), 1, 1))
+        advanced = self.family.advance(y[:, :-2], self.period, self.values(y), tangents)
         assert advanced.tangents is not None
-        impacts = advanced.statistics.get("impacts", np.full(runs, -1))
-        return [
-            Return(x, moved.T, int(hits))
-            for x, moved, hits in zip(advanced.states, advanced.tangents, impacts, strict=True)
-        ]
+        rows = zip(advanced.states, advanced.tangents, impacts_of(advanced), strict=True)
+        return [Return(x, moved.T, int(hits)) for x, moved, hits in rows]
 
-    def correct(self, guess: _Array, row: _Array, before: _Array, known: _Array | None = None) -> _CurvePoint:
-        """The point of the curve on the plane through *guess* across *row*, as well as its residual allows.
+    def events(self, last: Point, point: Point, number: int) -> list[tuple[str, Point]]:
+        """Points of codimension two between two points, by halving."""
+        found = []
+        ahead = _monitors(self, last, point)
+        size = float(np.linalg.norm(point.y - last.y))
+        for kind, begun in _monitors(self, last, last).items():
+            if not begun * ahead[kind] < 0.0:
+                continue
+            low, high, nearest = 0.0, 1.0, point
+            for _ in range(_HALVINGS):
+                part = 0.5 * (low + high)
+                try:
+                    nearest = self.between(last, point, part)
+                except OrbitNotFoundError:
+                    break
+                if begun * _monitors(self, last, nearest)[kind] > 0.0:
+                    low = part
+                else:
+                    high = part
+                if (high - low) * size < self.tolerance:
+                    break
+            found.append((kind, nearest))
+        return found
 
-        Raises
-        ------
-        OrbitNotFoundError
-        """
+    def has_returned(self, point: Point, first: tuple[_Curve, Point], near: float) -> bool:
+        """Return whether the curve has returned to its first point, in the same direction."""
+        return bool(
+            np.linalg.norm(point.y[-2:] - first[1].y[-2:]) < near
+            and np.linalg.norm(self.state(point.y) - first[0].state(first[1].y, self.family.flow)) < near
+            and point.tangent[-2:] @ first[1].tangent[-2:] > 0.0
+        )
 
-        def residual(y: _Array) -> _Array:
-            return np.append(self.equations(y)[0], row @ (y - guess))
-
-        def derivative(y: _Array) -> tuple[_Array, _Array]:
-            found, _, table = self.derivative(y)
-            return np.append(found, row @ (y - guess)), np.vstack([table, row])
-
-        first = None if known is None else np.vstack([known, row])
-        for easier in _EASIER:
-            try:
-                shot = newton(residual, derivative, guess, easier * self.tolerance, _ITERATIONS, first)
-                break
-            except OrbitNotFoundError:
-                # light impacts make the multipliers rough; what is left counts as error
-                if easier == _EASIER[-1]:
-                    raise
-                first = None
-        _, came, table = self.derivative(shot.x)
-        if not np.isfinite(table).all():
-            raise OrbitNotFoundError("a run beside the orbit failed")
-        return _CurvePoint(shot.x, _tangent(table, before), came, table, shot.iterations, shot.residual)
-
-    def at(self, y: _Array) -> Flow:
-        """The flow at the parameters of a point."""
-        values = dict(zip(self.plane.names, (y[-2:] * self.spans).tolist(), strict=True))
-        flow: Flow = self.plane.flow
-        if isinstance(flow, Stroboscope):
-            return flow.changed(values)
-        for name, value in values.items():
-            flow = flow.neighbour(name, value)
-        return flow
-
-    def state(self, point: _CurvePoint, flow: Flow) -> _Array:
-        """The state of a point at the phase at which another flow takes states."""
-        if not isinstance(flow, Stroboscope) or flow is self.plane.flow:
-            return point.y[:-2]
-        here = self.at(point.y)
-        assert isinstance(here, Stroboscope)
-        return here.carried(point.y[:-2], flow.striker_phase)
-
-    def between_contacts(self, point: _CurvePoint) -> tuple[_Curve, _CurvePoint]:
-        """The point at the phase farthest from contacts, if one is near the phase of the flow; itself otherwise.
-
-        Raises
-        ------
-        OrbitNotFoundError
-        """
-        flow, names = self.plane.flow, self.plane.names
-        if (
-            not isinstance(flow, Stroboscope)
-            or not flow.jumps
-            or any(flow.system.parameter(name).name.endswith(".phase") for name in names)
-        ):
-            return self, point
-        here = self.at(point.y)
-        assert isinstance(here, Stroboscope)
-        phase = here.phase_between_contacts(point.y[:-2], self.period)
-        if phase is None:
-            return self, point
-        plane = _Plane(Stroboscope(flow.system, flow.integration, phase), names)
-        moved = _Curve(plane, self.kind, self.period, self.spans, self.tolerance)
-        y = np.append(self.state(point, plane.flow), point.y[-2:])
-        moved.border(moved.came(y))
-        table = moved.derivative(y)[2]
-        along = _tangent(table, np.append(np.zeros(y.size - 2), point.tangent[-2:]))
-        return moved, moved.correct(y, along, along, table)
-
-    def error(self, point: _CurvePoint, relative: float) -> _Array:
+    def error(self, point: Point, relative: float) -> _Array:
         """Uncertainty of the parameters from the residual and the error of the map's derivative."""
         size = point.y.size - 2
         steep = float(np.abs(point.came.jacobian).sum())
@@ -320,11 +251,7 @@ def _without_contact_force(grazing: SpecialPoint, names: tuple[str, str]) -> Flo
                 f"names = {shown(names)}: {name} does not change where an orbit without other impacts grazes; choose another parameter"
             )
     recorded = [replace(each, law=HertzContact(_WITHOUT_FORCE)) for each in flow.system.contacts]
-    return Stroboscope(flow.system.replace(contacts=recorded), flow.integration, flow.phase)
-
-
-_Seen = tuple[_Curve, _CurvePoint]
-"""A point, and the curve at whose phase of observation it is seen."""
+    return replace(flow, system=flow.system.replace(contacts=recorded))
 
 
 def _pair(came: Return) -> tuple[float, float]:
@@ -337,16 +264,10 @@ def _pair(came: Return) -> tuple[float, float]:
     return float(np.abs(pair) ** 2 - 1.0), float(pair.real / np.abs(pair))
 
 
-def _tangent(table: _Array, before: _Array) -> _Array:
-    """Unit tangent of the curve, in the direction of *before*."""
-    found: _Array = svd(table)[2][-1]
-    return found if found @ before >= 0.0 else -found
-
-
 # Points of codimension two between two points of a curve.
 
 
-def _monitors(curve: _Curve, one: _CurvePoint, point: _CurvePoint) -> dict[str, float]:
+def _monitors(curve: _Curve, one: Point, point: Point) -> dict[str, float]:
     """Functions that change their sign at points of codimension two, from the point *one* on."""
     found, came = dict[str, float](), point.came
     signs = {
@@ -376,7 +297,7 @@ _SIGNS = {"fold": 1.0, "flip": -1.0}
 """Critical multipliers."""
 
 
-def _flip_coefficient(curve: _Curve, point: _CurvePoint) -> float:
+def _flip_coefficient(curve: _Curve, point: Point) -> float:
     """The cubic coefficient of the normal form of a flip; NaN where the states beside the orbit have other impacts.
 
     A doubled orbit is stable if it is positive.
@@ -385,11 +306,8 @@ def _flip_coefficient(curve: _Curve, point: _CurvePoint) -> float:
     x, v, w = point.y[:-2], right / np.linalg.norm(right), left * np.linalg.norm(right) / (left @ right)
 
     def images(directions: _Array) -> _Array:
-        values = np.broadcast_to(point.y[-2:] * curve.spans, (len(directions), 2))
-        came = curve.plane.advance(x + _NORMAL_FORM * directions, curve.period, values)
-        same = np.asarray(came.statistics.get("impacts", np.zeros(1))).max(initial=0) == max(
-            point.came.impacts, 0
-        )
+        came = curve.family.advance(x + _NORMAL_FORM * directions, curve.period, curve.values(point.y))
+        same = (impacts_of(came) == point.came.impacts).all()
         return came.states if same else np.full_like(came.states, np.nan)
 
     twice, above, below, beyond = images(np.array([2.0, 1.0, -1.0, -2.0])[:, None] * v)
@@ -401,32 +319,6 @@ def _flip_coefficient(curve: _Curve, point: _CurvePoint) -> float:
     both = images(np.array([v + h / size, -v - h / size, v - h / size, h / size - v]))
     mixed = size * (both[0] + both[1] - both[2] - both[3]) / (4.0 * _NORMAL_FORM**2)
     return float(w @ third / 6.0 + w @ mixed / 2.0)
-
-
-def _between(curve: _Curve, one: _CurvePoint, other: _CurvePoint) -> list[tuple[str, _CurvePoint]]:
-    """Points of codimension two between two points, by halving."""
-    found = []
-    ahead = _monitors(curve, one, other)
-    for kind, begun in _monitors(curve, one, one).items():
-        if not begun * ahead[kind] < 0.0:
-            continue
-        low, high, nearest = 0.0, 1.0, other
-        along = other.y - one.y
-        row = along / np.linalg.norm(along)
-        for _ in range(_HALVINGS):
-            part = 0.5 * (low + high)
-            try:
-                nearest = curve.correct(one.y + part * along, row, one.tangent, one.table)
-            except OrbitNotFoundError:
-                break
-            if begun * _monitors(curve, one, nearest)[kind] > 0.0:
-                low = part
-            else:
-                high = part
-            if (high - low) * np.linalg.norm(along) < curve.tolerance:
-                break
-        found.append((kind, nearest))
-    return found
 
 
 @checked
@@ -526,157 +418,73 @@ def bifurcation_curve(
         for words, value in (("step", step), ("max_step", max_step))
     )
     spans = limits[:, 1] - limits[:, 0]
-    curve = _Curve(
-        _Plane(flow, (names[0], names[1])),
-        special_point.kind,
-        special_point.orbit.period,
-        spans,
-        orbit_tolerance(tolerance),
-    )
-    y = np.append(special_point.orbit.coordinates, begun / spans)
-    curve.border(curve.came(y))
+    orbit, family = special_point.orbit, Family(flow, *names)
+    curve = _Curve(family, orbit.period, spans, orbit_tolerance(tolerance), special_point.kind)
+    y = np.append(orbit.coordinates, begun / spans)
+    curve.begin(y)
     # the special point was located with other steps of differences: once more, across the curve
     table = curve.derivative(y)[2]
-    first = curve.correct(y, _tangent(table, np.ones(y.size)), np.ones(y.size), table)
+    first = curve.correct(y, tangent_of(table, np.ones(y.size)), np.ones(y.size), table)
     report = counting(progress, "bifurcation curve", "points")
-    sides, special, ends = [], [], []
-    for sign in (-1.0, 1.0):
-        start = first._replace(tangent=sign * first.tangent)
-        points, events, end = _follow(
-            curve, start, limits / spans[:, None], count, min(length, longest), longest, report
+    back, ahead = (
+        follow(
+            curve,
+            first._replace(tangent=sign * first.tangent),
+            limits=limits / spans[:, None],
+            max_points=count,
+            step=min(length, longest),
+            max_step=longest,
+            progress=report,
+            what="point",
         )
-        sides.append(points)
-        special += events
-        ends.append(end)
-    points = [*reversed(sides[0][1:]), *sides[1]]
-    return _dataset(curve, names, points, special, ends, flow)
-
-
-def _follow(
-    curve: _Curve,
-    first: _CurvePoint,
-    limits: _Array,
-    max_points: int,
-    length: float,
-    longest: float,
-    progress: Callable[[int, int], object] | None,
-) -> tuple[list[_Seen], list[tuple[str, _CurvePoint]], str]:
-    points, events = [(curve, first)], list[tuple[str, _CurvePoint]]()
-    while len(points) < max_points:
-        try:
-            points[-1] = curve.between_contacts(points[-1][1])
-        except (OrbitNotFoundError, np.linalg.LinAlgError):
-            pass  # the next point is sought at the phase of this one
-        curve, last = points[-1]
-        guess, row, over = last.y + length * last.tangent, last.tangent, False
-        shares = [
-            (value - last.y[k - 2]) / (length * last.tangent[k - 2])
-            for k in range(2)
-            for value in limits[k]
-            if (guess[k - 2] - value) * (last.y[k - 2] - value) < 0.0
-        ]
-        if shares:
-            # the last point stands at the limit itself
-            over, guess = True, last.y + min(shares) * length * last.tangent
-            k = int(np.argmin(np.abs(guess[-2:, None] - limits).min(axis=1)))
-            row = np.zeros(guess.size)
-            row[k - 2] = 1.0
-        try:
-            curve.border(last.came)
-            point = curve.correct(guess, row, last.tangent, last.table if points[1:] else None)
-            turned = float(point.tangent @ last.tangent)
-            if np.linalg.norm(point.y - last.y) > 3.0 * length or turned < 0.5:
-                raise OrbitNotFoundError("the next point is too far away, or on another curve")
-            if not over and not ((limits[:, 0] <= point.y[-2:]) & (point.y[-2:] <= limits[:, 1])).all():
-                raise OrbitNotFoundError("the corrected point is beyond the limits")
-        except (OrbitNotFoundError, np.linalg.LinAlgError) as error:
-            length *= 0.5
-            if length < _SHORTEST * longest:
-                return points, events, f"no further point: {error}"
-            continue
-        events += _between(curve, last, point)
-        points.append((curve, point))
-        if progress is not None:
-            progress(len(points), max_points)
-        if over:
-            return points, events, "limit of a parameter"
-        if (
-            len(points) > 8
-            and np.linalg.norm(point.y[-2:] - first.y[-2:]) < 0.75 * length
-            and np.linalg.norm(point.y[:-2] - points[0][0].state(first, curve.plane.flow)) < 0.75 * length
-            and point.tangent[-2:] @ first.tangent[-2:] > 0.0
-        ):
-            return points, events, "closed"
-        if point.iterations <= _EASY and turned > 0.95:
-            length = min(1.4 * length, longest)
-        elif point.iterations >= _HARD or turned < 0.8:
-            length *= 0.6
-    return points, events, f"{max_points} points, the maximum (max_points)"
+        for sign in (-1.0, 1.0)
+    )
+    points = [*reversed(back.points[1:]), *ahead.points]
+    ends = f"{back.end}; {ahead.end}"
+    return _dataset(curve, names, points, [*back.events, *ahead.events], ends, flow)
 
 
 def _dataset(
     curve: _Curve,
     names: tuple[str, str],
-    seen: list[_Seen],
-    special: list[tuple[str, _CurvePoint]],
-    ends: list[str],
+    seen: list[tuple[_Curve, Point]],
+    special: list[tuple[str, Point]],
+    ends: str,
     flow: Flow,
 ) -> xr.Dataset:
-    from snapbeam.util.datasets import xr
-
     points = [point for _, point in seen]
     relative = _FINE if isinstance(flow, Stroboscope) else 1e-9
     errors = np.array([curve.error(point, relative) for point in points])
-    values = np.array([point.y[-2:] for point in points]) * curve.spans
-    places = np.array([point.y[-2:] for _, point in special]).reshape(-1, 2) * curve.spans
+    values = np.array([curve.values(point.y) for point in points])
+    places = np.reshape([curve.values(point.y) for _, point in special], (-1, 2))
     multipliers = np.array([np.linalg.eigvals(point.came.jacobian) for point in points])
-    coordinates = getattr(flow, "names", tuple(f"x[{i + 1}]" for i in range(points[0].y.size - 2)))
-    variables: dict[str, Any] = {
+    of_kind, kinds = {"long_name": "kind of the point of codimension two"}, [kind for kind, _ in special]
+    variables: dict[str, tuple[Any, Any, Any]] = {
         "state": (
-            ("point", "coordinate"),
-            np.array([by.state(point, flow) for by, point in seen]),
-            dimensionless("state of the orbit at the phase of observation of the special point"),
+            ("point", "coordinate"), np.array([by.state(point.y, flow) for by, point in seen]),
+            "state of the orbit at the phase of observation of the special point",
         ),
-        "multiplier_real": (("point", "multiplier"), multipliers.real, dimensionless("Floquet multiplier")),
-        "multiplier_imag": (("point", "multiplier"), multipliers.imag, dimensionless("its imaginary part")),
-        "impacts": (
-            "point",
-            np.array([p.came.impacts for p in points], np.int32),
-            dimensionless("impacts within the period"),
-        ),
-        "residual": (
-            "point",
-            np.array([point.residual for point in points]),
-            dimensionless("of the return and of the condition"),
-        ),
-        "special_point_kind": (
-            "special_point",
-            np.array([kind for kind, _ in special], dtype=str),
-            {"long_name": "kind of the point of codimension two"},
-        ),
-    }
-    coords: dict[str, Any] = {"coordinate": list(coordinates)}
+        "multiplier_real": (("point", "multiplier"), multipliers.real, "Floquet multiplier"),
+        "multiplier_imag": (("point", "multiplier"), multipliers.imag, "its imaginary part"),
+        "impacts": ("point", np.array([p.came.impacts for p in points], np.int32), "impacts within the period"),
+        "residual": ("point", np.array([p.residual for p in points]), "of the return and of the condition"),
+        "special_point_kind": ("special_point", np.array(kinds, dtype=str), of_kind),
+    }  # fmt: skip
+    coords: dict[str, Any] = {"coordinate": coordinate_names(flow)}
     shorts = []
     for k, name in enumerate(names):
-        short, labels = name, {"units": "1", "long_name": name}
-        if isinstance(flow, Stroboscope):
-            row = flow.system.parameter(name)
-            short, labels = row.short, {"units": row.quantity.unit, "long_name": row.quantity.long_name}
+        short, labels = parameter_labels(flow, name)
         shorts.append(short)
         coords[short] = ("point", values[:, k], labels | {"parameter": name})
         off = labels | {"long_name": f"by how much it may be off at these steps: {labels['long_name']}"}
         variables[f"{short}_error"] = ("point", errors[:, k], off)
         variables[f"special_point_{short}"] = ("special_point", places[:, k], labels)
-    attrs = {
-        **fixed_parameters(flow, *shorts),
-        "title": f"bifurcation curve of periodic orbits: {curve.kind}",
-        "kind": curve.kind,
-        "parameters": shorts,
-        "period": curve.period,
-        "termination_reason": "; ".join(ends),
-    }
+    attrs = fixed_parameters(flow, *shorts) | {
+        "title": f"bifurcation curve of periodic orbits: {curve.kind}", "kind": curve.kind, "parameters": shorts,
+        "period": curve.period, "termination_reason": ends,
+    }  # fmt: skip
     if curve.kind == "grazing":
         assert isinstance(flow, Stroboscope)
         left_out = flow.system.contacts[0].law == HertzContact(_WITHOUT_FORCE)
         attrs |= {"kept_gap": curve.room, "contact_force": "left out" if left_out else "included"}
-    return xr.Dataset(variables, coords, attrs)
+    return labelled(variables, coords, attrs)

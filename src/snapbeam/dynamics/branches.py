@@ -15,20 +15,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.flow import Flow, Stroboscope, dimensionless, fixed_parameters, jumps
-from snapbeam.dynamics.periodic_orbits import (
-    Corrector,
-    Family,
-    OrbitNotFoundError,
-    PeriodicOrbit,
-    Return,
-    Spot,
-    orbit_at,
-    orbit_tolerance,
-)
+from snapbeam.dynamics.arclength import OrbitEquations, Path, Point, follow, tangent_of
+from snapbeam.dynamics.flow import Flow
+from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, orbit_at
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels
+from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, jacobian, orbit_tolerance
+from snapbeam.dynamics.stroboscope import Stroboscope, jumps
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
-from snapbeam.util.validation import InputError, checked, choice, integer, shown, within
+from snapbeam.util.validation import InputError, checked, choice, integer, interval, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -132,120 +127,56 @@ class Branch:
         Over ``orbit``: the parameter, the state, the multipliers, stability, impacts and the mid-span displacement,
         once and at every ``return``.  Over ``special_point``: kind, value, error, state and the orbit before it.
         """
-        from snapbeam.util.datasets import xr
-
-        first = self.orbits[0]
+        first, special = self.orbits[0], self.special_points
         seen = [orbit_at(orbit, first.flow) for orbit in self.orbits]
-        names = getattr(first.flow, "names", tuple(f"x[{i + 1}]" for i in range(first.coordinates.size)))
         values = np.array([orbit.multipliers for orbit in self.orbits])
-        short, unit, words = self.name, "1", self.name
-        if isinstance(first.flow, Stroboscope):
-            row = first.flow.system.parameter(self.name)
-            short, unit, words = row.short, row.quantity.unit, row.quantity.long_name
+        short, labels = parameter_labels(first.flow, self.name)
         states = np.array([orbit.coordinates for orbit in seen])
         steps = np.linalg.norm(np.diff(states, axis=0), axis=1)
-        dataset = xr.Dataset(
-            {
-                "state": (
-                    ("orbit", "coordinate"),
-                    states,
-                    dimensionless("state of the orbit at the phase of observation of the first orbit"),
-                ),
-                "multiplier_real": (
-                    ("orbit", "multiplier"),
-                    values.real,
-                    dimensionless("Floquet multiplier"),
-                ),
-                "multiplier_imag": (
-                    ("orbit", "multiplier"),
-                    values.imag,
-                    dimensionless("its imaginary part"),
-                ),
-                "stable": (
-                    "orbit",
-                    self.is_stable,
-                    dimensionless("whether every multiplier is inside the unit circle"),
-                ),
-                "impacts": (
-                    "orbit",
-                    np.array(self.impacts, dtype=np.int32),
-                    dimensionless("impacts within the period"),
-                ),
-                "arclength": (
-                    "orbit",
-                    np.append(0.0, np.cumsum(steps)),
-                    dimensionless("length of the branch in states"),
-                ),
-                "residual": (
-                    "orbit",
-                    [orbit.residual for orbit in self.orbits],
-                    dimensionless("of the return"),
-                ),
-                "special_point_kind": (
-                    "special_point",
-                    [point.kind for point in self.special_points],
-                    {"long_name": "kind of the special point"},
-                ),
-                "special_point_index": (
-                    "special_point",
-                    [point.index for point in self.special_points],
-                    dimensionless("orbit before it"),
-                ),
-                "special_point_value": (
-                    "special_point",
-                    [point.value for point in self.special_points],
-                    {"units": unit, "long_name": words},
-                ),
-                "special_point_error": (
-                    "special_point",
-                    np.array([point.error for point in self.special_points], dtype=np.float64),
-                    {"units": unit, "long_name": f"by how much it may be off at these steps: {words}"},
-                ),
-                "special_point_state": (
-                    ("special_point", "coordinate"),
-                    np.array(
-                        [orbit_at(point.orbit, first.flow).coordinates for point in self.special_points]
-                    ).reshape(-1, states.shape[1]),
-                    dimensionless("state of the orbit there"),
-                ),
-            },
-            {
-                "coordinate": list(names),
-                short: ("orbit", self.values, {"units": unit, "long_name": words, "parameter": self.name}),
-            },
-            {
-                **fixed_parameters(first.flow, short),
-                "title": "branch of periodic orbits",
-                "parameter": short,
-                "period": first.period,
-                "termination_reason": self.termination_reason,
-            },
-        )
+        there = [orbit_at(point.orbit, first.flow).coordinates for point in special]
+        off = labels | {"long_name": f"by how much it may be off at these steps: {labels['long_name']}"}
+        coordinates, multipliers = ("orbit", "coordinate"), ("orbit", "multiplier")
+        variables: dict[str, tuple[Any, Any, Any]] = {
+            "state": (coordinates, states, "state of the orbit at the phase of observation of the first orbit"),
+            "multiplier_real": (multipliers, values.real, "Floquet multiplier"),
+            "multiplier_imag": (multipliers, values.imag, "its imaginary part"),
+            "stable": ("orbit", self.is_stable, "whether every multiplier is inside the unit circle"),
+            "impacts": ("orbit", np.array(self.impacts, np.int32), "impacts within the period"),
+            "arclength": ("orbit", np.append(0.0, np.cumsum(steps)), "length of the branch in states"),
+            "residual": ("orbit", [orbit.residual for orbit in self.orbits], "of the return"),
+            "special_point_kind": (
+                "special_point", [point.kind for point in special], {"long_name": "kind of the special point"}
+            ),
+            "special_point_index": ("special_point", [point.index for point in special], "orbit before it"),
+            "special_point_value": ("special_point", [point.value for point in special], labels),
+            "special_point_error": ("special_point", np.array([point.error for point in special], float), off),
+            "special_point_state": (
+                ("special_point", "coordinate"), np.reshape(there, (-1, states.shape[1])), "state of the orbit there"
+            ),
+        }  # fmt: skip
         if isinstance(first.flow, Stroboscope):
             centers = np.array([_centers(orbit) for orbit in seen])
-            dataset["midspan_displacement"] = (
-                "orbit",
-                centers[:, 0],
-                dimensionless("centre displacement there, over b"),
-            )
-            dataset["midspan_returns"] = (
-                ("orbit", "return"),
-                centers,
-                dimensionless("centre displacement once a period of the drive, over b"),
-            )
-        return dataset
+            words = "centre displacement there, over b"
+            variables["midspan_displacement"] = ("orbit", centers[:, 0], words)
+            words = "centre displacement once a period of the drive, over b"
+            variables["midspan_returns"] = (("orbit", "return"), centers, words)
+        coords = {
+            "coordinate": coordinate_names(first.flow),
+            short: ("orbit", self.values, labels | {"parameter": self.name}),
+        }
+        attrs = fixed_parameters(first.flow, short) | {
+            "title": "branch of periodic orbits", "parameter": short, "period": first.period,
+            "termination_reason": self.termination_reason,
+        }  # fmt: skip
+        return labelled(variables, coords, attrs)
 
 
 def _centers(orbit: PeriodicOrbit) -> NDArray[np.float64]:
     """Centre displacement over b, once a period of the drive."""
     flow = orbit.flow
     assert isinstance(flow, Stroboscope)
-    states = orbit.coordinates[np.newaxis]
-    if orbit.period > 1:
-        later = flow.advance(states, orbit.period - 1, every=True).every
-        assert later is not None
-        states = np.concatenate([states, later[0]])
-    amplitudes = states[:, : flow.modes] * flow.scales[: flow.modes]
+    n = flow.space.modes
+    amplitudes = orbit.points[:, :n] * flow.space.scales[:n]
     return np.asarray(amplitudes @ flow.system.model.midspan_shape / flow.system.scale.length)
 
 
@@ -261,34 +192,71 @@ _ACROSS = 10.0
 """Maximum ratio of the change of multipliers across a branch to that along it; above it, an orbit is inaccurate."""
 
 
+class _Orbits(OrbitEquations):
+    """Equations of the orbits over one parameter."""
+
+    def _value(self, y: _Array) -> float:
+        return float(self.values(y)[0])
+
+    def residual(self, y: _Array) -> _Array:
+        """Residual of the return, shape (d,)."""
+        there = self.family.advance(y[None, :-1], self.period, self.values(y)).states[0]
+        return np.asarray(there - y[:-1])
+
+    def derivative(self, y: _Array) -> tuple[_Array, Return, _Array]:
+        """Residual, return map and derivative, shape (d, d + 1)."""
+        came, span = jacobian(self.family, y[:-1], self.period, self.values(y)), float(self.spans[0])
+        slope = self.family.slope(y[:-1], self.period, self._value(y), _DIFFERENCE * span) * span
+        return came.x - y[:-1], came, np.column_stack([came.jacobian - np.eye(len(came.x)), slope])
+
+    def orbit(self, point: Point) -> PeriodicOrbit:
+        """Orbit of the flow at its parameter value."""
+        came, x = point.came, self.state(point.y)
+        residual = float(np.abs(came.x - x).max())
+        return PeriodicOrbit(self.flow_at(point.y), x, self.period, came.jacobian, residual, point.iterations)
+
+    def require_next(self, last: Point, point: Point) -> None:
+        """Refuse another number of impacts where the derivatives jump between such orbits."""
+        if jumps(self.family.flow) and point.came.impacts != last.came.impacts:
+            raise OrbitNotFoundError("another number of impacts: it grazes")
+
+    def events(self, last: Point, point: Point, number: int) -> list[SpecialPoint]:
+        """Special points between two orbits."""
+        found = []
+        up, flip, pair = (b - a for a, b in zip(_counts(last.came), _counts(point.came), strict=True))
+        if last.tangent[-1] * point.tangent[-1] < 0.0:
+            found.append(_located(self, last, point, "fold", number))
+        elif up % 2:
+            found.append(_located(self, last, point, "branch point", number))
+        if flip % 2:
+            found.append(_located(self, last, point, "flip", number))
+        if pair and not (up or flip):
+            found.append(_located(self, last, point, "Neimark-Sacker", number))
+        if last.came.impacts != point.came.impacts:
+            found.append(_grazing(self, last, point, number))
+        return [event for event in found if event is not None]
+
+    def has_returned(self, point: Point, first: tuple[_Orbits, Point], near: float) -> bool:
+        """Return whether the branch has returned to its first orbit, in the same direction."""
+        if not abs(point.y[-1] - first[1].y[-1]) < near:
+            return False
+        try:
+            begun = self.seen(*first)
+        except OrbitNotFoundError:
+            return False  # at this phase the first orbit is in contact: it is another one
+        return bool(np.linalg.norm(point.y - begun.y) < near and point.tangent @ begun.tangent > 0.9)
+
+
 def _counts(came: Return) -> tuple[int, int, int]:
     """Real multipliers above 1, real ones below -1, and others outside the unit circle."""
     values = np.linalg.eigvals(came.jacobian)
     real = np.abs(values.imag) < 1e-12 * np.maximum(np.abs(values), 1e-300)
     out = np.abs(values) > 1.0
-    return (
-        int((real & (values.real > 1.0)).sum()), int((real & (values.real < -1.0)).sum()), int((out & ~real).sum())
-    )  # fmt: skip
+    sets = real & (values.real > 1.0), real & (values.real < -1.0), out & ~real
+    return int(sets[0].sum()), int(sets[1].sum()), int(sets[2].sum())
 
 
-def between(corrector: Corrector, one: Spot, other: Spot, at: int) -> list[SpecialPoint]:
-    """Locate the special points between two orbits of a branch."""
-    found = []
-    up, flip, pair = (b - a for a, b in zip(_counts(one.came), _counts(other.came), strict=True))
-    if one.tangent[-1] * other.tangent[-1] < 0.0:
-        found.append(_located(corrector, one, other, "fold", at))
-    elif up % 2:
-        found.append(_located(corrector, one, other, "branch point", at))
-    if flip % 2:
-        found.append(_located(corrector, one, other, "flip", at))
-    if pair and not (up or flip):
-        found.append(_located(corrector, one, other, "Neimark-Sacker", at))
-    if one.came.impacts != other.came.impacts:
-        found.append(_grazing(corrector, one, other, at))
-    return [event for event in found if event is not None]
-
-
-def _test(spot: Spot, kind: str) -> float:
+def _test(spot: Point, kind: str) -> float:
     """Test function, zero at a special point."""
     if kind == "fold":
         return float(spot.tangent[-1])
@@ -304,14 +272,7 @@ def _test(spot: Spot, kind: str) -> float:
     return float(logs[0].real * abs(near - sign))
 
 
-def _between_at(corrector: Corrector, one: Spot, other: Spot, part: float) -> Spot:
-    along = other.y - one.y
-    row = along / np.linalg.norm(along)
-    nearer = one if part < 0.5 else other
-    return corrector.correct(one.y + part * along, row, one.tangent, (nearer.came, nearer.slope))
-
-
-def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -> SpecialPoint | None:
+def _located(orbits: _Orbits, one: Point, other: Point, kind: str, at: int) -> SpecialPoint | None:
     """An event between two orbits, by the Illinois form of false position; None where no multiplier is critical."""
     low, high, f_low, f_high = 0.0, 1.0, _test(one, kind), _test(other, kind)
     if not f_low * f_high < 0.0:
@@ -322,7 +283,7 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
         steep = (f_high - f_low) / (high - low)
         tried = low - f_low / steep
         try:
-            spot = _between_at(corrector, one, other, tried)
+            spot = orbits.between(one, other, tried)
         except OrbitNotFoundError:
             off = high - low
             break
@@ -339,15 +300,15 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
             low, f_low = tried, value
             f_high *= 0.5 if side == -1 else 1.0
             side = -1
-    orbit = corrector.orbit(best)
-    critical = max(_CRITICAL, 10.0 * _derivative_error(corrector.family.flow))
+    orbit = orbits.orbit(best)
+    critical = max(_CRITICAL, 10.0 * _derivative_error(orbits.family.flow))
     if not _distance(orbit.multipliers, kind) < critical:
         return None  # what seems to change its sign jumps, as where an impact passes the phase of observation
     # a derivative that is off moves the place at which a multiplier seems to pass, and so does an orbit off its own
-    off += _ACROSS * _unsettled(corrector, best) / float(np.linalg.norm(other.y - one.y))
-    off += _derivative_error(corrector.family.flow) * abs(1.0 / (_test(other, kind) - _test(one, kind)))
-    found = float(best.y[-1]) * corrector.span
-    error = _moved(corrector, (one, best, other), part, off) + corrector.span * _unsettled(corrector, best)
+    off += _ACROSS * _unsettled(best) / float(np.linalg.norm(other.y - one.y))
+    off += _derivative_error(orbits.family.flow) * abs(1.0 / (_test(other, kind) - _test(one, kind)))
+    found = orbits._value(best.y)
+    error = _moved(orbits, (one, best, other), part, off) + float(orbits.spans[0]) * _unsettled(best)
     return SpecialPoint(kind, orbit, found, at, error)
 
 
@@ -363,74 +324,74 @@ def _derivative_error(flow: Flow) -> float:
     return _FINE if isinstance(flow, Stroboscope) else _ROUNDING
 
 
-def _moved(corrector: Corrector, spots: tuple[Spot, Spot, Spot], part: float, off: float) -> float:
+def _moved(orbits: _Orbits, spots: tuple[Point, Point, Point], part: float, off: float) -> float:
     """Change of the parameter if the location between the first and the last orbit is off by *off*.
 
     It is read off the parabola through the three, since at a fold the parameter moves with the square alone.
     """
     first, middle, last = (float(spot.y[-1]) for spot in spots)
     if not 1e-6 < part < 1.0 - 1e-6:
-        return abs(last - first) * corrector.span * off
+        return abs(last - first) * float(orbits.spans[0]) * off
     rise, fall = (middle - first) / part, (last - middle) / (1.0 - part)
     bend = fall - rise
     slope = rise + bend * part
-    return (abs(slope) * off + abs(bend) * off**2) * corrector.span
+    return (abs(slope) * off + abs(bend) * off**2) * float(orbits.spans[0])
 
 
-def _unsettled(corrector: Corrector, spot: Spot) -> float:
+def _unsettled(point: Point) -> float:
     """Estimated error of an orbit, as a state and over the parameter range, from its closure error."""
-    table = corrector.bordered(spot.came, spot.slope, spot.tangent)
-    residual = max(float(np.linalg.norm(spot.came.x - spot.y[:-1])), _ROUNDING)
+    table = np.vstack([point.table, point.tangent])
+    residual = max(float(np.linalg.norm(point.came.x - point.y[:-1])), _ROUNDING)
     least = float(np.linalg.svd(table, compute_uv=False)[-1])
     return residual / least if least > 0.0 else float("nan")
 
 
-def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> SpecialPoint:
+def _grazing(orbits: _Orbits, one: Point, other: Point, at: int) -> SpecialPoint:
     """Special point at which the number of impacts changes between two orbits, by bisection."""
     sides = [one, other]
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         part = 0.5 * (low + high)
         try:
-            spot = _between_at(corrector, one, other, part)
+            spot = orbits.between(one, other, part)
         except OrbitNotFoundError:
             break
         if spot.came.impacts == one.came.impacts:
             low, sides[0] = part, spot
         else:
             high, sides[1] = part, spot
-    width = abs(float(sides[1].y[-1] - sides[0].y[-1])) * corrector.span
-    found = float(sides[1].y[-1]) * corrector.span
-    error = width + corrector.span * _unsettled(corrector, sides[1])
-    return SpecialPoint("grazing", corrector.orbit(sides[1]), found, at, error)
+    width = abs(float(sides[1].y[-1] - sides[0].y[-1])) * float(orbits.spans[0])
+    found = orbits._value(sides[1].y)
+    error = width + float(orbits.spans[0]) * _unsettled(sides[1])
+    return SpecialPoint("grazing", orbits.orbit(sides[1]), found, at, error)
 
 
-def grazing_end(spots: list[tuple[Corrector, Spot]]) -> SpecialPoint | None:
+def _grazing_end(points: list[tuple[_Orbits, Point]]) -> SpecialPoint | None:
     """The grazing that a branch ends at, if its last orbit passes the tip without room to spare.
 
     The room left, over how fast it went along the branch, is by how much the place is off.
     """
-    corrector, last = spots[-1]
-    if not isinstance(corrector.family.flow, Stroboscope):
+    orbits, last = points[-1]
+    if not isinstance(orbits.family.flow, Stroboscope):
         return None
-    orbit = corrector.orbit(last)
+    orbit, span = orbits.orbit(last), float(orbits.spans[0])
     scratch = orbit.contact_summary.clearance
     if not scratch < _TOUCHES:
         return None
-    error, found = float("nan"), float(last.y[-1]) * corrector.span
-    for by, before in reversed(spots[:-1]):
-        way = abs(float(before.y[-1]) * corrector.span - found)
+    error = float("nan")
+    for by, before in reversed(points[:-1]):
+        way = abs(float(before.y[-1] - last.y[-1])) * span
         fell = by.orbit(before).contact_summary.clearance - scratch
         if fell > max(scratch, _ROUNDING):
-            error = 2.0 * scratch * way / fell + corrector.span * _unsettled(corrector, last)
+            error = 2.0 * scratch * way / fell + span * _unsettled(last)
             break
-    return SpecialPoint("grazing", orbit, found, len(spots) - 1, error)
+    return SpecialPoint("grazing", orbit, orbits._value(last.y), len(points) - 1, error)
 
 
 _SHORTEST, _LONGEST = 1e-8, 1.0
 """Allowed range of the distance between orbits."""
-_EASY, _HARD = 4, 9
-"""Iterations up to which the step grows, and from which on it shrinks."""
+_DIFFERENCE = 2e-6
+"""Step of the difference by the parameter, over its range."""
 
 
 @checked
@@ -490,7 +451,7 @@ def continuation(
     >>> float(branch.values.max())
     0.032
     """
-    low, high = _limits(bounds)
+    low, high = interval("bounds", bounds)
     begun = orbit.flow.value(name)
     if not low <= begun <= high:
         raise InputError(f"bounds = ({low:g}, {high:g}): must contain the orbit's own {name} = {begun:g}")
@@ -500,109 +461,34 @@ def continuation(
         within(words, value, _SHORTEST, _LONGEST, closed="both")
         for words, value in (("step", step), ("max_step", max_step))
     )
-    corrector = Corrector(Family(orbit.flow, name), orbit.period, high - low, orbit_tolerance(tolerance))
-    y = np.append(orbit.coordinates, begun / corrector.span)
-    came, slope = corrector.derivatives(y)
-    sign = np.zeros(y.size)
-    sign[-1] = 1.0 if direction == "up" else -1.0
-    first = Spot(y, corrector.tangent(came, slope, sign), came, slope, orbit.iterations)
-    return _follow(
-        corrector,
-        first,
-        (low, high),
-        count,
-        min(length, max_step),
-        max_step,
-        counting(progress, "branch", "orbits"),
+    span = np.array([high - low])
+    orbits = _Orbits(Family(orbit.flow, name), orbit.period, span, orbit_tolerance(tolerance))
+    y = np.append(orbit.coordinates, begun / span)
+    _, came, table = orbits.derivative(y)
+    towards = np.append(np.zeros(y.size - 1), 1.0 if direction == "up" else -1.0)
+    report = counting(progress, "branch", "orbits")
+    path = follow(
+        orbits,
+        Point(y, tangent_of(table, towards), came, table, orbit.iterations, orbit.residual),
+        limits=np.array([[low, high]]) / span,
+        max_points=count,
+        step=min(length, max_step),
+        max_step=max_step,
+        progress=report,
     )
+    if report is not None and len(path.points) < count:
+        report(len(path.points), len(path.points))
+    return _branch(name, path)
 
 
-def _limits(bounds: tuple[float, float]) -> tuple[float, float]:
-    try:
-        low, high = (float(value) for value in bounds)
-    except (TypeError, ValueError):
-        raise InputError(f"bounds = {shown(bounds)}: must be a minimum and a maximum") from None
-    if not low < high:
-        raise InputError(f"bounds = ({low:g}, {high:g}): must be increasing")
-    return low, high
-
-
-def _follow(
-    corrector: Corrector,
-    first: Spot,
-    limits: tuple[float, float],
-    max_points: int,
-    length: float,
-    max_step: float,
-    progress: Callable[[int, int], object] | None,
-) -> Branch:
-    spots, events = [(corrector, first)], list[SpecialPoint]()
-    end = f"{max_points} orbits, the maximum (max_points)"
-    shortest = 1e-7 * max_step
-    limit = tuple(value / corrector.span for value in limits)
-    while len(spots) < max_points:
-        try:
-            spots[-1] = corrector.between_contacts(spots[-1][1])
-        except OrbitNotFoundError:
-            pass  # the next orbit is sought at the phase of this one
-        corrector, last = spots[-1]
-        guess = last.y + length * last.tangent
-        over = next((value for value in limit if (guess[-1] - value) * (last.y[-1] - value) < 0.0), None)
-        row = last.tangent
-        if over is not None:
-            # the last orbit stands at the limit itself
-            guess = last.y + (over - last.y[-1]) / last.tangent[-1] * last.tangent
-            guess[-1], row = over, np.append(np.zeros(guess.size - 1), 1.0)
-        try:
-            spot = corrector.correct(guess, row, last.tangent, (last.came, last.slope))
-            turned = float(spot.tangent @ last.tangent)
-            if np.linalg.norm(spot.y - last.y) > 3.0 * length or turned < 0.5:
-                raise OrbitNotFoundError("the next orbit is too far away, or on another branch")
-            if over is None and not limit[0] <= spot.y[-1] <= limit[1]:
-                raise OrbitNotFoundError("the corrected orbit is beyond the limit")
-            if jumps(corrector.family.flow) and spot.came.impacts != last.came.impacts:
-                raise OrbitNotFoundError("another number of impacts: it grazes")
-        except OrbitNotFoundError as error:
-            length *= 0.5
-            if length < shortest:
-                end = f"no further orbit: {error}"
-                grazing = grazing_end(spots)
-                if grazing is not None:
-                    events.append(grazing)
-                    end = "grazing"
-                break
-            continue
-        events += between(corrector, last, spot, len(spots) - 1)
-        spots.append((corrector, spot))
-        if progress is not None:
-            progress(len(spots), max_points)
-        if over is not None:
-            end = "limit of the parameter"
-            break
-        if len(spots) > 8 and _returned(corrector, spot, *spots[0], 0.75 * length):
-            end = "closed"
-            break
-        if spot.iterations <= _EASY and turned > 0.95:
-            length = min(1.4 * length, max_step)
-        elif spot.iterations >= _HARD or turned < 0.8:
-            length *= 0.6
-    if progress is not None and len(spots) < max_points:
-        progress(len(spots), len(spots))
-    orbits = [by.orbit(spot) for by, spot in spots]
-    assert corrector.family.name is not None
-    impacts = [spot.came.impacts for _, spot in spots]
-    return Branch(corrector.family.name, orbits, events, end, impacts, [spot.tangent for _, spot in spots])
-
-
-def _returned(corrector: Corrector, spot: Spot, before: Corrector, first: Spot, near: float) -> bool:
-    """Return whether the branch has returned to its first orbit within a distance, in the same direction."""
-    if not abs(spot.y[-1] - first.y[-1]) < near:
-        return False
-    try:
-        begun = corrector.seen(before, first)
-    except OrbitNotFoundError:
-        return False  # at this phase the first orbit is in contact: it is another one
-    return bool(np.linalg.norm(spot.y - begun.y) < near and spot.tangent @ begun.tangent > 0.9)
+def _branch(name: str, path: Path[_Orbits]) -> Branch:
+    points, special, end = path.points, path.events, path.end
+    grazing = _grazing_end(points) if end.startswith("no further") else None
+    if grazing is not None:
+        special, end = [*special, grazing], "grazing"
+    impacts = [point.came.impacts for _, point in points]
+    tangents = [point.tangent for _, point in points]
+    return Branch(name, [by.orbit(point) for by, point in points], special, end, impacts, tangents)
 
 
 def switch_branch(
@@ -649,17 +535,13 @@ def switch_branch(
     """
     if not isinstance(special_point, SpecialPoint) or special_point.kind not in ("flip", "branch point"):
         raise InputError(f"special_point = {shown(special_point)}: must be a flip or a branch point")
-    low, high = _limits(bounds)
-    orbit, span = special_point.orbit, high - low
+    low, high = interval("bounds", bounds)
+    orbit, span = special_point.orbit, np.array([high - low])
     doubled = special_point.kind == "flip"
     values, vectors = np.linalg.eig(orbit.jacobian)
     vector = vectors[:, np.argmin(np.abs(values - (-1.0 if doubled else 1.0)))].real
     row = np.append(vector / np.linalg.norm(vector), 0.0)
-    flow: Flow = orbit.flow
-    corrector = Corrector(Family(flow, name), orbit.period * (2 if doubled else 1), span, _TOLERANCE)
-    guess = (
-        np.append(orbit.coordinates, special_point.value / span)
-        + within("size", size, _SHORTEST, _LONGEST, closed="both") * row
-    )
-    spot = corrector.correct(guess, row, row)
-    return corrector.orbit(spot)
+    orbits = _Orbits(Family(orbit.flow, name), orbit.period * (2 if doubled else 1), span, _TOLERANCE)
+    away = within("size", size, _SHORTEST, _LONGEST, closed="both") * row
+    guess = np.append(orbit.coordinates, special_point.value / span) + away
+    return orbits.orbit(orbits.correct(guess, row, row))

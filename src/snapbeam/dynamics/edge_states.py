@@ -9,20 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.bifurcation import minimal_period
-from snapbeam.dynamics.flow import Flow, Stroboscope, fixed_parameters, flow_of
-from snapbeam.dynamics.periodic_orbits import (
-    OrbitNotFoundError,
-    PeriodicOrbit,
-    require_isolated_orbits,
-    shoot,
-)
+from snapbeam.dynamics.flow import Flow, minimal_period
+from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot, state_of
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.shooting import OrbitNotFoundError, require_isolated_orbits
+from snapbeam.dynamics.stroboscope import Stroboscope, flow_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
-from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, positive
+from snapbeam.util.validation import InputError, checked, integer, positive
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,35 +67,20 @@ class EdgeState:
 
     def to_dataset(self) -> xr.Dataset:
         """The motion, labelled."""
-        from snapbeam.util.datasets import xr
-
-        names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.flow.dimension)))
-        labels = {"units": "1", "long_name": "state on the border once a period"}
         settled = np.empty((0, self.flow.dimension)) if self.orbit is None else self.orbit.points
         values = np.empty(0, dtype=complex) if self.orbit is None else self.orbit.multipliers
-        return xr.Dataset(
+        words = "unstable orbit that it settles on, once a period"
+        return labelled(
             {
-                "state": (("period", "coordinate"), self.states, labels),
-                "distance": (
-                    "period",
-                    self.distance,
-                    {"units": "1", "long_name": "distance of the two that hold it"},
-                ),
-                "orbit_state": (
-                    ("orbit_period", "coordinate"),
-                    settled,
-                    {"units": "1", "long_name": "unstable orbit that it settles on, once a period"},
-                ),
-                "multiplier_real": (
-                    "multiplier",
-                    values.real,
-                    {"units": "1", "long_name": "its multipliers"},
-                ),
-                "multiplier_imag": ("multiplier", values.imag, {"units": "1", "long_name": "imaginary part"}),
+                "state": (("period", "coordinate"), self.states, "state on the border once a period"),
+                "distance": ("period", self.distance, "distance of the two that hold it"),
+                "orbit_state": (("orbit_period", "coordinate"), settled, words),
+                "multiplier_real": ("multiplier", values.real, "its multipliers"),
+                "multiplier_imag": ("multiplier", values.imag, "imaginary part"),
             },
-            {"coordinate": list(names)},
-            {
-                **fixed_parameters(self.flow),
+            {"coordinate": coordinate_names(self.flow)},
+            fixed_parameters(self.flow)
+            | {
                 "title": "edge state",
                 "period": 0 if self.orbit is None else self.orbit.period,
                 "termination_reason": self.termination_reason,
@@ -173,7 +155,7 @@ def edge_tracking(
     if not near < far:
         raise InputError(f"bisect_threshold = {near:g}: must be less than diverge_threshold = {far:g}")
     decide = _snaps if outcome is None else outcome
-    low, high = _row(flow, u1, "u1"), _row(flow, u2, "u2")
+    low, high = state_of(flow, "u1", u1), state_of(flow, "u2", u2)
     told = decide(flow, np.stack([low, high]), ahead)
     if bool(told[0]) or not bool(told[1]):
         raise InputError(
@@ -240,7 +222,7 @@ def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array,
     towards = -np.sign(quiet[0]) or 1.0
     sizes = [0.1 * 2.0**k for k in range(8)] if size is None else [positive("kick", size)]
     rows = np.repeat(quiet[None], len(sizes) + 1, axis=0)
-    rows[1:, flow.modes] += towards * np.array(sizes)
+    rows[1:, flow.space.modes] += towards * np.array(sizes)
     told = _snaps(flow, rows, integer("horizon", horizon, 1, 10**6))
     if told[0]:
         raise InputError(f"the start: it snaps within {horizon} periods by itself; take a weaker drive")
@@ -249,17 +231,6 @@ def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array,
             f"kick (--initial-velocity) = {sizes[-1]:g}: does not snap within {horizon} periods; take a harder one"
         )
     return quiet, rows[int(np.argmax(told))]
-
-
-def _row(flow: Flow, state: State | ArrayLike, name: str) -> _Array:
-    if isinstance(state, State):
-        if not isinstance(flow, Stroboscope):
-            raise InputTypeError(f"{name}: must be an array of {flow.dimension} numbers")
-        return flow.coordinates(state)[0]
-    row = finite_array(name, state)
-    if row.shape != (flow.dimension,):
-        raise InputError(f"{name} of shape {row.shape}: must be {flow.dimension} finite numbers")
-    return row
 
 
 def _snaps(flow: Flow, states: _Array, horizon: int) -> NDArray[np.bool_]:
@@ -272,7 +243,7 @@ def _snaps(flow: Flow, states: _Array, horizon: int) -> NDArray[np.bool_]:
     if isinstance(flow, Stroboscope):
         # on the border's way some have crossed before they are looked at again
         shape, first = flow.system.model.midspan_shape, flow.coordinates()[0]
-        side = states[:, : flow.modes] @ shape * float(first[: flow.modes] @ shape)
+        side = states[:, : flow.space.modes] @ shape * float(first[: flow.space.modes] @ shape)
         crossed |= side < 0.0
     return crossed
 
@@ -318,6 +289,6 @@ def _settled(flow: Flow, path: _Array) -> tuple[PeriodicOrbit | None, str]:
         )
     try:
         require_isolated_orbits(flow)
-        return shoot(flow, tail[-1], period, 1e-10, 40), f"it settled on an orbit of period {period}"
+        return shoot(flow, tail[-1], period, 1e-10), f"it settled on an orbit of period {period}"
     except (InputError, OrbitNotFoundError) as error:
         return None, f"no orbit of period {period}: {error}"

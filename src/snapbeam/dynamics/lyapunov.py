@@ -9,14 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.flow import (
-    AdvancedStates,
-    Flow,
-    Stroboscope,
-    fixed_parameters,
-    flow_of,
-    settling_periods,
-)
+from snapbeam.dynamics.flow import AdvancedStates, Flow
+from snapbeam.dynamics.results import fixed_parameters, in_unit, labelled
+from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
@@ -61,8 +56,7 @@ def lyapunov_spectrum(
     """The largest Lyapunov exponents, by tangents with a QR factorisation at every whole period.
 
     The linearised time steps of the run advance k small changes, which are orthonormalised once a period (Benettin,
-    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  Differences of order six between neighbouring states replace
-    them for strikers with mass, local forces, harvesters, and contact forces that jump or depend on the velocity.  The
+    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  The
     exponents are the logarithms of the growth, divided by the time.  A run that snaps and then settles has two kinds: those
     of the transient, and those of the settled motion.  Set ``transient=0`` to obtain both: the default transient is
     usually longer than the snap-through.
@@ -97,7 +91,7 @@ def lyapunov_spectrum(
     Raises
     ------
     InputError
-        If a number is out of range, or a user-defined flow has no tangents: see :func:`largest_lyapunov`.
+        If a number is out of range.
 
     Examples
     --------
@@ -114,10 +108,6 @@ def lyapunov_spectrum(
     count = integer("k", k, 1, flow.dimension)
     total = integer("periods", periods, _BLOCKS, 10**7)
     before, rule = _transient(flow, transient, 0)
-    if not flow.smooth:
-        raise InputError(
-            "system: the flow advances no tangents; use largest_lyapunov for the largest exponent"
-        )
     begun, points, columns = _runs(flow, states, axes)
     advanced = (
         flow.advance(begun, before, points=columns) if before else flow.advance(begun, 1, points=columns)
@@ -223,53 +213,50 @@ def _orthogonal(tangents: _Array | None) -> tuple[_Array, _Array]:
 def _dataset(
     flow: Flow, growth: _Array, crossed: NDArray[np.bool_], points: Points | None, before: int
 ) -> xr.Dataset:
-    from snapbeam.util.datasets import xr
-
     total, _, count = growth.shape
-    rate = growth / flow.period if points is None else growth / _periods(flow, points)[None, :, None]
-    unit = "1/s" if isinstance(flow, Stroboscope) else "1"
-    edges = np.linspace(0, total, _BLOCKS + 1).astype(int)
-    means = np.array([_sums(rate[a:b]) / (b - a) for a, b in pairwise(edges)])
+    periods = np.array([flow.period]) if points is None else _periods(flow, points)
+    rate = growth / np.reshape(periods, (1, -1, 1))
     number = np.arange(total)[:, None]
     last = np.where(crossed.any(axis=0), total - np.argmax(crossed[::-1], axis=0), 0)
-    snapping = np.where((number < last)[..., None], rate, np.nan)
-    settled = np.where((number >= last)[..., None], rate, np.nan)
     dims = ("run",) if points is None else points.dims
 
     def arranged(values: NDArray[Any]) -> NDArray[Any]:
         return values if points is None else points.arranged(values)
 
-    def mean(values: _Array) -> _Array:
-        known = np.isfinite(values).sum(axis=0)
-        sums = _sums(np.where(np.isfinite(values), values, 0.0))
-        return np.where(known > 0, sums / np.maximum(known, 1), np.nan)
+    def during(which: NDArray[np.bool_]) -> _Array:
+        """Mean over some of the periods."""
+        known = which[..., None] & np.isfinite(rate)
+        many = known.sum(axis=0)
+        return np.where(many > 0, _sums(np.where(known, rate, 0.0)) / np.maximum(many, 1), np.nan)
 
-    table = {
-        "exponent": (_sums(rate) / total, "Lyapunov exponent"),
-        "exponent_error": (_error(means), "standard error of the exponent"),
-        "exponent_snapping": (mean(snapping), "finite-time exponent while it snaps"),
-        "exponent_settled": (mean(settled), "finite-time exponent once it snaps no more"),
+    unit, own = _unit(flow), (*dims, "exponent_number")
+    variables: dict[str, tuple[Any, Any, Any]] = {
+        name: (own, arranged(values), in_unit(unit, words))
+        for name, values, words in (
+            ("exponent", _sums(rate) / total, "Lyapunov exponent"),
+            ("exponent_error", _error(rate), "standard error of the exponent"),
+            ("exponent_snapping", during(number < last), "finite-time exponent while it snaps"),
+            ("exponent_settled", during(number >= last), "finite-time exponent once it snaps no more"),
+        )
     }
+    words = "periods from the first to the last with a crossing"
+    variables["periods_snapping"] = (dims, arranged(last), words)
     coords: dict[str, Any] = {"exponent_number": np.arange(1, count + 1)}
     coords |= {} if points is None else points.coordinates()
-    dataset = xr.Dataset(
-        coords=coords,
-        attrs={name: value for name, value in fixed_parameters(flow).items() if name not in coords}
-        | {"title": "Lyapunov exponents", "periods": total, "transient": before},
-    )
-    for name, (values, words) in table.items():
-        dataset[name] = ((*dims, "exponent_number"), arranged(values), {"units": unit, "long_name": words})
-    words = "periods from the first to the last with a crossing"
-    dataset["periods_snapping"] = (dims, arranged(last), {"units": "1", "long_name": words})
+    attrs = {name: value for name, value in fixed_parameters(flow).items() if name not in coords}
+    attrs |= {"title": "Lyapunov exponents", "periods": total, "transient": before}
     if points is None:
         running = np.cumsum(rate, axis=0) / np.arange(1, total + 1)[:, None, None]
-        labels = {"units": unit, "long_name": "exponent so far"}
-        dataset["running"] = (("period", *dims, "exponent_number"), running, labels)
-        dataset.attrs["period"] = flow.period
+        variables["running"] = (("period", *own), running, in_unit(unit, "exponent so far"))
+        attrs["period"] = flow.period
     else:
-        labels = {"units": "s", "long_name": "period of the excitation"}
-        dataset["excitation_period"] = (dims, arranged(_periods(flow, points)), labels)
-    return dataset
+        variables["excitation_period"] = (dims, arranged(periods), in_unit("s", "period of the excitation"))
+    return labelled(variables, coords, attrs)
+
+
+def _unit(flow: Flow) -> str:
+    """Unit of an exponent."""
+    return "1/s" if isinstance(flow, Stroboscope) else "1"
 
 
 def _sums(values: _Array) -> _Array:
@@ -277,8 +264,10 @@ def _sums(values: _Array) -> _Array:
     return np.ascontiguousarray(np.moveaxis(values, 0, -1)).sum(axis=-1)
 
 
-def _error(means: _Array) -> _Array:
-    """Standard error of the mean of stretches, shape (stretches, ...)."""
+def _error(rate: _Array) -> _Array:
+    """Standard error of the mean over periods, from the means of blocks."""
+    edges = np.linspace(0, len(rate), _BLOCKS + 1).astype(int)
+    means = np.array([_sums(rate[a:b]) / (b - a) for a, b in pairwise(edges)])
     off = means - _sums(means) / len(means)
     return np.sqrt(_sums(off * off) / (len(means) * (len(means) - 1)))
 
@@ -294,7 +283,7 @@ def _periods(flow: Flow, points: Points) -> _Array:
     columns = points.take(np.arange(points.size))
     rows, which = np.unique(np.stack([columns[name] for name in names], axis=1), axis=0, return_inverse=True)
     systems = [flow.system.replace(**dict(zip(names, map(float, row), strict=True))) for row in rows]
-    return flow.cycles_per_period * np.array([cycle_of(system) for system in systems])[which.ravel()]
+    return flow.clock.cycles_per_period * np.array([cycle_of(system) for system in systems])[which.ravel()]
 
 
 @checked
@@ -336,8 +325,6 @@ def largest_lyapunov(
     >>> bool(result.exponent < 0.0)
     True
     """
-    from snapbeam.util.datasets import xr
-
     flow = flow_of(system, integration)
     total = integer("periods", periods, _BLOCKS, 10**7)
     before, rule = _transient(flow, transient, 1)
@@ -358,20 +345,18 @@ def largest_lyapunov(
         if report is not None:
             report(period + 1, total)
     rate = growth / flow.period
-    edges = np.linspace(0, total, _BLOCKS + 1).astype(int)
-    means = np.array([_sums(rate[a:b]) / (b - a) for a, b in pairwise(edges)])
-    unit = "1/s" if isinstance(flow, Stroboscope) else "1"
-    merged = int((growth_lost := np.isnan(growth).any(axis=0)).sum())
-    told = _merged(merged, growth_lost.size, size)
+    lost, unit = np.isnan(growth).any(axis=0), _unit(flow)
+    told = _merged(int(lost.sum()), lost.size, size)
     tell(told)
-    return xr.Dataset(
+    return labelled(
         {
-            "exponent": ("run", _sums(rate) / total, {"units": unit, "long_name": "largest Lyapunov exponent"}),
-            "exponent_error": ("run", _error(means), {"units": unit, "long_name": "standard error"}),
+            "exponent": ("run", _sums(rate) / total, in_unit(unit, "largest Lyapunov exponent")),
+            "exponent_error": ("run", _error(rate), in_unit(unit, "standard error")),
         },
-        attrs=fixed_parameters(flow) | {
+        None,
+        fixed_parameters(flow) | {
             "title": "largest Lyapunov exponent from two trajectories", "periods": total, "period": flow.period,
-            "transient": before, "termination_reason": _stopped(total, before, rule), "merged": merged,
+            "transient": before, "termination_reason": _stopped(total, before, rule), "merged": int(lost.sum()),
             "diagnostics": to_json(told),
         },
     )  # fmt: skip

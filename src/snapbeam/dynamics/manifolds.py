@@ -15,8 +15,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.flow import Flow, Stroboscope, dimensionless, fixed_parameters
-from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, periodic_orbit
+from snapbeam.dynamics.flow import Flow
+from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, periodic_orbit
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.shooting import OrbitNotFoundError
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
 from snapbeam.util.diagnostics import Diagnostic, sharing, tell
 from snapbeam.util.validation import (
@@ -327,30 +330,22 @@ def _dataset(
     branches: list[tuple[int, _Array, _Array, str]],
     error: float,
 ) -> xr.Dataset:
-    from snapbeam.util.datasets import xr
-
-    def joined(of: Callable[[int, _Array, _Array], _Array]) -> _Array:
-        return np.concatenate([of(side, age, states) for side, age, states, _ in branches])
-
-    def length(side: int, age: _Array, states: _Array) -> _Array:
-        return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(states, axis=0), axis=1)))
-
-    names = getattr(orbit.flow, "names", tuple(f"x[{i + 1}]" for i in range(orbit.coordinates.size)))
-    variables: dict[str, Any] = {
-        "state": (("point", "coordinate"), joined(lambda side, age, states: states), dimensionless("state")),
-        "side": ("point", joined(lambda side, age, states: np.full(age.size, side, np.int8)), dimensionless("branch")),
-        "arclength": ("point", joined(length), dimensionless("length of the branch")),
-        "age": (
-            "point", joined(lambda side, age, states: age), dimensionless("applications of the map since the fundamental segment")
-        ),
-        "saddle": ("coordinate", orbit.coordinates, dimensionless("state of the orbit")),
+    ages, states = (np.concatenate([each[k] for each in branches]) for k in (1, 2))
+    sides = np.concatenate([np.full(age.size, side, np.int8) for side, age, *_ in branches])
+    steps = [np.linalg.norm(np.diff(known, axis=0), axis=1) for _, _, known, _ in branches]
+    variables: dict[str, tuple[Any, Any, Any]] = {
+        "state": (("point", "coordinate"), states, "state"),
+        "side": ("point", sides, "branch"),
+        "arclength": ("point", np.concatenate([np.append(0.0, np.cumsum(own)) for own in steps]), "length of the branch"),
+        "age": ("point", ages, "applications of the map since the fundamental segment"),
+        "saddle": ("coordinate", orbit.coordinates, "state of the orbit"),
     }  # fmt: skip
-    attrs = {
-        **fixed_parameters(orbit.flow), "title": f"{stability} manifold of a periodic orbit", "stability": stability,
+    attrs = fixed_parameters(orbit.flow) | {
+        "title": f"{stability} manifold of a periodic orbit", "stability": stability,
         "multiplier": multiplier, "period": orbit.period, "chord_error": error,
         "termination_reason": "; ".join(reason for *_, reason in branches),
     }  # fmt: skip
-    return xr.Dataset(variables, {"coordinate": list(names)}, attrs)
+    return labelled(variables, {"coordinate": coordinate_names(orbit.flow)}, attrs)
 
 
 @checked
@@ -405,11 +400,11 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
             along_stable = float(s[2][other] + b[one, other] * np.linalg.norm(s[1][other]))
             found.append((along, along_stable, *(begin[one, 0] + part * way[one, 0])))
     table = np.array(sorted(found)).reshape(-1, 4)
-    return xr.Dataset(
+    return labelled(
         {
-            "state": (("point", "coordinate"), table[:, 2:], dimensionless("state")),
-            "arclength": ("point", table[:, 0], dimensionless("length of the unstable manifold")),
-            "stable_arclength": ("point", table[:, 1], dimensionless("length of the stable manifold")),
+            "state": (("point", "coordinate"), table[:, 2:], "state"),
+            "arclength": ("point", table[:, 0], "length of the unstable manifold"),
+            "stable_arclength": ("point", table[:, 1], "length of the stable manifold"),
         },
         {"coordinate": unstable["coordinate"].values},
         {
@@ -493,8 +488,6 @@ def homoclinic_tangency(
     >>> found.attrs["termination_reason"], found["bracket"].values
     ('max_seconds', array([nan, nan]))
     """
-    from snapbeam.util.datasets import xr
-
     instance("orbit", orbit, PeriodicOrbit, "an orbit, as periodic_orbit gives")
     low, high = interval("bounds", bounds)
     width = within("tolerance", tolerance, 1e-9, 0.5, closed="both") * (high - low)
@@ -510,7 +503,7 @@ def homoclinic_tangency(
         if clock.is_over:
             return "max_seconds"
         part = clock._replace(begun=len(tried) / total, part=1.0 / total)
-        flow = orbit.flow.neighbour(name, value)
+        flow = orbit.flow.changed({name: value})
         try:
             saddle = periodic_orbit(flow, orbit.coordinates, orbit.period)
             both = [
@@ -554,10 +547,11 @@ def homoclinic_tangency(
         next((each for each in (low, high) if tried.get(each) is state), np.nan) for state in (False, True)
     ]
     values = sorted(tried)
-    return xr.Dataset(
+    labels = {"long_name": f"nearest values of {name}"}
+    return labelled(
         {
-            "crosses": ("value", np.array([tried[value] for value in values], bool), dimensionless("the manifolds cross")),
-            "bracket": ("manifolds", np.array(kept), {"long_name": f"nearest values of {name}"}),
+            "crosses": ("value", np.array([tried[value] for value in values], bool), "the manifolds cross"),
+            "bracket": ("manifolds", np.array(kept), labels),
         },
         {"value": ("value", np.array(values), {"long_name": name}), "manifolds": ["apart", "crossing"]},
         {

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.flow import Stroboscope, settling_periods
+from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
@@ -101,8 +101,7 @@ def poincare_section(
         begun = flow.advance(begun, before).states
     if not np.isfinite(begun).all():
         raise InputError("transient: the run failed before the section; use a smaller step")
-    held = flow.starting(flow.state(begun[0]))
-    how = flow.integration.replace(cycles=total * flow.cycles_per_period, early_termination=False)
+    held, how = flow.starting(begun[0]), flow.during(total)
     end = total * flow.period
     reason, off = f"{total} periods after a transient of {before} periods ({rule})", None
     if section == "stroboscopic":
@@ -184,8 +183,7 @@ def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope,
     kept = data[["displacement_at_striker", "velocity_at_striker", "midspan_displacement", "midspan_velocity", "modal_amplitude",
                  "modal_velocity"]]  # fmt: skip
     kept = kept.rename(time="point").reset_coords(drop=True)
-    cycle = flow.period / flow.cycles_per_period
-    phase = (flow.striker_phase + 2.0 * np.pi * times / cycle) % (2.0 * np.pi)
+    phase = (flow.clock.striker_phase + 2.0 * np.pi * times / flow.clock.cycle) % (2.0 * np.pi)
     result = xr.Dataset(
         {name: (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars},
         {"time": ("point", times, {"units": "s", "long_name": "time since the transient"})},

@@ -43,6 +43,7 @@ _HOMES = {
     "open_recording": "camera",
     "read_channels": "signal_files",
     "read_signal": "signal_files",
+    "read_spectra": "signal_formats",
     "write_signal": "signal_files",
     "make_signal": "signals",
     "SineFit": "sine_fit",

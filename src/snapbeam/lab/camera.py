@@ -49,8 +49,9 @@ class Recording:
         (first row, last row + 1, first column, last column + 1) in the full frame.
     numbers
         Number of each frame counted from the first, int (frames,); a hole is a missing frame.
-    frame_rate, pixel_size
-        Frames per second [Hz] and metres per pixel, from the file or the user.
+    frame_rate, pixel_size, pixel_width
+        Frames per second [Hz] and metres per pixel, from the file or the user; ``pixel_size`` is the height of a pixel, for
+        motion along columns, and ``pixel_width`` its width where the file states another.
     exposure
         Shutter time [s], or ``None`` where it is not known.
     max_value
@@ -87,6 +88,7 @@ class Recording:
         pixel_size: float,
         region: tuple[int, int, int, int],
         diagnostics: tuple[Diagnostic, ...] = (),
+        pixel_width: float | None = None,
     ) -> None:
         if not isinstance(source, FrameSource):
             raise InputTypeError(
@@ -98,6 +100,7 @@ class Recording:
         self._source = source
         self.frame_rate = frame_rate
         self.pixel_size = pixel_size
+        self.pixel_width = pixel_size if pixel_width is None else pixel_width
         self.region = region
         self.shape = (region[1] - region[0], region[3] - region[2])
         self.numbers = source.numbers
@@ -187,6 +190,16 @@ def _rate_diagnostics(source: FrameSource, given: float | None) -> tuple[Diagnos
     return ()
 
 
+def _missing(numbers: NDArray[np.int64]) -> tuple[Diagnostic, ...]:
+    """Diagnostics for frames that are missing by their numbers."""
+    holes = np.flatnonzero(np.diff(numbers) > 1)
+    if not holes.size:
+        return ()
+    lost = float(numbers[-1] + 1 - numbers.size)
+    first = float(numbers[holes[0]])
+    return (KINDS_RECORDING["frames_missing"].found(frames=lost, places=float(holes.size), first=first),)
+
+
 def open_recording(
     path: str | Path,
     *,
@@ -205,9 +218,9 @@ def open_recording(
     frame_rate
         Frame rate [Hz] of the recording. Overrides the file. It is required for a video, because the rate in
         the file is the playback rate. A Photron header gives record rate over skipped frames; the argument is
-        required if its fields contradict each other.
+        required if statements in a file contradict each other.
     pixel_size
-        Metres per pixel in the plane of the beam.  Overrides the file.  Photron (.cihx) and ImageJ files may
+        Metres per pixel in the plane of the beam.  Overrides the file.  Photron (.cihx), ImageJ and OME files may
         contain it; usually it is measured with a scale in view.
     region
         (first row, last row + 1, first column, last column + 1), the part of the frame to read.
@@ -256,8 +269,9 @@ def open_recording(
                 f"pixel_size (--pixel-size) = {size:g}: a pixel of {size:g} m; must be at most {_LARGEST_PIXEL:g} m, "
                 "in metres, such as 12e-6 for 12 um"
             )
-        diagnostics = (*source.diagnostics, *_rate_diagnostics(source, given))
-        return Recording(path, source, rate, size, _region(region, source.shape), diagnostics)
+        diagnostics = (*source.diagnostics, *_rate_diagnostics(source, given), *_missing(source.numbers))
+        width = source.pixel_width if pixel_size is None else None
+        return Recording(path, source, rate, size, _region(region, source.shape), diagnostics, width)
     except BaseException:
         source.close()
         raise

@@ -404,6 +404,12 @@ KINDS_RECORDING = table(
         "the header gives exposures of {first_us:.4g} and {second_us:.4g} us; the second is taken",
     ),
     Kind(
+        "recording.frames_missing", WARNING,
+        "numbers or time stamps of the frames",
+        "{frames:.0f} frame(s) are missing at {places:.0f} place(s), the first after frame {first:.0f}, by the numbers or "
+        "time stamps in the file; there the result is NaN, and later times are right",
+    ),
+    Kind(
         "recording.curve", WARNING,
         "the camera's curve and edge enhancement in the header",
         "the camera's settings bend edges (curve of gamma {gamma:g}, edge enhancement {enhance:g}): switch both "

@@ -11,6 +11,7 @@ from scipy.ndimage import spline_filter1d
 
 from snapbeam.lab.camera import Recording
 from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.diagnostics import to_json
 from snapbeam.util.singular_values import pinv
 from snapbeam.util.validation import InputError, checked, choice, instance, integer, within
 
@@ -63,8 +64,8 @@ def full_field(
     -------
     xarray.Dataset
         ``displacement`` [m] from the rest, positive towards the first row, with ``displacement_se`` and
-        ``correlation``, over ``time`` [s] and ``position`` [m] along the beam; NaN where the correlation is below 0.5 or
-        the block left the region.
+        ``correlation``, over ``time`` [s] and ``position`` [m] along the beam; NaN where the correlation is below 0.5,
+        the block left the region, or the frame is missing.
 
     Raises
     ------
@@ -113,12 +114,13 @@ def full_field(
     )
     if not at_rest.slope.any():
         raise InputError(f"rows = {first}, {last}: hold no texture and no edge in any block")
-    found = {name: np.full((count, blocks), np.nan) for name in ("shift", "error", "correlation")}
+    length = int(recording.numbers[-1]) + 1
+    found = {name: np.full((length, blocks), np.nan) for name in ("shift", "error", "correlation")}
     shift = np.zeros(blocks)
     for k in range(count):
         fitted = at_rest.fit_shifts(frame(k), shift)
         for name, values in zip(found, fitted, strict=True):
-            found[name][k] = values
+            found[name][recording.numbers[k]] = values
         # a block that is lost is looked for where its neighbours are
         known = np.isfinite(fitted[0])
         if known.any():
@@ -126,7 +128,9 @@ def full_field(
             shift = np.interp(at, at[known], fitted[0][known])
         if progress is not None:
             progress(k + 1, count)
-    pixel = recording.pixel_size
+    pixel, across = recording.pixel_size, recording.pixel_width
+    if motion == "columns":
+        pixel, across = across, pixel
     columns: dict[str, tuple[_Array, str, str]] = {
         "displacement": (-pixel * found["shift"], "m", "displacement from the rest"),
         "displacement_se": (pixel * found["error"], "m", "standard error of the displacement"),
@@ -135,14 +139,17 @@ def full_field(
     return xr.Dataset(
         {name: (("time", "position"), v, {"units": u, "long_name": words}) for name, (v, u, words) in columns.items()},
         {
-            "time": ("time", np.arange(count) / recording.frame_rate, {"units": "s"}),
+            "time": ("time", np.arange(length) / recording.frame_rate, {"units": "s"}),
             "position": (
                 "position",
-                pixel * ((np.arange(blocks) + 0.5) * block - 0.5),
+                across * ((np.arange(blocks) + 0.5) * block - 0.5),
                 {"units": "m", "long_name": "place along the beam, from the first column"},
             ),
         },
-        {"source": recording.path.name, "pixel_size": pixel, "frame_rate": recording.frame_rate, "block": block},
+        {
+            "source": recording.path.name, "pixel_size": pixel, "frame_rate": recording.frame_rate, "block": block,
+            "diagnostics": to_json(recording.diagnostics),
+        },
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_RECORDING, LOSSY_ERROR
+from snapbeam.lab.frame_times import cine_times, numbers_of_stamps
 from snapbeam.lab.photron import CameraHeader, check_pixels, read_header, read_mraw
+from snapbeam.lab.signal_formats import is_time, seconds_in, stated_unit
+from snapbeam.lab.signals import si_unit
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import refuse_inflated
@@ -26,10 +29,10 @@ from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError
 
 TIFF_SUFFIXES = (".tif", ".tiff")
-_LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "µm": 1e-6, "\\u00b5m": 1e-6}
 ARRAY_SUFFIXES = (".npy", ".h5", ".hdf5")
 _RATES = ("frame_rate", "fps", "record_rate", "frame_rate_hz")
 _SIZES = ("pixel_size", "pixel_size_m")
+_SAME_RATE = 1.005  # ratio of rates that are rounded
 _EVEN = 0.02  # share by which the kinds of pixels under a mosaic may differ and count as one
 IMAGE_SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", ".jpg", ".jpeg")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mov", ".mkv", ".cine")
@@ -52,8 +55,8 @@ class FrameSource:
     ----------
     shape, numbers, max_value
         (height, width); number of each frame; the largest grey level the file can hold.
-    frame_rate, pixel_size, exposure
-        [Hz], [m], [s], or None where the file does not say.
+    frame_rate, pixel_size, pixel_width, exposure
+        [Hz], [m], [m], [s], or None where the file does not say; ``pixel_size`` is the height of a pixel.
     frame_rate_question, pixel_size_hint
         Ambiguous information of the file, for the error message.
     diagnostics, edge_error
@@ -69,6 +72,7 @@ class FrameSource:
         self.max_value = 255
         self.frame_rate: float | None = None
         self.pixel_size: float | None = None
+        self.pixel_width: float | None = None
         self.exposure: float | None = None
         self.frame_rate_question = ""
         self.pixel_size_hint = ""
@@ -82,6 +86,14 @@ class FrameSource:
 
     def close(self) -> None:
         """Close open files."""
+
+    def state_rate(self, rates: Mapping[str, float]) -> None:
+        """Take the frame rate [Hz] from what the file states, in words; statements that differ become a question."""
+        if rates and max(rates.values()) <= _SAME_RATE * min(rates.values()):
+            self.frame_rate = next(iter(rates.values()))
+        elif rates:
+            told = ", ".join(f"{words}: {rate:.6g} Hz" for words, rate in rates.items())
+            self.frame_rate_question = f"the file contradicts itself about the frame rate ({told}); give frame_rate (--frame-rate) in Hz"
 
 
 def grey_of(colors: NDArray[Any]) -> NDArray[Any]:
@@ -130,13 +142,17 @@ def _refuse_picture(path: Path, shape: Iterable[int]) -> None:
 
 
 class TiffSource(FrameSource):
-    """A TIFF file of many pages.  ImageJ's frame interval and calibrated pixel size are used if present."""
+    """A TIFF file of many pages, or of many frames behind one page as ImageJ writes files above 4 GB.
+
+    Times and sizes that ImageJ or OME state are used.  Channels and slices are no frames.
+    """
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         import tifffile
 
         self._file: Any = None
+        self._stack: NDArray[Any] | None = None
         try:
             self._file = tifffile.TiffFile(path)
             pages = self._file.pages
@@ -162,8 +178,12 @@ class TiffSource(FrameSource):
             ):
                 self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
                 self.edge_error = LOSSY_ERROR
-            self._imagej(self._file.imagej_metadata or {}, first)
+            self.metadata = {"format": "TIFF stack"}
+            count = self._lay_out(self._file.imagej_metadata or {}, count, first)
             self.numbers = np.arange(count)
+            self._imagej(self._file.imagej_metadata or {}, first)
+            if self._file.is_ome:
+                self._ome(tifffile.xml2dict(self._file.ome_metadata)["OME"]["Image"])
             self._full = 0.0
             if self._dtype.kind == "f":
                 self._full = float_range([self._page(k) for k in {0, count // 2, count - 1}], path)
@@ -177,20 +197,102 @@ class TiffSource(FrameSource):
                 raise
             raise InputError(f"{path}: cannot be read as a TIFF file ({error})") from None
 
-    def _imagej(self, values: dict[str, Any], page: Any) -> None:
-        self.metadata = {
-            "format": "TIFF stack",
-            **{k: v for k, v in values.items() if k in ("fps", "finterval")},
+    def _lay_out(self, told: dict[str, Any], count: int, page: Any) -> int:
+        """Number of frames, by the axes that the file states."""
+        import tifffile
+
+        series = self._file.series
+        if len(series) > 1:
+            if self._file.is_ome or told:
+                raise InputError(
+                    f"{self.path}: holds {len(series)} images of several frames; save one of them"
+                )
+            return count
+        axes = {
+            axis: size
+            for axis, size in zip(series[0].axes, series[0].shape, strict=True)
+            if axis not in "YXS" and size > 1
         }
-        interval = values.get("finterval")
+        # ImageJ calls the frames of a video that it opened slices
+        moving = "TIQ" + ("Z" if {"finterval", "fps"} & set(told) and "spacing" not in told else "")
+        if len(axes) > 1 or any(axis not in moving for axis in axes):
+            names = {**tifffile.TIFF.AXES_NAMES, "Q": "unnamed", "I": "unnamed"}
+            found = ", ".join(f"{size} ({names.get(axis, axis)})" for axis, size in axes.items())
+            raise InputError(
+                f"{self.path}: holds pictures along {found}: must be frames over time alone; save one channel and slice, in "
+                "ImageJ with its number of frames and one slice (Image > Properties)"
+            )
+        frames = math.prod(axes.values())
+        if int(told.get("images", frames)) != frames:
+            raise InputError(f"{self.path}: says {told['images']} images and holds {frames}: it is cut short")
+        if frames != count:
+            if series[0].dataoffset is None:
+                raise InputError(f"{self.path}: says {frames} frames and holds {count} pages")
+            self._stack = tifffile.memmap(self.path, mode="r").reshape(frames, *page.shape)
+        return frames
+
+    def _imagej(self, told: dict[str, Any], page: Any) -> None:
+        self.metadata |= {key: value for key, value in told.items() if key in ("fps", "finterval", "tunit")}
+        rates: dict[str, float] = {}
+        interval, shown = told.get("finterval"), told.get("fps")
         if isinstance(interval, (int, float)) and interval > 0.0:
-            self.frame_rate = 1.0 / float(interval)
-        unit = _LENGTH_UNITS.get(str(values.get("unit", "")))
-        resolution = page.tags.get("XResolution")
-        if unit is not None and resolution is not None and resolution.value[0] > 0:
-            self.pixel_size = unit * resolution.value[1] / resolution.value[0]
+            unit = _unescaped(told.get("tunit", "s"))
+            try:
+                rates[f"finterval = {interval:g} {unit}"] = 1.0 / (interval * seconds_in("finterval", unit))
+            except InputError as error:
+                self.frame_rate_question = f"{error}; give frame_rate (--frame-rate) in Hz"
+                return
+        if isinstance(shown, (int, float)) and shown > 0.0:
+            rates["fps"] = float(shown)
+        self.state_rate(rates)
+        across, down = (
+            self._size(told.get(key, told.get("unit")), page.tags.get(name))
+            for key, name in (("unit", "XResolution"), ("yunit", "YResolution"))
+        )
+        self.pixel_size, self.pixel_width = down or across, across or down
+
+    @staticmethod
+    def _size(unit: Any, resolution: Any) -> float | None:
+        """Metres per pixel of a resolution; inches come from printers."""
+        if (
+            resolution is None
+            or not min(resolution.value) > 0
+            or _unescaped(unit) in ("in", "inch", "inches")
+        ):
+            return None
+        metres = _metres(unit)
+        return None if metres is None else metres * resolution.value[1] / resolution.value[0]
+
+    def _ome(self, image: Any) -> None:
+        """Take times and sizes of OME, whose units are micrometres and seconds unless stated."""
+        pixels = (image[0] if isinstance(image, list) else image)["Pixels"]
+        sizes = {}
+        for axis in "YX":
+            size, metres = (
+                pixels.get(f"PhysicalSize{axis}"),
+                _metres(pixels.get(f"PhysicalSize{axis}Unit", "um")),
+            )
+            sizes[axis] = None if not size or metres is None else float(size) * metres
+        self.pixel_size, self.pixel_width = sizes["Y"] or sizes["X"], sizes["X"] or sizes["Y"]
+        rates: dict[str, float] = {}
+        if step := pixels.get("TimeIncrement"):
+            unit = str(pixels.get("TimeIncrementUnit", "s"))
+            rates["TimeIncrement"] = 1.0 / (float(step) * seconds_in("TimeIncrement", unit))
+        planes = pixels.get("Plane", [])
+        stamps = [plane for plane in planes if "DeltaT" in plane] if isinstance(planes, list) else []
+        if len(stamps) == self.numbers.size > 2 and any(plane["DeltaT"] for plane in stamps):
+            stamps.sort(key=lambda plane: int(plane.get("TheT", 0)))
+            times = [
+                float(one["DeltaT"]) * seconds_in("DeltaT", str(one.get("DeltaTUnit", "s"))) for one in stamps
+            ]
+            known = 1.0 / rates["TimeIncrement"] if rates else None
+            self.numbers, step = numbers_of_stamps(self.path, np.array(times), 0.0, known)
+            rates["time stamps DeltaT"] = 1.0 / step
+        self.state_rate(rates)
 
     def _page(self, index: int) -> NDArray[Any]:
+        if self._stack is not None:
+            return grey_of(self._stack[index]) if self._colors else self._stack[index]
         try:
             page = self._file.pages[index]
             _refuse_picture(self.path, page.shape)
@@ -219,7 +321,22 @@ class TiffSource(FrameSource):
 
     def close(self) -> None:
         """Close the file."""
+        self._stack = None
         self._file.close()
+
+
+def _unescaped(unit: Any) -> str:
+    """A unit of ImageJ, which writes letters beyond ASCII by their codes."""
+    return re.sub(r"\\u([0-9a-fA-F]{4})", lambda found: chr(int(found[1], 16)), str(unit or "")).strip()
+
+
+def _metres(unit: Any) -> float | None:
+    """Metres in a unit; None if it is not one of length."""
+    try:
+        factor, base = si_unit("pixel size", _unescaped(unit))
+    except InputError:
+        return None
+    return factor if base == "m" else None
 
 
 # Stacks of pictures in arrays: NumPy's .npy and HDF5.
@@ -228,12 +345,15 @@ class TiffSource(FrameSource):
 class ArraySource(FrameSource):
     """A stack (frames, height, width), or with red, green and blue last, read from the disk as needed.
 
-    The attributes ``frame_rate`` [Hz], ``pixel_size`` [m] and ``exposure`` [s] of an HDF5 file are used.
+    The attributes ``frame_rate`` [Hz], ``pixel_size`` [m] and ``exposure`` [s] of an HDF5 file are used, and times of
+    the frames beside the stack.
     """
 
     def __init__(self, path: Path, dataset: str = "") -> None:
         super().__init__(path)
         self._file: Any = None
+        self._rates: dict[str, float] = {}
+        self._times: list[NDArray[np.float64]] = []
         try:
             self._stack = self._open(dataset)
         except InputError:
@@ -252,6 +372,10 @@ class ArraySource(FrameSource):
         _refuse_picture(path, shape[1:])
         self.shape = (int(shape[1]), int(shape[2]))
         self.numbers = np.arange(shape[0])
+        if self._times and shape[0] > 2:
+            self.numbers, step = numbers_of_stamps(path, self._times[0], 0.0)
+            self._rates["times of the frames"] = 1.0 / step
+        self.state_rate(self._rates)
         self._colors = len(shape) == 4
         if self._colors:
             self.diagnostics += (KINDS_RECORDING["colour"].found(channels=shape[3]),)
@@ -292,23 +416,34 @@ class ArraySource(FrameSource):
                 f"{self.path.name}::name"
             )
         levels = (found[chosen].attrs, found[chosen].parent.attrs, self._file.attrs)
-        self.frame_rate = self._attribute(levels, _RATES)
-        self.pixel_size = self._attribute(levels, _SIZES)
-        self.exposure = self._attribute(levels, ("exposure",))
+        self._rates = self._attributes(levels, _RATES)
+        sizes = self._attributes(levels, _SIZES)
+        if sizes and max(sizes.values()) > 1.001 * min(sizes.values()):
+            told = ", ".join(f"{name} {size:g}" for name, size in sizes.items())
+            self.pixel_size_hint = f"its attributes differ ({told})"
+        else:
+            self.pixel_size = next(iter(sizes.values()), None)
+        self.exposure = next(iter(self._attributes(levels, ("exposure",)).values()), None)
+        self._times = [
+            np.asarray(item, dtype=np.float64) * seconds_in(name, stated_unit(item.attrs) or None)
+            for name, item in found[chosen].parent.items()
+            if isinstance(item, h5py.Dataset) and item.shape == found[chosen].shape[:1] and is_time(name)
+        ]
         self.metadata = {"format": "HDF5 stack", "dataset": chosen}
         return found[chosen]
 
-    def _attribute(self, levels: tuple[Any, ...], names: tuple[str, ...]) -> float | None:
+    def _attributes(self, levels: tuple[Any, ...], names: tuple[str, ...]) -> dict[str, float]:
+        """Values of the attributes of these names, the nearest first."""
+        found: dict[str, float] = {}
         for level in levels:
-            for name in names:
-                if name in level:
-                    value = np.asarray(level[name])
-                    if value.size != 1 or value.dtype.kind not in "iuf" or not value.item() > 0.0:
-                        raise InputError(
-                            f"{self.path}: attribute {name!r} = {level[name]!r}: must be a positive number"
-                        )
-                    return float(value.item())
-        return None
+            for name in (name for name in names if name in level and name not in found):
+                value = np.asarray(level[name])
+                if value.size != 1 or value.dtype.kind not in "iuf" or not value.item() > 0.0:
+                    raise InputError(
+                        f"{self.path}: attribute {name!r} = {level[name]!r}: must be a positive number"
+                    )
+                found[name] = float(value.item())
+        return found
 
     def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
         """Return some frames, in some rows."""
@@ -596,7 +731,7 @@ class VideoSource(FrameSource):
     """A video file, decoded by PyAV.
 
     The rate in a video file is how fast it plays, seldom how fast it was recorded; it stands in the metadata
-    as ``playback_rate`` and is no frame rate.
+    as ``playback_rate`` and is no frame rate.  Time stamps and empty chunks tell which frames are missing.
     """
 
     def __init__(self, path: Path) -> None:
@@ -615,15 +750,23 @@ class VideoSource(FrameSource):
                 stream = container.streams.video[0]
                 if stream.codec_context is None:
                     raise InputError(f"{path}: its video has a codec that is not known here")
-                count = sum(1 for packet in container.demux(stream) if packet.size)
+                read = (packet for packet in container.demux(stream) if packet.size)
+                stamps = [packet.dts if packet.pts is None else packet.pts for packet in read]
+                known = sorted(stamp for stamp in stamps if stamp is not None)
+                count, tick = len(stamps), float(stream.time_base or 0.0)
                 codec = stream.codec_context.name
                 if path.suffix.lower() == ".cine":
-                    self._cine(stream, container.metadata)
+                    self._cine(stream, container.metadata, count)
                     if stream.codec_context.codec_tag == "BIT\0":
                         self._light = _light_of_packed(path, stream.codec_context.bits_per_coded_sample)
                 else:
-                    playback = stream.average_rate
-                    rate = None if playback is None else float(playback)
+                    average = float(stream.average_rate or 0.0)
+                    rate = float(stream.guessed_rate or 0.0) or average or None
+                    self.numbers = np.arange(count)
+                    if len(known) == count > 2 and rate:
+                        # Matroska counts milliseconds; of the others the average counts lost frames as slowness
+                        step = 1.0 / (average if average * tick > 1.0 else rate)
+                        self.numbers, _ = numbers_of_stamps(path, tick * np.array(known), tick, step)
                     self.metadata = {"format": f"video ({codec})", "playback_rate": rate}
                 if codec not in LOSSLESS and not _lossless_h264(stream.codec_context):
                     self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
@@ -646,16 +789,20 @@ class VideoSource(FrameSource):
         deep = re.search(r"(9|10|12|14|16|48)(le|be)", name)
         self._format = "gray16le" if deep else "gray"
         self.max_value = 65535 if deep else 255
-        self.numbers = np.arange(count)
 
-    def _cine(self, stream: Any, metadata: dict[str, str]) -> None:
-        """Read the frame rate and exposure from the header of a Phantom recording."""
-        rate = stream.average_rate or stream.base_rate or stream.guessed_rate
-        self.frame_rate = float(rate) if rate else float(1 / stream.time_base)
+    def _cine(self, stream: Any, metadata: dict[str, str], count: int) -> None:
+        """Read frame rate, exposure and times of frames from the header of a Phantom recording."""
+        rate = float(stream.average_rate or stream.base_rate or stream.guessed_rate or 1 / stream.time_base)
         told = {**metadata, **stream.metadata}
         shutter = float(told.get("shutter_ns", 0))
-        self.exposure = 1e-9 * shutter if 0.0 < 1e-9 * shutter <= 1.01 / self.frame_rate else None
-        self.metadata = {"format": "Phantom cine", "record_rate": self.frame_rate}
+        self.exposure = 1e-9 * shutter if 0.0 < 1e-9 * shutter <= 1.01 / rate else None
+        self.metadata = {"format": "Phantom cine", "record_rate": rate}
+        rates, self.numbers = {"header": rate}, np.arange(count)
+        times = cine_times(self.path, count)
+        if times is not None and count > 2:
+            self.numbers, step = numbers_of_stamps(self.path, times, 2.0**-32)
+            rates["time stamps of the frames"] = 1.0 / step
+        self.state_rate(rates)
 
     def _frames(self) -> Iterator[NDArray[np.integer]]:
         self._container = self._av.open(str(self.path))

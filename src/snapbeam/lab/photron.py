@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_RECORDING
+from snapbeam.lab.signals import si_unit
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, shown
 
@@ -254,7 +255,6 @@ def _exposure(fields: HeaderFields, rate: float | None) -> tuple[float | None, t
 # frame, row by row, without any header of its own); or a header and numbered images.
 
 
-_LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 _MAX_SIDE = 65536
 _IMAGES = {"png": ".png", "tiff": ".tif", "tif": ".tif", "bmp": ".bmp", "jpeg": ".jpg", "jpg": ".jpg"}
 
@@ -379,11 +379,12 @@ def _bits(fields: HeaderFields, images: str) -> tuple[int, int, str]:
 
 def _pixel_size(fields: HeaderFields) -> float | None:
     """Metres per pixel from the calibration block, where its unit is a length."""
-    unit = fields.text("unit", "").lower() if fields.xml else ""
-    if unit not in _LENGTH_UNITS:
+    try:
+        factor, base = si_unit("pixel", fields.text("unit", "").lower() if fields.xml else "")
+    except InputError:
         return None
-    size = fields.positive("pixel")
-    return None if size is None else size * _LENGTH_UNITS[unit]
+    size = fields.positive("pixel") if base == "m" else None
+    return None if size is None else size * factor
 
 
 def _scale_hint(fields: HeaderFields) -> str:

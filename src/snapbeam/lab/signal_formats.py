@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 import re
 import tempfile
 import warnings
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,8 +24,9 @@ from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import decoded, refuse_inflated
 from snapbeam.util.netcdf import hdf5_stream
+from snapbeam.util.packages import needing
 from snapbeam.util.tables import universal_record, write_universal
-from snapbeam.util.validation import InputError, positive
+from snapbeam.util.validation import InputError, file_path, positive
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,11 +60,16 @@ _PACKING = (
 _COMMENT = ("#", "%", "//", "!")
 _LOOK = 400  # lines in which the table must begin
 _ABOVE = 20
-"""Rows at the end whose numbers are compared."""
+"""Rows at the start or at the end that are looked at."""
 _STAMP = re.compile(
     r"(?<![\d.])(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]+\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)?|\d{1,2}:\d{2}(:\d{2})?([.,:]\d{2,})?)"
 )
-_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?")
+_GROUPED = {
+    sign: re.compile(rf"[-+]?[1-9]\d{{0,2}}([{others}])\d{{3}}(?:\1\d{{3}})*(?:[{sign}]\d*)?")
+    for sign, others in ((".", ",' "), (",", ".' "))
+}
+"""Numbers with signs between groups of three digits, by their decimal sign."""
+_SIGNS = str.maketrans("\u2212\u00a0\u2009\u202f\u2019", "-   '")
 _SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
 _END = "***end_of_header***"
 _RATES = (
@@ -75,8 +82,12 @@ _STEPS = (
 )  # fmt: skip
 _LONGEST_LINE = 2000
 """Letters of a line of a header that is looked into."""
-_PER_SECOND = dict.fromkeys(("", "hz", "s/s", "sa/s", "1/s"), 1.0)
-_PER_SECOND |= {"khz": 1e3, "ks/s": 1e3, "mhz": 1e6, "ms/s": 1e6}
+_PER_SECOND = {"": 1.0, "1/s": 1.0, "samples/s": 1.0, "samples/sec": 1.0, "samples/second": 1.0} | {
+    prefix + unit: scale
+    for prefix, scale in (("", 1.0), ("k", 1e3), ("m", 1e6), ("g", 1e9))
+    for unit in ("hz", "s/s", "sa/s", "sps")
+}
+"""Samples per second in units in small letters; none is smaller than 1 Hz."""
 _LONGEST_NAME = 500
 """Letters of a name of a column that a unit is looked for in."""
 _SUFFIX_UNITS = {
@@ -85,6 +96,14 @@ _SUFFIX_UNITS = {
 }  # fmt: skip
 _INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (128.0, 128.0)}
 _FORTRAN = re.compile(rb"(\.\d*)[Dd]([-+]\d\d)")
+_EXPONENT = re.compile(r"(\.\d*)[Dd]([-+]?\d{1,3})$")  # of Fortran
+_DURATIONS = {"sec": 1.0, "min": 60.0, "hr": 3600.0, "day": 86400.0, "days": 86400.0}
+_DURATION = re.compile(rf"([-+\d][^ ]*) ({'|'.join(_DURATIONS)})")
+SPECTRA = {
+    2: "auto spectrum", 3: "cross spectrum", 4: "frequency response", 5: "transmissibility", 6: "coherence",
+    9: "power spectral density", 10: "energy spectral density", 12: "spectrum",
+}  # fmt: skip
+"""Functions over frequency in a record of dataset 58, by their codes."""
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -105,7 +124,7 @@ def is_time(name: str) -> bool:
     return _key(name) in TIME_NAMES
 
 
-def _seconds(name: str, unit: str | None) -> float:
+def seconds_in(name: str, unit: str | None) -> float:
     """Seconds in a unit of a time axis, also as in ``milliseconds since 2024-01-01``."""
     last = name.rpartition("/")[2]
     word = (unit or split_unit(last)[1] or "").strip()
@@ -129,7 +148,7 @@ def _time_unit(name: str, unit: str) -> float | None:
     return factor if base == "s" else None
 
 
-def _stated_unit(attributes: Mapping[str, Any]) -> str:
+def stated_unit(attributes: Mapping[str, Any]) -> str:
     """Unit among attributes; empty if there is none."""
     return next((_text(attributes[key]).strip() for key in UNIT_NAMES if key in attributes), "")
 
@@ -145,7 +164,7 @@ def with_time(channels: list[Channel]) -> list[Channel]:
     for channel in channels:
         name = channel["name"]
         if name in stated or is_time(split_unit(name.rpartition("/")[2])[0]):
-            axes[name] = np.asarray(channel["data"], dtype=np.float64) * _seconds(name, channel["unit_str"])
+            axes[name] = np.asarray(channel["data"], dtype=np.float64) * seconds_in(name, channel["unit_str"])
         else:
             signals.append(channel)
     for channel in signals:
@@ -282,10 +301,10 @@ def _refuse_scales(name: str, data: NDArray[Any], values: Mapping[str, Any]) -> 
         neutral = 1.0 if _key(key) in _SCALES else 0.0 if _key(key) in _OFFSETS else None
         if neutral is None or (data.dtype.kind == "f" and key not in ("scale_factor", "add_offset")):
             continue
-        number = _quantity(_text(value))[0]
-        if math.isfinite(number) and number != neutral:
+        numbers = _quantity(_text(value))[0]
+        if any(number != neutral for number in numbers):
             raise InputError(
-                f"{name}: {key} = {number:g} may scale its numbers: store the scaled numbers without it, or make it the "
+                f"{name}: {key} = {_text(value)} may scale its numbers: store the scaled numbers without it, or make it the "
                 "attributes scale_factor and add_offset of an array in an HDF5 or NetCDF file"
             )
 
@@ -298,7 +317,7 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         if item.data.size == 1 and item.data.dtype.kind in "iufUSO":
             folder, _, last = name.rpartition("/")
             value = item.data.reshape(-1)[0]
-            stated = _stated_unit(item.attributes)
+            stated = stated_unit(item.attributes)
             texts[name] = _text(value)
             levels.setdefault(folder, {})[last] = f"{_text(value)} {stated}" if stated else value
     vectors = {
@@ -336,7 +355,7 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
         for k, row in enumerate(rows):
             own = name if rows.shape[0] == 1 else f"{name} {k + 1}"
-            unit = _stated_unit(item.attributes) or _unit(texts, name)
+            unit = stated_unit(item.attributes) or _unit(texts, name)
             channel: Channel = {"data": row, "name": own, "unit_str": unit, "axis": item.axis}
             if rates:
                 channel["fs"] = _one_rate(rates, own)
@@ -445,10 +464,10 @@ def _stating(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 def _is_axis(name: str, attributes: Mapping[str, Any]) -> bool:
     """Return whether a dimension scale contains times."""
-    stated = _stated_unit(attributes)
+    stated = stated_unit(attributes)
     try:
         return is_time(split_unit(name.rpartition("/")[2])[0]) or (
-            stated != "" and _seconds(name, stated) > 0.0
+            stated != "" and seconds_in(name, stated) > 0.0
         )
     except InputError:
         return False
@@ -498,16 +517,38 @@ class TextBlock:
 
 
 def to_number(cell: str, decimal_comma: bool = False) -> float:
-    """The number in a cell; NaN if it holds none."""
-    text = cell.strip()
+    """The number in a cell, a duration of MATLAB such as ``0.5 min`` in seconds; NaN if it holds none."""
+    text = cell.strip().translate(_SIGNS)
+    duration = _DURATION.fullmatch(text)
+    if duration:
+        return to_number(duration[1], decimal_comma) * _DURATIONS[duration[2]]
     if decimal_comma and "," in text:
-        if text.count(",") > 1 or ("." in text and not _GROUPED.fullmatch(text)):
-            return math.nan
-        text = text.replace(".", "").replace(",", ".")
+        text = _with_point(text, ",")
     try:
-        return float(text) if "_" not in text else math.nan
+        return float(_EXPONENT.sub(r"\1e\2", text)) if "_" not in text else math.nan
     except ValueError:
         return math.nan
+
+
+def _with_point(text: str, sign: str) -> str:
+    """A number whose decimal sign is *sign* as Python writes it; empty if it is none."""
+    found = _GROUPED[sign].fullmatch(text)
+    text = text.replace(found[1], "") if found else text
+    return "" if sign == "," and "." in text else text.replace(",", ".") if sign == "," else text
+
+
+def readings(text: str, decimal_comma: bool = False) -> tuple[float, ...]:
+    """The numbers that a number of a header may be, none if it is no number.
+
+    ``51,200`` may be 51200 or 51.2.  ``51.200`` may be 51200 only in a file of decimal commas: points between groups of
+    digits are seldom, and decimals that end in zeros are not.
+    """
+    text = text.strip().translate(_SIGNS)
+    signs = (".", ",") if "," in text or decimal_comma else (".",)
+    if text.count(".") > 1:
+        signs = (",",)
+    numbers = (to_number(_with_point(text, sign)) for sign in signs)
+    return tuple(dict.fromkeys(number for number in numbers if math.isfinite(number)))
 
 
 def _cells(lines: list[str], separator: str | None) -> list[list[str]]:
@@ -554,7 +595,16 @@ def _dialects(lines: list[str]) -> list[_Dialect]:
                 used = tuple(i for i, cell in enumerate(row) if cell)
                 following = cells[k : k + 3]
                 if all(_is_row(one, used, comma) and sum(map(bool, one)) == len(used) for one in following):
-                    found.append(_Dialect(separator, comma, k, used))
+                    one = _Dialect(separator, comma, k, used)
+                    before = replace(one, first=k - 1)
+                    # the first row may have more cells, such as the settings of an instrument
+                    wide = (
+                        k
+                        and separator
+                        and len(cells[k - 1]) > used[-1] + 1
+                        and _is_row(cells[k - 1], used, comma)
+                    )
+                    found.append(before if wide and _heads(lines, before)[0] else one)
                     break
     return found
 
@@ -571,7 +621,7 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     """Take a text file apart; *columns* is the number of columns, if the user gives it."""
     text = decoded(path.read_bytes(), str(path))
     numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
-    comments = [line.strip().lstrip("#%/!").strip() for _, line in numbered if line.startswith(_COMMENT)]
+    marked = [(i, line.strip().lstrip("#%/!").strip()) for i, line in numbered if line.startswith(_COMMENT)]
     numbered = [(i, line) for i, line in numbered if not line.startswith(_COMMENT)]
     lines = [line for _, line in numbered]
     if not lines:
@@ -590,7 +640,12 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
             f"{path}: no row of numbers in its first {min(len(lines), _LOOK)} lines; its columns may not be separated "
             "by semicolons, tabs, commas or blanks"
         )
-    dialect, names, units, taken = _best(path, lines, dialects, columns)
+    places = [0, *(i for i, _ in numbered)]
+    above = {
+        one.first: [text for i, text in marked if places[one.first] < i < places[one.first + 1]]
+        for one in dialects
+    }
+    dialect, names, units, taken = _best(path, lines, dialects, columns, above)
     first = _earlier(lines, dialect)
     try:
         cells = _cells(lines[first:], dialect.separator)
@@ -601,25 +656,34 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     if not text.endswith("\n") and _is_short(cells):
         last = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
         tell([KINDS_SIGNAL["cut_in_number"].found(told=last)])
+    beyond = " ".join(
+        cell for cell in cells[0][max(dialect.used) + 1 :] if cell
+    )  # settings behind the first row
     return TextBlock(
         path=path,
-        header=(*comments, *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken)),
+        header=(
+            beyond,
+            *(text for _, text in marked),
+            *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken),
+        ),
         names=names,
         units=units,
-        rows=[_kept(row, dialect, numbered[first + k][0], path, names) for k, row in enumerate(cells)],
+        rows=[
+            _kept(row, dialect, numbered[first + k][0], path, names, k == 0) for k, row in enumerate(cells)
+        ],
         lines=[i for i, _ in numbered[first:]],
         decimal_comma=dialect.decimal_comma,
     )
 
 
 def _kept(
-    cells: list[str], dialect: _Dialect, line: int, path: Path, names: tuple[str, ...] | None
+    cells: list[str], dialect: _Dialect, line: int, path: Path, names: tuple[str, ...] | None, first: bool
 ) -> list[str]:
     """The cells of a row that belong to the table's columns."""
     last = max(dialect.used)
     whole = len(cells) > last
     extra = dialect.separator is None and len(cells) != len(dialect.used)
-    stray = any(cells[last + 1 :])
+    stray = any(cells[last + 1 :]) and not first
     if not whole or extra or stray:
         count = len([cell for cell in cells if cell]) if stray or extra else len(cells)
         told = "the header names" if names else "the first has"
@@ -639,10 +703,23 @@ def _earlier(lines: list[str], dialect: _Dialect) -> int:
 
 
 def _best(
-    path: Path, lines: list[str], dialects: list[_Dialect], columns: int
+    path: Path, lines: list[str], dialects: list[_Dialect], columns: int, above: Mapping[int, list[str]]
 ) -> tuple[_Dialect, tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
-    """The dialect whose header fits its columns, its names and units, and the lines these stand on."""
-    seen = [(one, *_heads(lines, one)) for one in dialects]
+    """The dialect whose header fits its columns, its names and units, and the lines these stand on.
+
+    *above* are the comments before the first row of each; the last may name the columns.
+    """
+    seen = []
+    for one in dialects:
+        names, units, taken = _heads(lines, one)
+        comments = above[one.first]
+        if names is None and comments:
+            following = lines[one.first : one.first + 3]
+            names, units, _ = _heads([*comments, *following], replace(one, first=len(comments)))
+            parts = [split_unit(name) for name in names or ()]
+            stated = any(is_time(word) or (unit and _like_unit(unit)) for word, unit in parts)
+            names = names if stated and not re.search("[=:]", "".join(names or ())) else None
+        seen.append((one, names, units if names else None, taken))
     if columns:
         seen = [entry for entry in seen if len(entry[0].used) == columns] or seen
     named = [entry for entry in seen if entry[1] is not None]
@@ -667,12 +744,13 @@ def _heads(
     above: list[tuple[int, list[str]]] = []
     count = len(dialect.used)
     for k in range(dialect.first - 1, max(dialect.first - 3, -1), -1):
-        blanks = dialect.separator is None
-        cells = [lines[k].strip()] if blanks and count == 1 else _cells([lines[k]], dialect.separator)[0]
+        cells = _cells_of_names(lines[k], dialect)
         row = dialect.row_of(cells)
-        fits = len([cell for cell in cells if cell]) >= count and all(row)
+        if len([cell for cell in cells if cell]) < count or not all(row):
+            rows = _cells(lines[dialect.first : dialect.first + 3], dialect.separator)
+            row = _wider([cell for cell in cells if cell], [dialect.row_of(one) for one in rows])
         text = any(re.search(r"[^\W\d_]", cell) and not math.isfinite(to_number(cell)) for cell in row)
-        if not fits or not text or (blanks and len(cells) != count):
+        if not text or (dialect.separator is None and len(cells) > count):
             break
         above.append((k, row))
     if not above:
@@ -681,6 +759,39 @@ def _heads(
     if len(above) == 2 and all(_like_unit(cell) for cell in last):
         return tuple(above[1][1]), tuple(last), {at, above[1][0]}
     return tuple(last), None, {at}
+
+
+def _cells_of_names(line: str, dialect: _Dialect) -> list[str]:
+    """Cells of a line that may name the columns; above blanks names may have commas between them, and units in brackets."""
+    count = len(dialect.used)
+    if dialect.separator is not None or count == 1:
+        return [line.strip()] if dialect.separator is None else _cells([line], dialect.separator)[0]
+    ways = [[cell.strip() for cell in line.split(mark)] for mark in ",;\t"]
+    ways.append(re.sub(r"\s+(?=[\[(])", "", line).split())
+    return next((cells for cells in ways if len(cells) == count), line.split())
+
+
+def _wider(words: list[str], rows: list[list[str]]) -> list[str]:
+    """Names of all columns where one is not named: ``""`` for an index in front, as pandas and R write it; else empty.
+
+    Without an index the first name must be the time and fit the first column alone.
+    """
+    values = [[to_number(cell) for cell in row] for row in rows]
+    if len(words) != len(rows[0]) - 1 or not words or len(rows) < 3:
+        return []
+    if any(math.isfinite(to_number(word)) or re.search("[=:]", word) for word in words):
+        return []
+    steps = [
+        [after - before for before, after in zip(*pair, strict=True)] for pair in (values[:2], values[1:])
+    ]
+    if values[0][0] in (0.0, 1.0) and steps[0][0] == steps[1][0] == 1.0:
+        return ["", *words]
+    rising = [min(one[k] for one in steps) > 0.0 for k in (0, 1)]
+    return (
+        [*words, f"column {len(rows[0])}"]
+        if is_time(split_unit(words[0])[0]) and rising == [True, False]
+        else []
+    )
 
 
 def _like_unit(cell: str) -> bool:
@@ -825,17 +936,27 @@ def header_values(lines: Iterable[str]) -> dict[str, str]:
     for line in lines:
         if len(line) > _LONGEST_LINE:
             continue
-        found = re.match(r'\s*"?([^:=,;\t"]+?)"?\s*([:=,;\t])\s*"?(.*?)"?\s*[,;\t]*\s*$', line)
+        found = re.match(r'\s*"?([^:=,;\t"]+?)"?\s*([:=,;\t])\s*(?:"([^"]*)"|(.*))', line)
         if found:
-            key = re.sub(r"[^a-z0-9]", "", found[1].lower())
-            ends = r"[,;\t]" if found[2] == "," else r"[;\t]"  # else a comma may be the decimal sign
-            values.setdefault(key, re.split(ends, found[3])[0].strip().strip('"'))
+            # else a comma may be the decimal sign; one before three digits may part groups of them
+            ends = r"[;\t]|(?<!\d),|,(?!\d{3}(?!\d|\.))" if found[2] == "," else r"[;\t]"
+            value = re.split(ends, found[4])[0] if found[3] is None else found[3]
+            values.setdefault(_key(found[1]), value.strip(' ,;\t"'))
     return values
 
 
-def header_rate(values: dict[str, str], where: str) -> float | None:
-    """Samples per second [Hz] that a header states; None if it does not."""
-    found = {key: rate for key, value in values.items() if (rate := _rate_of(key, value)) is not None}
+def header_rate(
+    values: dict[str, str], where: str, decimal_comma: bool = False, known: float | None = None
+) -> float | None:
+    """Samples per second [Hz] that a header states; None if it does not.
+
+    *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
+    """
+    found = {
+        key: rate
+        for key, value in values.items()
+        if (rate := _rate_of(key, value, decimal_comma, known)) is not None
+    }
     return _one_rate(found, f"{where}: the header") if found else None
 
 
@@ -847,24 +968,37 @@ def _one_rate(found: Mapping[str, float], where: str) -> float:
     return next(iter(found.values()))
 
 
-def _rate_of(name: str, value: Any) -> float | None:
-    """Samples per second [Hz] that a named value states; None if it states none, or is 0 or no number."""
-    word, suffix = (name, None) if len(name) > _LONGEST_NAME else split_unit(name)
-    key = _key(name)
-    if key not in _RATES and key not in _STEPS:
-        units = (end for end in ("hz", "s") if key.endswith(end) and key[: -len(end)] in _RATES + _STEPS)
-        ending = next(units, "")
-        key = _key(word) if suffix else key[: -len(ending)] if ending else ""
-    if key not in _RATES and key not in _STEPS:
+def _rate_of(name: str, value: Any, decimal_comma: bool = False, known: float | None = None) -> float | None:
+    """Samples per second [Hz] that a named value states; None if it states none, or is 0 or no number.
+
+    Raises
+    ------
+    InputError
+        If the number has two readings and *known* [Hz] is neither.
+    """
+    word, suffix = (name, "") if len(name) > _LONGEST_NAME else split_unit(name)
+    for key in (_key(name), _key(word)):
+        of_name = max((one for one in _RATES + _STEPS if key.startswith(one)), key=len, default="")
+        suffix = suffix or key[len(of_name) :]
+        if of_name and (key == of_name or suffix in _PER_SECOND or _time_unit(name, suffix)):
+            break
+    else:
         return None
-    number, unit = _quantity(_text(value))
-    unit = unit or suffix or ""
-    step = key in _STEPS
+    numbers, unit = _quantity(_text(value), decimal_comma)
+    step = of_name in _STEPS
+    unit = unit or ("" if suffix == "s" and not step else suffix) or ""
     factor = _time_unit(name, unit or "s") if step else _PER_SECOND.get(unit.lower())
-    if factor is None or number == 0.0 or math.isnan(number):
+    if factor is None or not numbers or 0.0 in numbers:
         return None
-    rate = 1.0 / (number * factor) if step else number * factor
-    return positive(f"{name}: sampling rate", rate, "Hz")
+    rates = [1.0 / (number * factor) if step else number * factor for number in numbers]
+    near = [rate for rate in rates if known and abs(rate / known - 1.0) < 0.05] or rates
+    if len(near) > 1:
+        both = " or ".join(f"{number:.12g}" for number in numbers)
+        raise InputError(
+            f"{name} = {_text(value)!r}: the comma or point may part thousands or decimals, so that it is {both}; write "
+            f"{both} into the file"
+        )
+    return positive(f"{name}: sampling rate", near[0], "Hz")
 
 
 def header_unit(values: dict[str, str], *keys: str) -> str | None:
@@ -873,13 +1007,13 @@ def header_unit(values: dict[str, str], *keys: str) -> str | None:
     return next((word for word in words if word), None)
 
 
-def _quantity(text: str) -> tuple[float, str]:
-    """Number and unit of ``"12 kHz"``, ``"CH1:2e-8"`` or ``"0,5 ms"``."""
-    found = re.fullmatch(r"(?:\w+:)?\s*([-+]?[0-9][0-9.,]*(?:[eE][-+]?\d+)?)\s*\[?([^\]]*)\]?", text.strip())
-    if not found:
-        return math.nan, ""
-    comma = "," in found[1] and "." not in found[1]
-    return to_number(found[1], comma), found[2].strip()
+def _quantity(text: str, decimal_comma: bool = False) -> tuple[tuple[float, ...], str]:
+    """Readings and unit of ``"12 kHz"``, ``"CH1:2e-8"``, ``"51 200"`` or ``"0,5 ms"``."""
+    found = re.fullmatch(
+        r"(?:\w+:)?\s*([-+]?\.?[0-9][0-9.,' ]*(?:[eE][-+]?\d+)?)\s*\[?([^\]]*)\]?",
+        text.strip().translate(_SIGNS),
+    )
+    return (readings(found[1], decimal_comma), found[2].strip()) if found else ((), "")
 
 
 class Table(NamedTuple):
@@ -919,9 +1053,16 @@ def read_table(path: Path, columns: str | None = None) -> Table:
         raise InputError(
             f"{path}: columns (--columns) = {columns!r} names {len(names)}, the rows have {width}"
         )
+    columns_of = list(zip(*block.rows, strict=True))
+    if (
+        not names[0]
+        and len(names) > 1
+        and (np.diff([to_number(cell) for cell in columns_of[0]]) == 1.0).all()
+    ):
+        names, columns_of = names[1:], columns_of[1:]  # the index of a data frame
     if "" in names or len(set(names)) < len(names):
         raise InputError(f"{path}: columns {list(names)}: each must have a name of its own")
-    return Table(block, dict(zip(names, zip(*block.rows, strict=True), strict=True)))
+    return Table(block, dict(zip(names, columns_of, strict=True)))
 
 
 def _names(block: TextBlock) -> tuple[str, ...] | None:
@@ -937,7 +1078,7 @@ def _names(block: TextBlock) -> tuple[str, ...] | None:
     joined = []
     for name, unit in zip(block.names, block.units, strict=True):
         word = unit.strip().strip("[]()").strip()
-        known = split_unit(name)[1] is not None or word in ("", "-")
+        known = not name or split_unit(name)[1] is not None or word in ("", "-")
         joined.append(name if known else f"{name} [{word}]")
     return tuple(joined)
 
@@ -952,16 +1093,28 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
     if len(times) > 1:
         raise InputError(f"{path}: columns {times}: only one may be the time")
     values = header_values(table.block.header)
-    rate = header_rate(values, str(path))
     first, (word, unit) = next(iter(columns.items()))
     if not times and (unit == "Hz" or word.lower().startswith("freq")):
         raise InputError(
             f"{path}: its first column, {first!r}, is a frequency, so that this is a spectrum; export the time signal"
         )
     common: dict[str, Any] = {}
+    known = told.rate
     if times:
         word, unit = columns[times[0]]
-        common["time"] = table.numbers(times[0]) * _seconds(f"{path}: column {word!r}", unit)
+        duration = _DURATION.fullmatch(table.columns[times[0]][0])
+        if duration and unit not in (None, "s"):
+            raise InputError(
+                f"{path}: column {times[0]!r} has times such as {duration[0]!r}: remove one of the units"
+            )
+        common["time"] = table.numbers(times[0]) * seconds_in(f"{path}: column {word!r}", unit)
+        if known is None and common["time"].size > 2:
+            known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
+    commas = table.block.decimal_comma and any(
+        "," in cell for row in table.block.rows[:_ABOVE] for cell in row
+    )
+    rate = header_rate(values, str(path), commas, known)
+    if times:
         if rate is not None:
             way_out = "correct the header, or name the times otherwise in columns (--columns), such as "
             agree(str(path), common["time"], rate, f"{way_out}'number [1],velocity [m/s]'")
@@ -1064,41 +1217,14 @@ def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
         writer.write_segment([ChannelObject("snapbeam", str(signal.name), values, properties=properties)])
 
 
-def read_uff(path: Path, told: Told) -> list[Channel]:
+def read_uff(path: Path, _told: Told) -> list[Channel]:
     """Return the channels of a universal file (dataset 58)."""
-    import pyuff
-
-    content = path.read_bytes()
-    # exponents as Fortran writes them, which pyuff does not read
-    if _FORTRAN.search(content) and b"58b" not in content:
-        with tempfile.TemporaryDirectory() as folder:
-            copy = Path(folder) / path.name
-            copy.write_bytes(_FORTRAN.sub(rb"\1E\2", content))
-            return read_uff(copy, told)
-    file = pyuff.UFF(str(path))
-    kinds, bodies = file.get_set_types(), _bodies(content)
     channels: list[Channel] = []
-    for number, kind in enumerate(kinds):
-        if kind != 58:
-            continue
-        entry = file.read_sets(number, header_only=True)
-        if entry.get("func_type") not in (0, 1):
-            continue
-        name = _first(entry["id1"], f"channel {len(channels) + 1}")
-        if not entry["binary"]:
-            if len(bodies) != kinds.tolist().count(58):
-                raise InputError("mixes binary and ASCII datasets 58: write each kind to a file of its own")
-            entry |= _numbers_58(name, bodies[kinds[:number].tolist().count(58)], entry)
-        else:
-            entry = file.read_sets(number)
-        data = np.asarray(entry["data"])
-        if data.size != entry["num_pts"]:
-            raise InputError(
-                f"{name}: the header promises {entry['num_pts']} samples, the file has {data.size}"
-            )
+    for name, entry in _records_58(path, (0, 1)):
+        data = entry["data"]
         if np.iscomplexobj(data):
             raise InputError(f"{name}: complex numbers are no time series")
-        factor = _seconds(f"{name}: the abscissa", _first(entry.get("abscissa_axis_units_lab"), "s"))
+        factor = seconds_in(f"{name}: the abscissa", _first(entry.get("abscissa_axis_units_lab"), "s"))
         unit = _first(entry.get("ordinate_axis_units_lab"), "") or None
         channel: Channel = {"data": data, "name": name, "unit_str": unit}
         if entry["abscissa_spacing"] == 1:
@@ -1111,8 +1237,110 @@ def read_uff(path: Path, told: Told) -> list[Channel]:
             channel["time"] = np.asarray(entry["x"]) * factor
         channels.append(channel)
     if not channels:
-        raise InputError("holds no whole time response in a dataset 58")
+        spectra = len(list(_records_58(path, tuple(SPECTRA))))
+        way_out = f"; read its {spectra} spectra by lab.read_spectra" if spectra else ""
+        raise InputError(f"holds no whole time response in a dataset 58{way_out}")
     return numbered(channels)
+
+
+def _records_58(path: Path, functions: tuple[int, ...]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and entry of each dataset 58 of these kinds of function, with its numbers."""
+    import pyuff
+
+    content = path.read_bytes()
+    # exponents as Fortran writes them, which pyuff does not read
+    if _FORTRAN.search(content) and b"58b" not in content:
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / path.name
+            copy.write_bytes(_FORTRAN.sub(rb"\1E\2", content))
+            yield from _records_58(copy, functions)
+        return
+    file = pyuff.UFF(str(path))
+    kinds, bodies = file.get_set_types().tolist(), _bodies(content)
+    count = 0
+    for number, kind in enumerate(kinds):
+        entry = file.read_sets(number, header_only=True) if kind == 58 else {}
+        if entry.get("func_type") not in functions:
+            continue
+        count += 1
+        name = _first(entry["id1"], f"channel {count}")
+        if not entry["binary"]:
+            if len(bodies) != kinds.count(58):
+                raise InputError("mixes binary and ASCII datasets 58: write each kind to a file of its own")
+            entry |= _numbers_58(name, bodies[kinds[:number].count(58)], entry)
+        else:
+            entry = file.read_sets(number)
+        entry["data"] = np.asarray(entry["data"])
+        if entry["data"].size != entry["num_pts"]:
+            raise InputError(
+                f"{name}: the header promises {entry['num_pts']} samples, the file has {entry['data'].size}"
+            )
+        yield name, entry
+
+
+def read_spectra(path: str | os.PathLike[str]) -> list[xr.DataArray]:
+    """Read the frequency responses and spectra of a universal file (dataset 58).
+
+    Parameters
+    ----------
+    path : path
+        ``.uff`` or ``.unv``, ASCII or binary.
+
+    Returns
+    -------
+    list of xarray.DataArray
+        Over ``frequency`` [Hz], complex where the file is, in the units of the file, as ``"m/s/N"``.  The attribute
+        ``function`` is the kind, such as "frequency response" or "coherence".
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or has none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import snapbeam as sb
+    >>> from snapbeam import lab
+    >>> force = lab.make_signal(np.random.default_rng(0).standard_normal(20_000), "N", 2000.0, name="force")
+    >>> motion = lab.make_signal(0.002 * force.values, "m", 2000.0, name="tip")
+    >>> left_out = sb.write_table(lab.frequency_response(force, motion, resolution=5.0), "frf.uff")
+    >>> response, coherence = lab.read_spectra("frf.uff")
+    >>> print(f"{abs(response.sel(frequency=100.0).item()):.4f} {response.attrs['units']}")
+    0.0020 m/N
+    """
+    from snapbeam.util.datasets import xr
+
+    file = file_path("path", path)
+    if not file.is_file():
+        raise InputError(f"{file}: no such file")
+    found = []
+    with needing(f"{file}: reading it", "lab"):
+        import pyuff  # noqa: F401
+    try:
+        for name, entry in _records_58(file, tuple(SPECTRA)):
+            over = _first(entry.get("abscissa_axis_units_lab"), "Hz")
+            factor, base = si_unit(f"abscissa of {name}", over)
+            if base != "Hz":
+                raise InputError(f"{name}: its abscissa is in {over!r}, not in Hz")
+            count = entry["data"].size
+            even = float(entry["abscissa_min"]) + float(entry["abscissa_inc"]) * np.arange(count)
+            lines = factor * (even if entry["abscissa_spacing"] == 1 else np.asarray(entry["x"]))
+            units = [
+                _first(entry.get(f"{which}_axis_units_lab"), "").strip() for which in ("ordinate", "orddenom")
+            ]
+            unit = "/".join(each for each in (units[0] or "1", units[1]) if each)
+            axis = ("frequency", lines, {"units": "Hz", "long_name": "frequency"})
+            words = SPECTRA[entry["func_type"]]
+            attrs = {"units": unit, "long_name": words, "function": words, "source": file.name}
+            found.append(xr.DataArray(entry["data"], {"frequency": axis}, ("frequency",), name, attrs))
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    except Exception as error:  # a damaged file makes pyuff raise many kinds
+        raise InputError(f"{file}: cannot be read as a universal file ({error})") from error
+    if not found:
+        raise InputError(f"{file}: has no spectrum in a dataset 58")
+    return found
 
 
 def _bodies(content: bytes) -> list[list[str]]:
@@ -1125,19 +1353,23 @@ def _bodies(content: bytes) -> list[list[str]]:
 
 def _numbers_58(name: str, body: list[str], entry: Mapping[str, Any]) -> dict[str, Any]:
     """``data`` and ``x`` of an ASCII dataset 58, whatever the width of its numbers, without zeros that fill its last line."""
-    if entry["ord_data_type"] not in (2, 4):
-        raise InputError(f"{name}: complex numbers, or of a type that is not known, are no time series")
+    if entry["ord_data_type"] not in (2, 4, 5, 6):
+        raise InputError(f"{name}: numbers of type {entry['ord_data_type']}: must be 2 or 4, complex 5 or 6")
+    parts = 2 if entry["ord_data_type"] > 4 else 1
     rows = []
     for line in body:
         if _NUMBER.sub("", line).strip():
             raise InputError(f"{name}: {line.strip()[:60]!r} is no line of numbers")
         rows.append([float(word) for word in _NUMBER.findall(line)])
     values = np.array([number for row in rows for number in row])
-    each = 1 if entry["abscissa_spacing"] == 1 else 2
+    each = parts if entry["abscissa_spacing"] == 1 else parts + 1
     count = each * int(entry["num_pts"])
     if values.size > count and count > values.size - len(rows[-1]) and not values[count:].any():
         values = values[:count]
-    return {"data": values[each - 1 :: each], "x": values[::each]}
+    data = values[each - 1 :: each]
+    if parts == 2 and values.size % each == 0:
+        data = values[each - 2 :: each] + 1j * data
+    return {"data": data, "x": values[::each]}
 
 
 def _undo_rounding(step: float) -> float:

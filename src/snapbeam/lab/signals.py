@@ -49,7 +49,8 @@ _WORDS = {
     "second": "s", "seconds": "s", "millisecond": "ms", "milliseconds": "ms", "microsecond": "us",
     "microseconds": "us", "nanosecond": "ns", "nanoseconds": "ns", "volt": "V", "volts": "V",
     "millivolts": "mV", "inch": "in", "inches": "in", "hertz": "Hz", "pascal": "Pa", "newton": "N",
-    "meter": "m", "metre": "m",
+    "meter": "m", "metre": "m", "micron": "um", "microns": "um", "micrometer": "um", "micrometre": "um",
+    "millimeter": "mm", "millimetre": "mm",
 }  # fmt: skip
 KNOWN_UNITS = (
     "m, m/s, m/s^2, N, V, s, Hz or Pa with a prefix k, c, m, u or n, g, in, in/s, in/s^2, or FS (fraction of full "
@@ -59,6 +60,7 @@ _LONG_NAMES = {
     "m": "displacement", "m/s": "velocity", "m/s^2": "acceleration", "N": "force", "V": "voltage", "Pa": "pressure",
 }  # fmt: skip
 MINIMUM_SAMPLES = 16
+_ON_GRID = 0.35  # steps off an even grid with gaps, below which samples are missing; jitter is beyond
 _LARGEST = 1e30  # of a value in SI units and of a sampling rate: powers and derivatives stay finite
 
 
@@ -141,15 +143,15 @@ def even_sampling(name: str, time: ArrayLike) -> tuple[float, float]:
             f"{name}: time[{at + 1}] = {times[at + 1]:.9g} s must come after time[{at}] = {times[at]:.9g} s"
         )
     typical = float(np.median(steps))
-    if (steps > 1.5 * typical).any():
+    counted = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(steps / typical), 1.0))])
+    if counted[-1] >= times.size and np.abs(grid_of(times, counted)[1]).max() < _ON_GRID:
         at = int(np.argmax(steps > 1.5 * typical))
         raise InputError(
             f"{name}: gap of {steps[at]:.6g} s after time[{at}] = {times[at]:.9g} s where the step is "
             f"{typical:.6g} s: samples are missing; cut the signal there"
         )
-    count = np.arange(times.size) - (times.size - 1) / 2
-    step = float(count @ times / (count @ count)) if times.size > 2 else typical
-    off = np.abs(times - (times.mean() + step * count)) / step
+    step, off = grid_of(times, np.arange(times.size))
+    off = np.abs(off)
     if off.max() > 0.2:
         at = int(np.argmax(off))
         raise InputError(
@@ -159,6 +161,13 @@ def even_sampling(name: str, time: ArrayLike) -> tuple[float, float]:
     if off.max() < 1e-6:
         return float(times[0]), (times.size - 1) / float(times[-1] - times[0])
     return float(times.mean() - step * (times.size - 1) / 2), 1.0 / step
+
+
+def grid_of(times: NDArray[np.float64], number: NDArray[Any]) -> tuple[float, NDArray[np.float64]]:
+    """Step of the grid of these numbers that fits the times best, and by how many steps each time lies after it."""
+    count = number - number.mean()
+    step = float(count @ times / (count @ count))
+    return step, (times - (times.mean() + step * count)) / step
 
 
 def make_signal(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.parameters import PHYSICAL, lookup
 from snapbeam.model.quantity import split_name
-from snapbeam.model.system import System
 from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import (
     InputError,
@@ -24,6 +23,9 @@ from snapbeam.util.validation import (
     instance,
     shown,
 )
+
+if TYPE_CHECKING:
+    from snapbeam.model.system import System
 
 Axis = float | NDArray[np.float64]
 
@@ -144,7 +146,6 @@ def axis_that_changes_unit(system: System, name: str, axes: Mapping[str, Any]) -
 
 
 def _unit(system: System, name: str) -> float:
-    instance("system", system, System, "a System")
     return unit_of(system, choice("name", name, tuple(PHYSICAL)))
 
 

@@ -748,14 +748,19 @@ class Config:
         return System(**self._parts(*(name for name in self._around if numbered(name)[0] == "force")))
 
     @property
-    def free_structure(self) -> ReducedModel:
-        """The model, for questions about its free motion; refused (InputError) if anything else acts on it."""
-        acting = [*self._around, *(name for name in _STRIKING if self.section(name))]
+    def free_system(self) -> System:
+        """The model with its forces and harvesters, for questions about free motion.
+
+        Raises
+        ------
+        InputError
+            If an excitation or a striker is given.
+        """
+        kept = [name for name in self._around if numbered(name)[0] in ("force", "harvester")]
+        acting = [name for name in (*self._around, *_STRIKING) if name not in kept and self.section(name)]
         if acting:
-            raise InputError(
-                f"{', '.join(acting)}: free motion of the structure alone is computed; leave out {acting[0]}"
-            )
-        return self.model
+            raise InputError(f"{', '.join(acting)}: free motion is computed; leave out {acting[0]}")
+        return System(**self._parts(*kept))
 
     def _parts(self, *forces: str) -> dict[str, Any]:
         self._require("beam")

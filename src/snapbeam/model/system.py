@@ -33,6 +33,7 @@ from snapbeam.model.mapping import (
     resolved,
     sequence_of,
 )
+from snapbeam.model.parameter_axes import ratios_of, to_physical
 from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, named_in, ratio_of
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import section_of
@@ -163,8 +164,6 @@ class System:
         ``forces``, ``base_excitation``, ``axial_load``, ``harvesters``, ``initial_state`` and ``initial_well``; one of several is ``contact``,
         ``contact.law``, ``contact.striker``, ``drive``, ``force`` or ``harvester``, with its number after the first word.
         """
-        from snapbeam.model.parameter_axes import ratios_of
-
         prefix = "initial_state."
         parts = {item.name: getattr(self, item.name) for item in fields(self)}
         changes = {resolved(name, self.labels): value for name, value in changes.items()}
@@ -184,8 +183,6 @@ class System:
 
     def get(self, name: str) -> Any:
         """The value of a parameter by its dotted name."""
-        from snapbeam.model.parameter_axes import to_physical
-
         found, name = self.parameters, resolved(instance("name", name, str, "text"), self.labels)
         if ratio_of(name) not in found:
             raise InputError(f"{name}: is not a parameter of this system; it has {', '.join(found)}")

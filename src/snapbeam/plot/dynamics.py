@@ -509,7 +509,7 @@ def plot_backbone(
     >>> import snapbeam as sb
     >>> from snapbeam import paper
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
-    >>> ax = sb.plot.plot_backbone(sb.dynamics.backbone_curve(model, max_points=5))
+    >>> ax = sb.plot.plot_backbone(sb.dynamics.backbone_curve(sb.System(model), max_points=5))
     """
     from snapbeam.util.datasets import xr
 

@@ -159,10 +159,10 @@ def _frame_axes(
 
 
 def _scale_bar(axes: Any, recording: Recording, width: int, height: int) -> None:
-    across = width * recording.pixel_size * 1e3
+    across = width * recording.pixel_width * 1e3
     power = 10.0 ** np.floor(np.log10(0.3 * across))
     length = float(max(step for step in (1.0, 2.0, 5.0) if step * power <= 0.3 * across) * power)
-    pixels = length / (recording.pixel_size * 1e3)
+    pixels = length / (recording.pixel_width * 1e3)
     right, row = 0.96 * width, 0.95 * height
     outline = {"facecolor": "black", "alpha": 0.55, "edgecolor": "none", "pad": 1.5}
     axes.plot([right - pixels, right], [row, row], color="white", lw=2.0, solid_capstyle="butt")

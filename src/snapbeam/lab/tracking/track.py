@@ -94,7 +94,8 @@ def tracked_dataset(
             )
         )
     turn = Orientation(settings.side, recording.shape)
-    scale = recording.pixel_size * 1e3 * scene.straight
+    down, across = _pixel(recording, settings)
+    scale = down * 1e3 / math.hypot(1.0, 0.0 if scene.shaker is None else scene.shaker.turn * down / across)
     beam, shaker = scene.beam, scene.shaker
     order = FrameOrder((), (), ())
     if not (fields.shift or fields.apart or scene.noise.lag):
@@ -213,7 +214,7 @@ def _attributes(
         "title": "displacement of beam and shaker from a high-speed recording",
         "source": recording.path.name,
         "frame_rate": recording.frame_rate,
-        "pixel_size": recording.pixel_size,
+        "pixel_size": _pixel(recording, settings)[0],
         "region": list(recording.region),
         "exposure": np.nan if recording.exposure is None else recording.exposure,
         "side": settings.side,
@@ -322,7 +323,11 @@ def track(
     saturated = saturation_level(sample, float(recording.max_value), noise)
     prepare = _Prepare(recording, turn, wanted, saturated)
     scene = survey(
-        prepare(sample), wanted, saturated=prepare.saturated, pixel_size=recording.pixel_size, head=head
+        prepare(sample),
+        wanted,
+        saturated=prepare.saturated,
+        pixel_size=_pixel(recording, wanted)[0],
+        head=head,
     )
     marks = _FixedMarks(sample[:head], wanted, turn)
     follower = Follower(scene, wanted.blur_limit)
@@ -345,6 +350,12 @@ def track(
     apart = fields_apart(recording, prepare, scene.beam, rows, wanted.side in ("below", "above"))
     fields = VideoFields(apart, alternation(rows.row))
     return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields)
+
+
+def _pixel(recording: Recording, settings: TrackingSettings) -> tuple[float, float]:
+    """Size [m] of a pixel along the motion and across it."""
+    sizes = recording.pixel_size, recording.pixel_width
+    return sizes[::-1] if settings.side in ("left", "right") else sizes
 
 
 def _sample(recording: Recording) -> tuple[NDArray[np.integer], int]:

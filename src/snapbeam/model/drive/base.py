@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -23,10 +23,12 @@ if TYPE_CHECKING:
 _Array = NDArray[np.float64]
 
 
-def _sum_named(name: str) -> type[Drive] | None:
-    from snapbeam.model.drive.sum import named
+SUMS: dict[str, Callable[..., Any]] = {}
+"""Functions on sums of drives, which :mod:`snapbeam.model.drive.sum` enters: "of" adds drives, "named" finds a kind of sum."""
 
-    return named(name) if "+" in name else None
+
+def _sum_named(name: str) -> type[Drive] | None:
+    return SUMS["named"](name) if "+" in name else None
 
 
 DRIVES: dict[str, type[Drive]] = NamedTable(_sum_named)
@@ -102,9 +104,8 @@ class Drive:
 
     def __add__(self, other: Drive) -> Drive:
         """One over the other, a :class:`~snapbeam.SumDrive`."""
-        from snapbeam.model.drive.sum import SumDrive
-
-        return SumDrive.of(self, other)
+        found: Drive = SUMS["of"](self, other)
+        return found
 
     def values(self) -> dict[str, float]:
         """The fields that are plain numbers, by name."""

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.drive.components import RISE
 from snapbeam.model.drive.noise import seed_of_noise
-from snapbeam.model.drive.recorded_acceleration import SampledAcceleration
+from snapbeam.model.drive.sampled_acceleration import SampledAcceleration
 from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 from snapbeam.util.units import number_in_unit

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import DRIVES, Drive, Scale, Timed
+from snapbeam.model.drive.base import DRIVES, SUMS, Drive, Scale, Timed
 from snapbeam.model.drive.components import Component, Tone
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
@@ -241,3 +241,6 @@ def __getattr__(name: str) -> type[SumDrive]:
 def _words(name: str) -> list[str] | None:
     first, *words = name.split(_SEPARATOR)
     return words if first == "SumDrive" and len(words) > 1 and all(word in DRIVES for word in words) else None
+
+
+SUMS |= {"of": SumDrive.of, "named": named}

@@ -1,0 +1,380 @@
+"""A parameter that is swept up and down: states once a period (bifurcation diagram) and statistics (hysteresis)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.dynamics.approaches import passage_of
+from snapbeam.dynamics.clock import frequencies_of
+from snapbeam.dynamics.flow import InitialConditions, minimal_period, starts_of
+from snapbeam.dynamics.results import fixed_parameters, labelled
+from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
+from snapbeam.model.integration import Integration
+from snapbeam.model.parameters import lookup, ratio_of
+from snapbeam.model.quantity import numbered
+from snapbeam.model.system import System
+from snapbeam.simulation.simulate import simulate
+from snapbeam.solver.assemble import make_ensemble, run_columns
+from snapbeam.solver.statistics import rows_for
+from snapbeam.util.diagnostics import counting
+from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.validation import InputError, InputTypeError, axis, checked, choice, flag, integer, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_Array = NDArray[np.float64]
+SWEEPS = ("up", "down")
+_PASSAGE = 4
+"""Periods that approaches are looked at in."""
+
+
+class _Axis:
+    """The parameter of sweeps and its values."""
+
+    def __init__(self, system: System, name: str, values: ArrayLike) -> None:
+        if not isinstance(system, System):
+            raise InputTypeError(f"system = {shown(system)}: must be a System")
+        row = system.parameter(name)
+        if row.quantity.kind is not float:
+            raise InputError(f"name = {shown(name)}: must be a parameter that is a number")
+        self.name, self.short = row.name, row.short
+        low, high, closed = row.quantity.low, row.quantity.high, row.quantity.closed
+        self.values = axis(row.short, values, low, high, closed=closed)
+        self._labels = {
+            "units": row.quantity.unit,
+            "long_name": row.quantity.long_name,
+            "parameter": row.name,
+        }
+
+    def order(self, kind: str) -> range:
+        """Numbers of the values in the order of a sweep."""
+        return range(self.values.size)[:: 1 if kind == "up" else -1]
+
+    def dataset(
+        self, kinds: list[str], variables: dict[str, tuple[Any, Any, Any]], attrs: dict[str, Any]
+    ) -> xr.Dataset:
+        """Results over the sweeps, the parameter and further dimensions."""
+        found = {
+            name: (("sweep", self.short, *more), table, words)
+            for name, (more, table, words) in variables.items()
+        }
+        coords = {"sweep": kinds, self.short: (self.short, self.values, self._labels)}
+        return labelled(found, coords, attrs | {"parameter": self.short})
+
+
+@checked
+def bifurcation_diagram(
+    system: System,
+    name: str,
+    values: ArrayLike,
+    integration: Integration | None = None,
+    *,
+    sweeps: Sequence[str] = SWEEPS,
+    initial_conditions: InitialConditions | int = 0,
+    periods: tuple[int | None, int] = (None, 32),
+    grazing: bool = False,
+    progress: Callable[[int, int], object] | bool | None = None,
+) -> xr.Dataset:
+    """Compute a bifurcation diagram: states once a period over one parameter that is swept up and down.
+
+    Each sweep continues from the last state.  The sweeps differ where attractors coexist (hysteresis); runs from many
+    initial conditions show further attractors.
+
+    Parameters
+    ----------
+    system : System
+    name : str
+        Parameter, by dotted name or the name in datasets.
+    values : array_like
+        Strictly increasing.
+    integration : Integration, optional
+    sweeps : sequence of {"up", "down"}
+    initial_conditions : InitialConditions or int
+        Initial conditions at every value, in addition to the sweeps; none by default.
+    periods : pair of int
+        Transient periods to discard at each value, and periods to record. None discards 16 time constants of
+        the slowest mode, at least 200 and at most 20,000 periods.
+    grazing : bool
+        Sample every approach within four of the recorded periods densely: ``clearance``, ``min_penetration``.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with values; True writes a line to standard error.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of the
+        centre and of the contact point at the phase of the start; over ``sweep`` and the parameter:
+        ``impacts_per_period``, ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that
+        failed are NaN, as are all that follow them in their sweep; ``failed`` marks them.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> diagram = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", [0.02, 0.03, 0.04])
+    >>> dict(diagram.sizes)
+    {'sweep': 2, 'velocity_amplitude': 3, 'period': 32}
+    """
+    swept = _Axis(system, name, values)
+    kinds = [choice("sweeps", kind, SWEEPS) for kind in sweeps]
+    given, keep = _periods(periods)
+    flag("grazing", grazing)
+    many = None
+    if isinstance(initial_conditions, InitialConditions) or initial_conditions:
+        many = starts_of(initial_conditions)
+    if not kinds and many is None:
+        raise InputError("sweeps = (): must be at least one, or initial_conditions at least 1")
+    flow = Stroboscope(system, Integration() if integration is None else integration)
+    leave, rule = settling_periods(flow) if given is None else (given, "as given")
+    count, further = swept.values.size, 0 if many is None else many.count
+    told = counting(progress, "bifurcation diagram", "values")
+
+    def report(done: int) -> None:
+        if told is not None:
+            told(done, count * (bool(kinds) + further))
+
+    def kept(x: _Array, at: NDArray[np.int64]) -> tuple[_Array, _Array]:
+        """Recorded states of some runs, shape (runs, keep, d), and impacts and crossings a period."""
+        return _recorded(flow, swept, x, at, leave, keep)
+
+    rows = np.empty((len(kinds) + further, count, keep, flow.dimension))
+    counts = np.empty((len(rows), count, 2))
+    x = np.repeat(flow.coordinates(), len(kinds), axis=0)
+    side_by_side = np.arange(len(kinds))
+    for step in range(count if kinds else 0):
+        at = np.array([swept.order(kind)[step] for kind in kinds])
+        rows[side_by_side, at], counts[side_by_side, at] = kept(x, at)
+        x = rows[side_by_side, at, -1]
+        report(step + 1)
+    for number in range(further):
+        assert many is not None
+        location = swept.values if swept.name == "contact.location" else None
+        state = many.state(flow.system, number, flow.system.start_state, location)
+        begun = np.broadcast_to(flow.coordinates(state), (count, flow.dimension))
+        rows[len(kinds) + number], counts[len(kinds) + number] = kept(begun, np.arange(count))
+        report(count * (bool(kinds) + number + 1))
+    labels = [*kinds, *(f"start {number}" for number in range(further))]
+    dataset = _diagram(flow, swept, labels, rows, counts, grazing)
+    dataset.attrs |= {
+        "periods_left_out": leave,
+        "termination_reason": f"{leave} periods left out ({rule}) and {keep} kept at each value",
+    }
+    return dataset
+
+
+def _periods(periods: tuple[int | None, int]) -> tuple[int | None, int]:
+    try:
+        leave, keep = periods
+    except (TypeError, ValueError):
+        raise InputTypeError(
+            f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep"
+        ) from None
+    left = None if leave is None else integer("periods[0]", leave, 0, 10**7)
+    return left, integer("periods[1]", keep, 2, 10**6)
+
+
+def _recorded(
+    flow: Stroboscope, swept: _Axis, x: _Array, at: NDArray[np.int64], leave: int, keep: int
+) -> tuple[_Array, _Array]:
+    values, periods = swept.values[at], leave + keep
+    if lookup(swept.name).is_run:
+        found = [flow.advance(x, periods, every=True, points={swept.name: values})]
+    else:
+        found = [
+            flow.changed({swept.name: float(value)}).advance(each[None], periods, every=True)
+            for each, value in zip(x, values, strict=True)
+        ]
+    every = np.concatenate([each.every[:, leave:] for each in found if each.every is not None])
+    names = "impacts", "zero_crossings"
+    counts = [np.concatenate([each.statistics[name] for each in found]) for name in names]
+    return every, np.stack(counts, axis=1) / periods
+
+
+def _diagram(
+    flow: Stroboscope, swept: _Axis, labels: list[str], rows: _Array, counts: _Array, grazing: bool
+) -> xr.Dataset:
+    system, n = flow.system, flow.space.modes
+    model, scale, full = system.model, system.scale, rows * flow.space.scales
+    parts = {
+        "displacement": (full[..., :n], scale.length, "b"),
+        "velocity": (full[..., n : 2 * n], scale.length * scale.omega, "b omega_1"),
+    }
+    location = 0.5 if system.striker is None else system.striker.location
+    shapes = {
+        "midspan_{}": ("mid-span", model.midspan_shape),
+        "{}_at_striker": ("contact point's", model.shape_at(location)),
+    }
+    found: dict[str, tuple[Any, Any, Any]] = {
+        name.format(what): (("period",), values @ shape / unit, f"{words} {what} once a period, over {over}")
+        for name, (words, shape) in shapes.items()
+        for what, (values, unit, over) in parts.items()
+    }
+    known = np.asarray(np.isfinite(rows).all(axis=(-1, -2)))
+    seen = np.where(known[..., None], counts, np.nan)
+    periods = np.where(known, minimal_period(np.where(np.isfinite(rows), rows, 0.0)), 0)
+    found |= {
+        "impacts_per_period": ((), seen[..., 0], "impacts per period of the drive"),
+        "crossings_per_period": ((), seen[..., 1], "zero crossings of mid-span per period"),
+        "minimal_period": ((), periods, "periods after which it repeats; 0: not seen to"),
+        "failed": ((), ~known, "whether a run failed there"),
+    }
+    if grazing and system.striker is not None:
+        near = np.full((*known.shape, 2), np.nan)
+        for at in map(tuple, np.argwhere(known)):
+            here = flow.changed({swept.name: float(swept.values[at[-1]])})
+            passage = passage_of(here, rows[at][-1], _PASSAGE)
+            near[at] = passage.clearance, passage.min_penetration
+        words = "minimum gap at which the beam turns back without contact, over b"
+        found["clearance"] = ((), near[..., 0], words)
+        found["min_penetration"] = ((), near[..., 1], "penetration of the lightest impact, over b")
+    attrs = fixed_parameters(flow, swept.short)
+    return swept.dataset(labels, found, attrs | {"title": "bifurcation diagram", "system_hash": system.hash})
+
+
+@checked
+def hysteresis(
+    system: System,
+    name: str,
+    values: ArrayLike,
+    integration: Integration | None = None,
+    *,
+    sweeps: Sequence[str] = SWEEPS,
+    progress: Callable[[int, int], object] | bool | None = None,
+) -> xr.Dataset:
+    """Compute every statistic over one parameter, swept up and then down, and carry the state on.
+
+    Each value is one run of :func:`snapbeam.simulate` that begins with the last state of the run before it: modes, phase
+    of the excitation, strikers and the circuit of a harvester.  If an excitation does not repeat, such as a record, a
+    chirp or noise, every excitation restarts at each value, and only the state of the structure is carried on: all
+    values are exposed to the same excitation.  The statistics whose names end in ``last_quarter`` leave out the
+    transient of a value, if it is over after three quarters of its run.
+
+    Parameters
+    ----------
+    system : System
+        Its initial state is that of the first value of the first sweep.
+    name : str
+        Parameter, by dotted name or the name in datasets.
+    values : array_like
+        Strictly increasing, in the unit of the parameter.
+    integration : Integration, optional
+        Solver settings; ``cycles`` is the length of the run at each value.
+    sweeps : sequence of {"up", "down"}
+        One after the other; the second begins with the last state of the first.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with values; True writes a line to standard error.
+
+    Returns
+    -------
+    xarray.Dataset
+        The :data:`snapbeam.STATISTICS` over ``sweep`` and the parameter.  After a run that failed, the other runs of the
+        sweeps have the status NOT_RUN, the class UNKNOWN, and NaN.
+
+    Raises
+    ------
+    InputError
+        Before the first run: if *name* is not a numeric parameter, a value is out of range or exceeds the recorded
+        motion, or a tip moves under an excitation that does not repeat, because the restart would shift the tip by a jump.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
+    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> found = sb.dynamics.hysteresis(system, "velocity_amplitude", [0.02, 0.03], sb.Integration(cycles=20))
+    >>> found["peak_force"].dims
+    ('sweep', 'velocity_amplitude')
+    """
+    swept = _Axis(system, name, values)
+    kinds = [choice("sweeps", kind, SWEEPS) for kind in sweeps]
+    if not kinds or len(set(kinds)) < len(kinds):
+        raise InputError(f"sweeps = {shown(sweeps)}: must contain 'up', 'down' or both, each once")
+    settings = Integration() if integration is None else integration
+    if settings.early_termination:
+        raise InputError(
+            "early_termination = True: ends runs before their last state; set early_termination = False"
+        )
+    restarts, begun, count = _restarts(system), system.start_state.phase, swept.values.size
+    for value in swept.values:
+        make_ensemble(system.replace(**{swept.name: float(value)}), settings)
+    told = counting(progress, "hysteresis", "values")
+    rows = rows_for(len(system.contacts))
+    tables: dict[str, Any] = {
+        key: np.full((len(kinds), count), _missing(key, each.dtype), each.dtype) for key, each in rows.items()
+    }
+    state = system.initial_state
+    places = [(i, k) for i, kind in enumerate(kinds) for k in swept.order(kind)]
+    for done, (i, k) in enumerate(places, 1):
+        here = system.replace(**{swept.name: float(swept.values[k]), "initial_state": state})
+        run = simulate(here, settings, sample_times=[0.0])
+        for key, table in tables.items():
+            table[i, k] = run.summary[key]
+        state = run.final_state
+        if told is not None:
+            told(done, len(places))
+        if state is None:
+            break
+        if restarts:
+            state = dataclasses.replace(state, phase=begun, modal=None)
+    left_out = _OF_ONE_RUN | {swept.short, lookup(ratio_of(swept.name)).short}
+    attrs = {key: value for key, value in run.dataset.attrs.items() if key not in left_out}
+    variables = {
+        key: ((), table, {"units": rows[key].unit, "long_name": rows[key].long_name})
+        for key, table in tables.items()
+    }
+    return swept.dataset(kinds, variables, attrs | {"title": "statistics swept up and down"})
+
+
+def _restarts(system: System) -> bool:
+    """Return True if an excitation does not repeat, so that every excitation restarts at each value.
+
+    Raises
+    ------
+    InputError
+        If a tip moves then.
+    """
+    motions = frequencies_of(system, run_columns(system, {}))
+    single = [(section, drive) for section, drive, rates in motions if rates is None]
+    if not single:
+        return False
+    base = system.base_excitation
+    in_space = base is not None and system.striker is not None and not base.striker_on_base
+    if in_space or any(numbered(section)[0] == "drive" for section, _ in system.moving):
+        section, drive = single[0]
+        raise InputError(
+            f"{section}: a motion of type {drive.name!r} does not repeat, and its restart at each value would shift the "
+            "tip of a striker by a jump; use sb.sweep, in which every value begins at rest"
+        )
+    return True
+
+
+_OF_ONE_RUN = {
+    "title",
+    "response_class",
+    "status",
+    "system_hash",
+    "parameter_hash",
+    "gross_work",
+    "energy_error",
+}
+"""Attributes of a run that do not hold for all runs."""
+
+
+def _missing(name: str, kind: str) -> Any:
+    """Value of a statistic of a run that was not computed."""
+    if name == "response_class":
+        return int(ResponseClass.UNKNOWN)
+    if name == "status":
+        return int(RunStatus.NOT_RUN)
+    return np.nan if kind == "float64" else 0
