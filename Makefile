@@ -54,10 +54,11 @@ $(VENV)/.installed-run: pyproject.toml constraints.txt $(CORE) | $(BIN)/python
 	$(PIP) install --constraint constraints.txt --editable .
 	@touch $@
 
-# Every package is compared with its hash.  The list is complete: with dependencies, pip 23 ignores the pin of a package
+# Every package is compared with its hash.  Python compiles the modules that it imports, which are the fewest: all of them
+# take half a minute.  The list is complete: with dependencies, pip 23 ignores the pin of a package
 # that another one asks for with an extra.
 $(VENV)/.locked-dev: requirements-dev.txt | $(BIN)/python
-	$(PIP) install --require-hashes --no-deps --requirement requirements-dev.txt
+	$(PIP) install --require-hashes --no-deps --no-compile --requirement requirements-dev.txt
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml $(CORE) $(VENV)/.locked-dev
@@ -91,12 +92,13 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/sp-repo-review .
 	$(BIN)/zizmor --offline --quiet .github
 
-# The linters take one minute beside the tests.
+# The linters take three quarters of a minute beside the tests.
 test:
 	$(MAKE) --no-print-directory --jobs 2 lint quick-tests
 
+# In the order of tests/conftest.py, which ends with the shortest; else files of few tests, often the longest, come last.
 quick-tests: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile
+	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 # Lines of the core and its parts that the quick tests run; the native core is not counted.
 coverage: $(VENV)/.installed-dev

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -39,6 +40,12 @@ def pytest_configure():
 def pytest_collection_modifyitems(items):
     """Begin with the laboratory, whose files take longest, so that two workers end at about the same time."""
     items.sort(key=lambda item: "/tests/lab/" not in item.path.as_posix())
+
+
+def pytest_collection_finish():
+    """Leave the modules and the tests out of the garbage collection: each would look at all of them again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

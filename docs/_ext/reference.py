@@ -7,6 +7,7 @@ pages are committed, so that they are complete on the page of the repository too
 from __future__ import annotations
 
 import dataclasses
+import functools
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -329,6 +330,7 @@ def _options_as_code(text: str) -> str:
     return re.sub(r"(?<![\w`-])(--[a-z][\w-]*)", r"`\1`", text)
 
 
+@functools.cache
 def support_tables() -> str:
     """Return which parts of a system work with which question, and every reason for a refusal.
 

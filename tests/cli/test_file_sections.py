@@ -121,7 +121,7 @@ COMMANDS = {
     "probability": ("probability",),
     "design": ("design",),
 }
-SAMPLED = [chosen for chosen in subsets(MOVING[:5]) if len(chosen) in (0, 1, 2, 5)]
+SAMPLED = [chosen for chosen in subsets(MOVING[:5]) if len(chosen) in (0, 1, 5)]
 REAL = [("contact",), ("base_excitation",), ("contact", "base_excitation"), ("axial_load", "initial_state"),
         ("contact", "drive", "base_excitation", "axial_load", "force", "harvester")]  # fmt: skip
 UNCERTAIN = {
@@ -166,7 +166,7 @@ def test_commands_before_the_first_run(cli, monkeypatch, command):
 
     for place in ("step_size._free_runs", "native._Arrays"):
         monkeypatch.setattr(f"snapbeam.solver.{place}", reached)
-    chosen = SAMPLED[:9] if command in ("schematic", "force-displacement") else SAMPLED  # those two compute
+    chosen = SAMPLED[:3] if command in ("schematic", "force-displacement") else SAMPLED  # those two compute
     files = [file_of(each, command) for each in chosen]
     accepted = [
         each for each, file in zip(chosen, files, strict=True) if works(cli(file, COMMANDS[command]), file)

@@ -9,6 +9,7 @@ from importlib.metadata import requires
 
 import numpy as np
 import pytest
+from commands import run_commands
 
 from snapbeam.parts import installed_parts
 from snapbeam.util.packages import _EXTRAS, extra_of
@@ -17,13 +18,7 @@ LAB = pytest.mark.skipif("lab" not in installed_parts(), reason="a part that is 
 EXPLORER = pytest.mark.skipif("explorer" not in installed_parts(), reason="a part that is not installed")
 BLOCKED = sorted(module for modules in _EXTRAS.values() for module in modules if module != "PIL")
 """Pillow is there: Matplotlib needs it."""
-PROGRAM = f"""
-import sys
-sys.modules.update(dict.fromkeys({BLOCKED!r}))
-sys.argv[0] = "snapbeam"
-from snapbeam.__main__ import main
-main()
-"""
+WITHOUT = f"import sys; sys.modules.update(dict.fromkeys({BLOCKED!r}))\n"
 RUN = ["simulate", "--modes", "1", "--cycles", "1"]
 MAP = [
     "map",
@@ -44,11 +39,19 @@ def without_extras(folder, program, *words):
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
 
 
-def refused(folder, words, extra):
-    done = without_extras(folder, PROGRAM, *words)
-    said = " ".join(done.stderr.replace("│", " ").split())
-    assert done.returncode == 2 and "Traceback" not in said, said
-    assert re.search(rf'needs \w+; .*pip install "\.\[{extra}\b', said), said
+@pytest.fixture
+def refused(tmp_path_factory):
+    """Run commands in a folder; each must name its extra."""
+
+    def run(folder, lines, extra):
+        for done in run_commands(
+            folder, tmp_path_factory.mktemp("answers"), lines, WITHOUT, ("snapbeam.cli.app", "pint")
+        ):
+            said = " ".join(done.stderr.decode("utf-8").replace("│", " ").split())
+            assert done.returncode == 2 and "Traceback" not in said, said
+            assert re.search(rf'needs \w+; .*pip install "\.\[{extra}\b', said), said
+
+    return run
 
 
 @pytest.fixture
@@ -68,39 +71,38 @@ def files(tmp_path):
 
 
 @EXPLORER
-@pytest.mark.parametrize("words", [["explore"], ["explore", "map.nc"], ["explore", "--port", "0"]])
-def test_the_explorer(tmp_path, words):
-    refused(tmp_path, words, "explorer")
+def test_the_explorer(tmp_path, refused):
+    refused(tmp_path, [["explore"], ["explore", "map.nc"], ["explore", "--port", "0"]], "explorer")
 
 
 @EXPLORER
 def test_the_explorer_in_python(tmp_path):
-    program = f"import sys; sys.modules.update(dict.fromkeys({BLOCKED!r})); import snapbeam; snapbeam.explorer.serve"
-    done = without_extras(tmp_path, program)
+    done = without_extras(tmp_path, WITHOUT + "import snapbeam; snapbeam.explorer.serve")
     assert 'pip install ".[explorer]"' in done.stderr.splitlines()[-1]
 
 
 TRACK = ["--frame-rate", "10e3", "--pixel-size", "12e-6", "--buckling-level", "0.33e-3"]
 
 
+LABORATORY = [
+    ["track", "a.png", *TRACK, "--video", "b.avi"],
+    ["vibrometer", "a.uff", "--frequency", "100"],
+    ["fit-decay", "a.csv", "--units", "m"],
+]
+SAME_READERS = [
+    ["track", "a.avi", *TRACK],
+    ["track", "a.tif", *TRACK],
+    ["track", "series", *TRACK],
+    ["vibrometer", "a.tdms", "--frequency", "100"],
+    ["fit-decay", "a.tdms"],
+    ["frf", "a.tdms", "--excitation", "x", "--response", "y"],
+]
+
+
 @LAB
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["track", "a.avi", *TRACK],
-        ["track", "a.tif", *TRACK],
-        ["track", "series", *TRACK],
-        ["track", "a.png", *TRACK, "--video", "b.avi"],
-        ["vibrometer", "a.tdms", "--frequency", "100"],
-        ["vibrometer", "a.uff", "--frequency", "100"],
-        ["fit-decay", "a.tdms"],
-        ["fit-decay", "a.csv", "--units", "m"],
-        ["frf", "a.tdms", "--excitation", "x", "--response", "y"],
-    ],
-    ids=lambda words: " ".join(words[:2]),
-)
-def test_commands_of_the_laboratory(files, words):
-    refused(files, words, "lab")
+@pytest.mark.parametrize("lines", [LABORATORY, pytest.param(SAME_READERS, marks=pytest.mark.slow)], ids=len)
+def test_commands_of_the_laboratory(files, refused, lines):
+    refused(files, lines, "lab")
 
 
 @pytest.mark.parametrize(
@@ -108,14 +110,12 @@ def test_commands_of_the_laboratory(files, words):
     [([*RUN, "--animate", "a.mp4"], "video"), ([*MAP, "--cluster", "local:2", "-o", "a.nc"], "cluster")],
     ids=["video", "cluster"],
 )
-def test_options_of_other_commands(tmp_path, words, extra):
-    refused(tmp_path, words, extra)
+def test_options_of_other_commands(tmp_path, refused, words, extra):
+    refused(tmp_path, [words], extra)
     assert not (tmp_path / "a.mp4").exists() and not (tmp_path / "a.nc").exists()
 
 
-WRITE = f"""
-import sys
-sys.modules.update(dict.fromkeys({BLOCKED!r}))
+WRITE = """
 import numpy as np
 from snapbeam import InputError, lab
 signal = lab.make_signal(np.sin(np.arange(900.0)), "m", 1e3)
@@ -137,7 +137,7 @@ for call in calls:
 @LAB
 def test_functions_of_the_laboratory(files):
     before = sorted(path.name for path in files.iterdir())
-    done = without_extras(files, WRITE)
+    done = without_extras(files, WITHOUT + WRITE)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count('pip install ".[lab]"') == 4, done.stdout
     assert sorted(path.name for path in files.iterdir()) == before

@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 import pytest
+from commands import run_commands
 
 import snapbeam as sb
 from snapbeam.util.files import check_writable
@@ -37,27 +38,32 @@ def command(folder, *words):
     return subprocess.run(program, cwd=folder, capture_output=True, timeout=300)
 
 
-@pytest.mark.parametrize(
-    ("words", "name"),
-    [
-        ([*RUN, "-o"], b"r\xe9sultat\xff.nc"),
-        ([*RUN, "--stream", "-o"], b"\xff.nc"),
-        ([*RUN, "--plot"], b"\xff.pdf"),
-        ([*RUN, "--plot"], b"\xff.svg"),
-        ([*RUN, "--json"], b"\xff.json"),
-        ([*MAP, "--log", "map.log", "-o"], b"\xff.nc"),
-        ([*MAP, "-o", "map.nc", "--checkpoint"], b"store\xff"),
-        ([*MAP, "-o", "map.nc", "--log"], b"\xff.log"),
-    ],
-)
-def test_names_of_any_bytes(tmp_path, words, name):
-    done = command(tmp_path, *words, name)
-    assert done.returncode == 0, done.stderr.decode("utf-8", "replace")
-    if b"log" not in name:  # of a map that takes no time
-        assert name in os.listdir(os.fsencode(tmp_path))
-    if name.endswith(b".nc") and words[0] == "simulate":
-        found = sb.load(os.fsdecode(os.path.join(os.fsencode(tmp_path), name)))
-        assert r"\xff.nc" in found.dataset.attrs["command"] and found.summary.impacts >= 0
+NAMED = [
+    ([*RUN, "-o"], b"r\xe9sultat\xff.nc"),
+    ([*RUN, "--plot"], b"\xff.pdf"),
+    ([*MAP, "-o", "map.nc", "--checkpoint"], b"store\xff"),
+]
+ALSO_NAMED = [
+    ([*RUN, "--stream", "-o"], b"s\xff.nc"),
+    ([*RUN, "--plot"], b"\xff.svg"),
+    ([*RUN, "--json"], b"\xff.json"),
+    ([*MAP, "--log", "map.log", "-o"], b"m\xff.nc"),
+    ([*MAP, "-o", "other.nc", "--log"], b"\xff.log"),
+]
+
+
+@pytest.mark.parametrize("named", [NAMED, pytest.param(ALSO_NAMED, marks=pytest.mark.slow)], ids=len)
+def test_names_of_any_bytes(tmp_path, tmp_path_factory, named):
+    lines = [[*words, name] for words, name in named]
+    modules = ("xarray", "dask.array", "h5netcdf", "pint", "snapbeam.cli.map", "snapbeam.plot.run")
+    answers = run_commands(tmp_path, tmp_path_factory.mktemp("answers"), lines, modules=modules)
+    for (words, name), done in zip(named, answers, strict=True):
+        assert done.returncode == 0, done.stderr.decode("utf-8", "replace")
+        if b"log" not in name:  # of a map that takes no time
+            assert name in os.listdir(os.fsencode(tmp_path))
+        if name.endswith(b".nc") and words[0] == "simulate":
+            found = sb.load(os.fsdecode(os.path.join(os.fsencode(tmp_path), name)))
+            assert r"\xff.nc" in found.dataset.attrs["command"] and found.summary.impacts >= 0
 
 
 @pytest.mark.parametrize("place", [b"a.json", b"-"])
@@ -94,24 +100,24 @@ def test_only_regular_files_are_written(tmp_path, monkeypatch, kind):
             check_writable(target, appended=appended)
 
 
-@pytest.mark.parametrize(
-    ("words", "suffix"),
-    [
-        ([*RUN, "-o"], ".nc"),
-        ([*RUN, "--stream", "-o"], ".nc"),
-        ([*RUN, "--plot"], ".png"),
-        ([*RUN, "--animate"], ".gif"),
-        ([*RUN, "--json"], ".json"),
-        ([*MAP, "-o"], ".nc"),
-        ([*MAP, "--log"], ".log"),
-        ([*MAP, "-o", "map.nc", "--checkpoint"], ".store"),
-    ],
-)
-def test_commands_refuse_a_pipe_before_the_work(tmp_path, words, suffix):
-    os.mkfifo(tmp_path / f"pipe{suffix}")
-    done = command(tmp_path, *words, f"pipe{suffix}")
-    assert done.returncode in (1, 2) and b"Traceback" not in done.stderr, done.stderr
-    assert b"pipe" in done.stderr and os.listdir(tmp_path) == [f"pipe{suffix}"]
+def test_commands_refuse_a_pipe_before_the_work(tmp_path, tmp_path_factory):
+    lines = [
+        [*RUN, "-o", "pipe.nc"],
+        [*RUN, "--stream", "-o", "pipe.nc"],
+        [*RUN, "--plot", "pipe.png"],
+        [*RUN, "--animate", "pipe.gif"],
+        [*RUN, "--json", "pipe.json"],
+        [*MAP, "-o", "pipe.nc"],
+        [*MAP, "--log", "pipe.log"],
+        [*MAP, "-o", "map.nc", "--checkpoint", "pipe.store"],
+    ]
+    pipes = sorted({words[-1] for words in lines})
+    for pipe in pipes:
+        os.mkfifo(tmp_path / pipe)
+    for done in run_commands(tmp_path, tmp_path_factory.mktemp("answers"), lines):
+        assert done.returncode in (1, 2) and b"Traceback" not in done.stderr, done.stderr
+        assert b"pipe" in done.stderr
+    assert sorted(os.listdir(tmp_path)) == pipes
 
 
 def test_the_standard_output_is_no_file(tmp_path):

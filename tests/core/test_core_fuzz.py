@@ -51,6 +51,10 @@ def spoiled(rng, value):
     return flat
 
 
+def copies(mapping):
+    return {name: each.copy() if isinstance(each, np.ndarray) else each for name, each in mapping.items()}
+
+
 def changed(rng, *mappings):
     """The mappings, of which one to three entries are spoiled or missing."""
     found = [dict(each) for each in mappings]
@@ -67,11 +71,10 @@ def changed(rng, *mappings):
 @pytest.mark.parametrize("made", [struck, crowded], ids=["struck", "crowded"])
 @pytest.mark.parametrize("layout", ["runs", "modes", "thread"])
 def test_integrate(made, layout):
-    rng, system = np.random.default_rng(["runs", "modes", "thread"].index(layout)), made(2)
-    refused = 0
+    rng, refused = np.random.default_rng(["runs", "modes", "thread"].index(layout)), 0
+    fresh = arrays(made(2), 1, {"drive.frequency_ratio": [1.0, 1.1, 1.2]}, max_steps=2_000)
     for _ in range(150):
-        fresh = arrays(system, 1, {"drive.frequency_ratio": [1.0, 1.1, 1.2]}, max_steps=20_000)
-        problem, batch = changed(rng, fresh.problem, fresh.batch)
+        problem, batch = changed(rng, copies(fresh.problem), copies(fresh.batch))
         try:
             _core.integrate(problem, batch, layout, "", 2, None)
         except REFUSED:
@@ -81,10 +84,10 @@ def test_integrate(made, layout):
 
 def test_integrate_tangents():
     rng, refused = np.random.default_rng(11), 0
+    fresh = arrays(crowded(2), 1, {"drive.frequency_ratio": [1.0, 1.1, 1.2]}, max_steps=500)
     for _ in range(50):
-        fresh = arrays(crowded(2), 1, {"drive.frequency_ratio": [1.0, 1.1, 1.2]}, max_steps=20_000)
         seeds = {name: rng.normal(size=each.shape) for name, each in fresh.no_change().items()}
-        problem, batch, seeds = changed(rng, fresh.problem, fresh.batch, seeds)
+        problem, batch, seeds = changed(rng, copies(fresh.problem), copies(fresh.batch), seeds)
         try:
             _core.integrate_tangents(problem, batch, seeds, "", 2, None)
         except REFUSED:
@@ -108,10 +111,7 @@ def recording(monkeypatch):
     with monkeypatch.context() as patch, contextlib.suppress(_Given):
         patch.setattr(native._core, "record", kept)
         next(native.record(arrays(crowded(2), 1).ensemble, np.linspace(0.0, 1e-3, 20), True))
-    return lambda: [
-        {name: each.copy() if isinstance(each, np.ndarray) else each for name, each in part.items()}
-        for part in given[0]
-    ]
+    return lambda: [copies(part) for part in given[0]]
 
 
 @pytest.mark.parametrize("at", range(5))

@@ -32,7 +32,7 @@ def test_lorenz() -> None:
     assert values.sum() == pytest.approx(-(10.0 + 1.0 + 8.0 / 3.0), abs=1e-3)
 
 
-@pytest.mark.parametrize("modes", [1, 3, 8, 32])
+@pytest.mark.parametrize("modes", [1, 3, 8, pytest.param(32, marks=pytest.mark.slow)])
 def test_the_sum_of_all_exponents_is_that_of_damping(modes: int) -> None:
     """-2 sum zeta omega, whatever the drive does, with impacts on the way: to 2e-7 of it."""
     system, fine = system_of(modes, 1.4, 0.2), sb.Integration(accuracy="reference")

@@ -126,7 +126,9 @@ GALLERY = (
 )
 
 
-@pytest.mark.parametrize("result", GALLERY)
+@pytest.mark.parametrize(
+    "result", [pytest.param(name, marks=pytest.mark.slow if name == "run" else ()) for name in GALLERY]
+)
 def test_text_is_inside_the_canvas_in_each_style_and_the_files_are_small(
     result: str, style: str, tmp_path
 ) -> None:

@@ -58,7 +58,7 @@ def in_pieces(monkeypatch):
 
 def test_a_run_ends_at_the_last_whole_piece(tmp_path, monkeypatch, system):
     in_pieces(monkeypatch)
-    settings = sb.Integration(cycles=600, early_termination=False)
+    settings = sb.Integration(cycles=300, early_termination=False)
     whole = tmp_path / "whole.nc"
     sb.simulate_to_file(system, settings, path=whole)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "none"))
@@ -105,7 +105,7 @@ main()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
-@pytest.mark.parametrize(("limit", "kept"), [(12 * 2**20, True), (100_000, False)])
+@pytest.mark.parametrize(("limit", "kept"), [(6 * 2**20, True), (100_000, False)])
 def test_a_limit_of_the_size_of_files(tmp_path, limit, kept):
     done = subprocess.run(
         [sys.executable, "-c", LIMITED, str(limit)], cwd=tmp_path, capture_output=True, text=True, timeout=300,

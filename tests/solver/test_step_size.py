@@ -43,7 +43,7 @@ def test_steps_a_period_are_those_of_the_page() -> None:
 
 # without damping the highest of 128 modes keep what an impact gives them: the warning about the energy balance is right
 @pytest.mark.filterwarnings("ignore:the energy-balance error")
-@pytest.mark.parametrize("modes", [64, 128])
+@pytest.mark.parametrize("modes", [64, pytest.param(128, marks=pytest.mark.slow)])
 def test_many_modes_are_as_good_as_few(modes: int) -> None:
     """A snap-through within five cycles; with steps that the impact alone decides, 128 modes are off by 3e-2."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes)

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import product
 
 import pytest
 
@@ -40,19 +41,28 @@ BODIES = {
 }
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("body", BODIES)
-def test_a_call_that_does_not_end(tmp_path, body, number):
-    process = subprocess.Popen(
-        [sys.executable, "-c", BLOCKED + BODIES[body]],
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+def test_calls_that_do_not_end(tmp_path):
+    """All at once, since the program waits for some seconds before it gives a call up."""
+    begun = []
     try:
-        assert process.stdout is not None and process.stdout.readline() == "blocked\n"
+        for body, number in product(BODIES, (signal.SIGINT, signal.SIGTERM)):
+            folder = tmp_path / f"{body}, {number}"
+            folder.mkdir()
+            process = subprocess.Popen(
+                [sys.executable, "-c", BLOCKED + BODIES[body]],
+                cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            )  # fmt: skip
+            begun.append((process, folder, number))
+        for process, _, _ in begun:
+            assert process.stdout is not None and process.stdout.readline() == "blocked\n"
         time.sleep(2.0)  # a signal before the call is a plain interrupt
-        process.send_signal(number)
-        _, told = process.communicate(timeout=60)
+        for process, _, number in begun:
+            process.send_signal(number)
+        for process, folder, number in begun:
+            _, told = process.communicate(timeout=60)
+            assert process.returncode == 128 + number, folder.name
+            assert told == "interrupted; no file was left half written\n", folder.name
+            assert not (folder / "half").exists()
     finally:
-        process.kill()
-    assert process.returncode == 128 + number
-    assert told == "interrupted; no file was left half written\n" and not (tmp_path / "half").exists()
+        for process, _, _ in begun:
+            process.kill()

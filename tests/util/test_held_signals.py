@@ -80,7 +80,7 @@ def written(path):
 
 
 def streamed(path):
-    sb.simulate_to_file(system(), sb.Integration(cycles=400), path=path)
+    sb.simulate_to_file(system(), sb.Integration(cycles=40), path=path)
 
 
 def swept(path):

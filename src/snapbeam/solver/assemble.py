@@ -21,7 +21,7 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.solver.channels import channels_of
-from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable
+from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable, Records
 from snapbeam.solver.excitation import displacements, motion_of, side_of, started
 from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
@@ -324,7 +324,7 @@ def _systems(system: System, points: Mapping[str, _Array], runs: int) -> tuple[S
     return tuple(system.replace(**changes) for changes in found)
 
 
-def _require_record(system: System, table: NDArray[Any], clock: _Array) -> None:
+def _require_record(system: System, table: Records, clock: _Array) -> None:
     """Refuse runs that last longer than the shortest record."""
     records: list[Any] = [each for _, each in system.moving if each.recorded]
     if not records:
@@ -562,7 +562,7 @@ class _Places(NamedTuple):
     rows: _Array
 
 
-def _places(structure: Structure, table: NDArray[Any], location: _Array) -> _Places:
+def _places(structure: Structure, table: Records, location: _Array) -> _Places:
     different, which = np.unique(location, return_inverse=True)
     shapes = np.array([structure.model.shape_at(float(x)) for x in different])
     table["contact_row"] = which
@@ -571,7 +571,7 @@ def _places(structure: Structure, table: NDArray[Any], location: _Array) -> _Pla
     return _Places(location, np.array([structure.row(shape) for shape in shapes]))
 
 
-def _starts(structure: Structure, table: NDArray[Any], state: State, since: _Array, units: _Array) -> _Array:
+def _starts(structure: Structure, table: Records, state: State, since: _Array, units: _Array) -> _Array:
     """q and p of every start; which start, well and contact time *since* each run has is entered in the table."""
     flat, modal = state.flat(), state.flat().modal
     count = flat.batch[0]
@@ -595,7 +595,7 @@ def _offsets(
     structure: Structure,
     state: State,
     columns: Mapping[str, _Array],
-    table: NDArray[Any],
+    table: Records,
     rows: _Array,
     starts: _Array,
     clock: _Array,
@@ -650,7 +650,7 @@ def _circuits(system: System, columns: Mapping[str, _Array], runs: int) -> tuple
 
 
 def _decisions(
-    table: NDArray[Any],
+    table: Records,
     system: System,
     structure: Structure,
     integration: Integration,

@@ -45,6 +45,8 @@ FAR_AWAY = -1e30
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
+Records = Any
+"""Type of arrays with fields; with ``NDArray[Any]`` mypy tries every overload of NumPy, seconds for a line."""
 
 
 class CircuitCoupling(NamedTuple):
@@ -88,7 +90,7 @@ class Ensemble:
     order: int
     """Order of the composition."""
     law: type[ContactLaw]
-    runs: NDArray[Any]
+    runs: Records
     """Records of :data:`~snapbeam.solver.ensemble.RUN`, shape (runs,)."""
     clock: _Array
     """Rate of the phase of each run, rad/s."""

@@ -20,7 +20,7 @@ from snapbeam.solver.channels import (
     STEEP,
     Channels,
 )
-from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.solver.statistics import (
     CIRCUIT_LATE_LOSS,
     CIRCUIT_LOSS,
@@ -273,7 +273,7 @@ class _Arrays:
         """True if a function of a user holds the interpreter's lock, so that threads would wait for each other."""
         return self.channels.calls_python or any(each.why_slow for each in self.updates)
 
-    def accumulators(self) -> NDArray[Any]:
+    def accumulators(self) -> Records:
         """The records of the runs."""
         statistics, of_channels = self.batch["statistics"], self.batch["of_channels"]
         channels = self.channels
@@ -343,7 +343,7 @@ def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) 
 
 def run_ensemble(
     ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
-) -> NDArray[Any]:
+) -> Records:
     """Integrate every run of an ensemble; returns a record of accumulators a run."""
     arrays = _Arrays(ensemble)
     _integrate(arrays, threads, progress)
@@ -473,7 +473,7 @@ def record(
 
 
 def _recorded(
-    arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: NDArray[Any]
+    arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: Records
 ) -> Recorded:
     channels = arrays.channels
     rows, values = recorder["rows"][:held], recorder["values"][:held]
@@ -510,7 +510,7 @@ def _recorded(
     return Recorded(values[:, 0].copy(), q, p, contacts[:, :, :2].copy(), found, table, accumulators, state)
 
 
-def _last(arrays: _Arrays, recorder: Any, accumulators: NDArray[Any]) -> Last:
+def _last(arrays: _Arrays, recorder: Any, accumulators: Records) -> Last:
     """State of the run where it stands; not finite if it diverged."""
     n, contacts = arrays.order.size, max(1, arrays.channels.contacts)
     final, count = arrays.batch["states"], arrays.channels.laws.size

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.early_termination import crossing_energy, decidable_energy, passed_heights
 from snapbeam.model.extension import takes
-from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
 from snapbeam.util.validation import InputError, NamedTable, instance, require_texts, shown
 
@@ -491,7 +491,7 @@ def empty_accumulators(runs: int, others: int = 0, circuits: int = 0) -> Any:
     return accumulators_of_runs
 
 
-def rounding_energy(ensemble: Ensemble, accumulators_of_runs: NDArray[Any]) -> _Array:
+def rounding_energy(ensemble: Ensemble, accumulators_of_runs: Records) -> _Array:
     """Energy that rounding may add to each run, J, even where nothing does work."""
     ends = np.abs(accumulators_of_runs["energy"]) + np.abs(accumulators_of_runs["first_energy"])
     return np.asarray(_ROUNDED * ends + _CANCELLED * abs(ensemble.structure.model.well_energy))
@@ -551,7 +551,7 @@ class Reading:
     """The accumulators of an ensemble, and what it takes to read them."""
 
     ensemble: Ensemble
-    accumulators: NDArray[Any]
+    accumulators: Records
 
     @property
     def sign(self) -> float:
@@ -679,7 +679,7 @@ class Reading:
         return found
 
 
-def statistics_of(ensemble: Ensemble, accumulators_of_runs: NDArray[Any]) -> dict[str, NDArray[Any]]:
+def statistics_of(ensemble: Ensemble, accumulators_of_runs: Records) -> dict[str, NDArray[Any]]:
     """Statistics of runs in the units and signs of a map, arrays of shape (runs,) by name."""
     reading = Reading(ensemble, accumulators_of_runs)
     found = {}
@@ -700,7 +700,7 @@ def statistics_of(ensemble: Ensemble, accumulators_of_runs: NDArray[Any]) -> dic
 class OutputStates(NamedTuple):
     """States of many runs at every output time."""
 
-    accumulators_of_runs: NDArray[Any]
+    accumulators_of_runs: Records
     q: _Array
     """Linear modes about the current well, shape (runs, output states, N)."""
     p: _Array
@@ -735,7 +735,7 @@ class Recorded(NamedTuple):
     """Beam energy, contact energy, work, dissipation, loss in contact, :data:`WORKS`, losses of circuits; shape (samples, columns)."""
     impacts: _Array
     """Onset, duration, peak force and impulse of each impact that ended, shape (impacts, 4)."""
-    accumulators_of_runs: NDArray[Any]
+    accumulators_of_runs: Records
     """The run's record of accumulators as it is at the end of the piece, shape (1,)."""
     last: Last
 

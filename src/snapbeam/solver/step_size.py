@@ -19,6 +19,7 @@ from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import ACCURACIES, Integration
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
+from snapbeam.solver.ensemble import Records
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, Severity
@@ -462,7 +463,7 @@ class Clocked(NamedTuple):
 
 
 def clocked(
-    table: NDArray[Any],
+    table: Records,
     system: System,
     integration: Integration,
     cycle: _Array,
