@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
-import lazy_loader
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.equilibria import landscape_of
@@ -16,8 +16,6 @@ from snapbeam.model.matrix_pairs import eigenpairs, fixed_coordinates, is_positi
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import InputError, finite_array, integer, nonnegative, positive, shown, within
-
-sp = lazy_loader.load("scipy.sparse")
 
 MAX_MODES = 256
 """Largest number of modes offered; the closed forms themselves know no limit."""

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import lazy_loader
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from snapbeam.util.diagnostics import Diagnostic, Severity, tell
 from snapbeam.util.validation import InputError
-
-sp = lazy_loader.load("scipy.sparse")
 
 _Array = NDArray[np.float64]
 _EPS = float(np.finfo(np.float64).eps)
