@@ -87,8 +87,9 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         values = {name: getattr(start, name) for name in _START}
         if start.contact_time.size == 1:
             values["contact_time"] = start.contact_time[..., 0]
+        # of several strikers or circuits, those without a number of their own are at rest
         sections["initial_state"] = {
-            name: value if np.ndim(value) else float(value)
+            name: np.nan_to_num(value) if np.ndim(value) else float(value)
             for name, value in values.items()
             if not np.isnan(value).all()
         }
