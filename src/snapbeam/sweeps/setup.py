@@ -441,7 +441,8 @@ def announce_long_sweep(setup: SweepSetup, repeats: int = 1, *, by_cluster: bool
     over the limits of its axes if each point has a model of its own.
     """
     size, alike = setup.points.size, all(lookup(name).is_run for name in setup.points.names)
-    if size * repeats * setup.integration.cycles * setup.system.model.modes <= _FEW and alike:
+    cycles = setup.integration.cycles  # none given: those of a record may be many
+    if cycles is not None and size * repeats * cycles * setup.system.model.modes <= _FEW and alike:
         return
     # multiples of the golden section fall on the columns of no grid
     spread = np.unique((np.arange(min(size, _PROBES)) * _GOLDEN % 1.0 * size).astype(np.int64))
