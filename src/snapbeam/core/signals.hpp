@@ -171,9 +171,11 @@ template <class L> struct Signal {
     }
     SNAPBEAM_FN void move_in_time(Number later) requires(L::directions > 0) { move_in_time(at, p[snapbeam::RATE], later), move_in_time(begun, p[snapbeam::RATE], later); }
     // Just before a jump at the end of the step.
-    SNAPBEAM_FN void before_jump(Marks jumps, Real end, Real tick) {
+    SNAPBEAM_FN void before_jump(Marks jumps, Real end, Real tick, Number late) {
         if (is_tone()) return;
-        assign(jumps, at.now, fma(Number(end - Real(1.5)), Number(tick), p[snapbeam::SHIFT]));
+        Number now = fma(Number(end - Real(1.5)), Number(tick), p[snapbeam::SHIFT]);
+        if constexpr (L::directions > 0) now += late;
+        assign(jumps, at.now, now);
         evaluate();
     }
     template <class F> void visit(F number) {

@@ -573,7 +573,7 @@ template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
         Signal<L> &one = z.signal[i];
         if (ends) one.advance_from(one.begun, WHOLE);
         else if (one.acts) one.advance(which);
-        if (ends && any(z.jumping)) one.before_jump(z.jumping, z.t + z.ticks, z.tick);
+        if (ends && any(z.jumping)) one.before_jump(z.jumping, z.t + z.ticks, z.tick, z.drift);
     }
 }
 
