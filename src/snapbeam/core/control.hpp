@@ -761,6 +761,10 @@ template <class L> struct Group {
         }
         z.t = select(ok, z.t + ticks, z.t), turned += select(ok, Real(1.0), Real(0.0));
         for (int i = 0; i < z.signals; ++i) assign(ok, z.signal[i].begun.sine, z.signal[i].at.sine), assign(ok, z.signal[i].begun.cosine, z.signal[i].at.cosine);
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            if (c.circuit) assign(ok, c.P[c.state], c.z), assign(ok, c.r0, c.r1);
+        }
         const Marks jumped = ok & (!(z.t < jump));
         if constexpr (L::directions > 0)
             if (jumped) move_in_time(*this, -z.drift);
@@ -773,7 +777,6 @@ template <class L> struct Group {
         Marks changed = FromBits<Marks>::of(0);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
-            if (c.circuit) assign(ok, c.P[c.state], c.z), assign(ok, c.r0, c.r1);
             if (!c.contact) continue;
             const Event<L> &e = events[j];
             const Marks off = ok & c.closed & e.flip, on = ok & (!c.closed) & e.flip, force = ok & e.force;
