@@ -17,6 +17,7 @@ namespace SNAPBEAM_SET {
 
 constexpr double GRADING = 0.5, RELEASE = 0.5, CONTACT_TURN = 0.35, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
+template <class L> constexpr int MOST_CORRECTIONS = L::directions > 0 ? 30 : CORRECTIONS;  // of a state the error is of second order, of derivatives of first
 
 template <class L> struct Group;
 template <class L>
@@ -678,7 +679,7 @@ template <class L> struct Group {
                     e.low = select(under, ticks, e.low), e.low_f = select(under, f1, e.low_f);
                     e.high = select(over, ticks, e.high), e.high_f = select(over, f1, e.high_f);
                     const Real next = nearest(e.low + (e.high - e.low) * (e.low_f / (e.low_f - e.high_f)));
-                    const Marks better = cut_before & (tries < Real(CORRECTIONS)) & (abs(next - ticks) > step * Real(1e-9)) & (next > e.low) & (next < e.high);
+                    const Marks better = cut_before & (tries < Real(MOST_CORRECTIONS<L>)) & (abs(next - ticks) > step * Real(1e-9)) & (next > e.low) & (next < e.high);
                     // what is held together opens where its force would pull, so that it does not land again at once
                     const Marks pushes = under & (!better) & FromBits<Marks>::of(c.impulsive ? ~0u : 0u);
                     at = select(better, next, select(pushes, e.high, at));
