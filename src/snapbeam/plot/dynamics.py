@@ -23,6 +23,7 @@ from snapbeam.plot.style import (
     frame,
     legend_below,
 )
+from snapbeam.plot.units import in_units, scale_text
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, checked, choice, instance, shown
@@ -94,9 +95,8 @@ def plot_diagram(
             dress(ax.xaxis, branches[0].swap_dims(orbit=along).drop_duplicates(along), along)
         kind = "Velocity" if "velocity" in variable else "Displacement"
         unit = r"$\dot w\,/\,b\omega_1$" if kind == "Velocity" else "$w/b$"
-        ax.set_ylabel(
-            f"{kind} at {'mid-span' if variable.startswith('midspan') else 'the striker'}\nonce a period, {unit}"
-        )
+        place = "mid-span" if variable.startswith("midspan") else "the striker"
+        ax.set_ylabel(f"{kind} at {place}\nonce a period, {scale_text(first.attrs, unit)}")
         unique = {handle.get_label(): handle for handle in handles}
         legend_below(ax, list(unique.values()), 3)
         if new:
@@ -202,6 +202,7 @@ def plot_lifetimes(
     >>> ax = sb.plot.plot_lifetimes(lifetimes)
     """
     contains(dataset, "lifetimes", "lifetime")
+    dataset = in_units(dataset)
     dims = [str(name) for name in dataset["lifetime"].dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"lifetime over {dims}: is drawn over one or two parameters")
@@ -353,6 +354,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     >>> ax = sb.plot.plot_exponents(sb.dynamics.lyapunov_spectrum(system, periods=40, transient=20))
     """
     contains(dataset, "exponents", "exponent")
+    dataset = in_units(dataset)
     unit = _PER[choice("per", per, tuple(_PER))]
     of_map = str(dataset["exponent"].attrs.get("units", "1/s")) == "1"
     factor: Any = 1.0
@@ -546,7 +548,8 @@ def plot_backbone(
                     kinds.add(kind)
             handles.append(Line2D([], [], label=label, **look))
         unit = f" (1: {prefixed(curves[0].attrs['reference_frequency'], 'Hz')})" if one_model else ""
-        ax.set(xlabel=rf"Frequency $\Omega$ of free vibration{unit}", ylabel="Amplitude at mid-span $w/b$")
+        ax.set(xlabel=rf"Frequency $\Omega$ of free vibration{unit}")
+        ax.set_ylabel(scale_text(curves[0].attrs if one_model else {}, "Amplitude at mid-span $w/b$"))
         ax.set_ylim(bottom=0.0)
         for line, name in (_STABILITY[kind] for kind in sorted(kinds, reverse=True)):
             handles.append(Line2D([], [], color="0.3", linestyle=line, label=f"{name} motion"))
@@ -733,7 +736,8 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
             if 0.0 < least > np.ptp(values):
                 ax.set(**{limits: (middle - 10.0 * least, middle + 10.0 * least)})
         where = "at mid-span" if x.startswith("midspan") else "at the striker"
-        ax.set(xlabel=f"Displacement {where} $w/b$", ylabel=rf"Velocity {where} $\dot w\,/\,b\omega_1$")
+        ax.set_xlabel(scale_text(dataset.attrs, f"Displacement {where} $w/b$"))
+        ax.set_ylabel(rf"Velocity {where} $\dot w\,/\,b\omega_1$")
     return ax
 
 
