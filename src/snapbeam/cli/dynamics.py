@@ -90,7 +90,9 @@ def _checked(output: Path, plot: Path | None) -> None:
 def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
     """Return the maximum of a statistic in each direction of a sweep, and where both directions differ."""
     from snapbeam.cli.summary import coordinate_text, value_text
+    from snapbeam.plot.units import in_units, scale_text
 
+    dataset = in_units(dataset)
     values, name = dataset[statistic], str(dataset.attrs["parameter"])
     lines = []
     for direction in values["sweep"].values:
@@ -102,8 +104,10 @@ def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
         if part.size:
             at = part.isel({name: int(part.values.argmax())})
             where = coordinate_text(dataset, name, at[name].item())
+            words = str(part.attrs["long_name"])
+            words = scale_text(dataset.attrs, words) if "over b" in words else words
             lines.append(
-                f"{direction}: maximum {part.attrs['long_name']}: {value_text(dataset, statistic, at.item())} at {where}"
+                f"{direction}: maximum {words}: {value_text(dataset, statistic, at.item())} at {where}"
             )
     if values.sizes["sweep"] == 2 and values.dtype.kind == "f":
         one, other = (values.isel(sweep=i).values for i in (0, 1))

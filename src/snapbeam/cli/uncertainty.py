@@ -275,6 +275,7 @@ def probability(
     """
     from snapbeam.cli.console import check_pictures
     from snapbeam.plot.uncertainty import plot_probability
+    from snapbeam.plot.units import in_units
     from snapbeam.uncertainty.cost import estimate_cost as cost_of
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
     from snapbeam.util.files import check_writable
@@ -303,14 +304,16 @@ def probability(
         )
     small = {name: dataset[name].values for name in ("probability", "probability_low", "probability_high", "runs")
              if dataset[name].size <= 4000}  # fmt: skip
-    add_json(results=small)
+    told = in_units(dataset)
+    axes = {str(dim): told[dim].values for dim in told["runs"].dims if dim in told.coords}
+    add_json(results=small, axes=axes)
     outcome = str(dataset.attrs["watched_outcome"])
     finish(
         dataset,
         output,
         plot,
         lambda ds: plot_probability(ds, outcome),
-        _lines_probability(dataset, time.monotonic() - begun),
+        _lines_probability(told, time.monotonic() - begun),
     )
 
 
