@@ -14,6 +14,7 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from snapbeam.plot.axes import dress, edges_of, positions
+from snapbeam.plot.map import in_order
 from snapbeam.plot.style import (
     SERIES_COLORS,
     color_bar,
@@ -218,14 +219,14 @@ def plot_lifetimes(
             ax.legend(loc="best")
             dress(ax.xaxis, dataset, dims[0])
         else:
-            _lifetime_cells(dataset, ax, dims, limits, legend)
+            _lifetime_cells(dataset, ax, list(in_order(dataset, dims)), limits, legend)
     return ax
 
 
 def _lifetime_cells(
     dataset: xr.Dataset, ax: Axes, dims: list[str], limits: tuple[float, float] | None, legend: bool
 ) -> None:
-    values = dataset["lifetime"].values.T
+    values = dataset["lifetime"].transpose(*reversed(dims)).values
     known = values[np.isfinite(values) & (values > 0.0)]
     edges = [edges_of(dataset, name) for name in dims]
     if known.size:
@@ -233,7 +234,7 @@ def _lifetime_cells(
         norm = LogNorm(*((max(low, 1.0), max(high, low) * 1.001) if limits is None else limits))
         cells = ax.pcolormesh(*edges, values, cmap=cm.batlow, norm=norm, rasterized=True)
         color_bar(cells, ax, "Lifetime of snapping (cycles)", extend="both")
-    endless = np.isnan(values) & (dataset["runs_snapping"].values.T > 0)
+    endless = np.isnan(values) & (dataset["runs_snapping"].transpose(*reversed(dims)).values > 0)
     hatched: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.4", "hatch": "//////", "linewidth": 0.0}
     for row, column in np.argwhere(endless):
         low, left = edges[1][row], edges[0][column]
@@ -366,6 +367,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     first = {"exponent_number": 0} if "exponent_number" in dataset.dims else {}
     value, error = (factor * dataset[name].isel(first) for name in ("exponent", "exponent_error"))
     dims = [str(name) for name in dataset["exponent"].dims if name != "exponent_number"]
+    dims = list(in_order(dataset, dims)) if len(dims) == 2 else dims
     value, error = (each.transpose(*dims) for each in (value, error))
     with frame(ax, dataset) as ax:
         if "running" in dataset:

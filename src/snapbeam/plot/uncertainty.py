@@ -27,7 +27,7 @@ from snapbeam.plot.style import (
     frame,
     legend_below,
 )
-from snapbeam.plot.units import in_units, ratio_along, ratio_name
+from snapbeam.plot.units import in_units, ratio_along, ratio_name, scale_text
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, checked, shown
@@ -107,7 +107,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
                     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
                     axis.set_major_formatter("{x:g}")
                     axis.set_minor_formatter(NullFormatter())
-        legend_below(ax)
+        legend_below(ax, columns=1)
     return ax
 
 
@@ -122,7 +122,8 @@ def _errors(dataset: xr.Dataset, name: str, own: np.ndarray) -> np.ndarray | Non
 def _label(dataset: xr.Dataset, name: str) -> str:
     labels = dataset[name].attrs
     unit, words = str(labels.get("units", "1")), str(labels.get("long_name", name))
-    return f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
+    words = scale_text(dataset.attrs, words) if "over b" in words else words
+    return textwrap.fill(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}", 40)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -378,11 +379,14 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
 def _name(data: xr.Dataset, at: int) -> str:
     """Label of a bar: the parameter and, for a local analysis, its step with unit."""
     name = str(data["parameter"].values[at])
-    step = "step" in data and _with_unit(float(data["step"][at]), lookup(name).quantity.unit, 2)
+    size = float(data["step"][at]) if "step" in data else 0.0  # 0 where it is not known
+    step = size and _with_unit(size, lookup(name).quantity.unit, 2)
     return f"{_words(name)}\n± {step}" if step else _words(name)
 
 
 def _words(name: str) -> str:
+    if name in PHYSICAL:
+        return PHYSICAL[name].words
     section, text = split_name(name)
     return f"{'contact ' if section == 'contact' and lookup(name).kinds else ''}{text.replace('_', ' ')}"
 

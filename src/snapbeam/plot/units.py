@@ -113,6 +113,7 @@ def scale_text(attrs: Mapping[Any, Any], words: str) -> str:
     words : str
         Words of a quantity over b.
     """
-    scale = attrs.get("length_scale") or attrs.get("beam_buckling_level")
+    names = ("length_scale", "beam_buckling_level", "fixed_beam_buckling_level")  # the last of designs
+    scale = next((attrs[name] for name in names if attrs.get(name)), None)
     symbol = "$b$" if "$" in words else "b"
     return f"{words} ({symbol} = {prefixed(float(scale), 'm')})" if scale else words
