@@ -109,9 +109,7 @@ def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any],
     at = np.unravel_index(int(np.nanargmax(values.values)), values.shape)
     point = _point(values, dict(zip(values.dims, at, strict=True)))
     where = ", ".join(coordinate_text(dataset, each, point[each]) for each in point)
-    words = _long_name(dataset, name)
-    words = scale_text(dataset.attrs, words) if "over b" in words else words
-    line = f"Highest {words}: {value_text(dataset, name, values.values[at])}"
+    line = f"Highest {statistic_text(dataset, name, values.values[at])}"
     line += f" at {where}" if where else ""
     return point, line + (f"; not known at {unknown} of {values.size} points" if unknown else "")
 
@@ -200,7 +198,7 @@ def _strength_words(dataset: xr.Dataset) -> str | None:
 
 
 def _without_scale(words: str) -> str:
-    return _NORMALISED.sub("", words).replace(", of the", " of the")
+    return _NORMALISED.sub("", words).replace(", of the", " of the").rstrip(",")
 
 
 def _long_name(dataset: xr.Dataset, name: str) -> str:
@@ -230,6 +228,14 @@ def value_text(dataset: xr.Dataset, name: str, value: Any, digits: int = 4) -> s
     if "e+0" in text and abs(value) < 1e6:
         text = f"{float(text):.0f}"
     return f"{text} {unit}".rstrip()
+
+
+def statistic_text(dataset: xr.Dataset, name: str, value: Any) -> str:
+    """Return the words of a statistic and a value of it, with the length scale b where it is over b: ``0.5 b (b = 6 µm)``."""
+    words, text = _long_name(dataset, name), value_text(dataset, name, value)
+    if _NORMALISED.search(words):
+        words, text = _without_scale(words), scale_text(dataset.attrs, text)
+    return f"{words}: {text}"
 
 
 def _count(number: int, noun: str) -> str:
