@@ -205,10 +205,13 @@ def test_the_power_of_a_harvester_with_one_well():
 def test_a_threshold_over_the_acceleration_of_a_base_has_units():
     """Amplitude, band and steps in g; the paper's own plane keeps its symbols."""
     from snapbeam.cli.summary import coordinate_text, value_text
+    from snapbeam.plot.units import in_units
 
-    curve = harvester_map([[0, 3]] * 3)
-    name = "base_excitation_acceleration_amplitude"
-    assert coordinate_text(curve, name, 0.4) == "acceleration amplitude of the base = 10.31 g"
-    assert value_text(curve, name, 0.04, 2) == "1 g"
+    curve = in_units(harvester_map([[0, 3]] * 3))
+    name = "base_excitation_amplitude_g"
+    assert coordinate_text(curve, name, 10.31) == "acceleration amplitude of the base = 10.31 g"
+    assert value_text(curve, name, 1.03, 2) == "1 g"
+    unit = curve[name].values / curve["base_excitation_acceleration_amplitude"].values
+    np.testing.assert_allclose(0.4 * unit, 10.31, rtol=1e-3)
     assert coordinate_text(curve, "modes", 2) == "N = 2"
     assert value_text(curve, "harvester_resistance", 2.5e6) == "2.5 Mohm"

@@ -143,13 +143,25 @@ def test_refused_parts(parts, message):
         sb.System(MODEL, **parts)
 
 
-@pytest.mark.parametrize("label", ["2", "a b", "a.b", 3])
+@pytest.mark.parametrize("label", ["left stop", "50 %", "stop.gap", "Anschlag Nr. 2", "=", "ü"])
+def test_a_part_is_named_by_a_label_of_any_characters(label, tmp_path):
+    """Also beside a label that is the beginning of it, and with a dot before a field's name."""
+    stops = [sb.Contact(HERTZ, STOP, "stop"), sb.Contact(HERTZ, STOP, label)]
+    system = sb.System(MODEL, contacts=stops)
+    moved = system.replace(**{f"contact.{label}.gap": 1e-4})
+    assert moved.get(f"contact.{label}.gap") == moved.get("contact.2.gap") == 1e-4
+    assert moved.get("contact.stop.gap") == system.get("contact.1.gap")
+    moved.save(tmp_path / "labelled.toml")
+    assert sb.System.load(tmp_path / "labelled.toml") == moved
+
+
+@pytest.mark.parametrize("label", ["2", " a", "a\n", 3])
 def test_refused_labels(label):
     for make in (
         lambda: sb.Contact(HERTZ, STOP, label),
         lambda: sb.LocalSpring(stiffness=1.0, location=0.5, label=label),
     ):
-        with pytest.raises(InputError, match=r"label = .*: must be a name of letters"):
+        with pytest.raises(InputError, match=r"label = .*: must be printable text"):
             make()
 
 

@@ -91,9 +91,10 @@ def test_dimension_of_a_product_is_checked():
     assert number_in_unit("4 um / 0", "m") is None
 
 
-def test_label_with_a_space_is_refused_with_one_that_works():
+def test_label_with_a_space_names_its_parameters_in_a_file():
     stop = {"gap": 1e-5, "label": "upper stop"}
-    with pytest.raises(sb.InputError, match=r"label = 'upper stop': .* such as 'upper_stop'"):
-        config_from_mapping({"extends": "paper", "contact": stop})
-    found = config_from_mapping({"extends": "paper", "contact": stop | {"label": "upper_stop"}}).system
-    assert found.get("contact.upper_stop.gap") == 1e-5
+    config = config_from_mapping(
+        {"extends": "paper", "contact": stop, "sweep": {"contact.upper stop.gap": [1e-5, 2e-5]}}
+    )
+    assert config.system.get("contact.upper stop.gap") == 1e-5
+    assert list(config.axes()) == ["contact.gap"]

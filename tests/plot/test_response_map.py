@@ -34,7 +34,7 @@ def test_cells(synthetic_map):
     np.testing.assert_allclose(corners[[0, -1], 0, 1], [0.0, y[-1] + 0.5 * (y[-1] - y[-2])])
     assert ax.get_xlim() == pytest.approx((0.05, 4.05))
     assert ax.get_xlabel() == r"Excitation frequency $\Omega$"
-    assert ax.get_title("left") == r"$N$ = 32, 200 cycles, $x_\mathrm{s}$ = 0.4762"
+    assert ax.get_title() == r"$N$ = 32, 200 cycles, $x_\mathrm{s}$ = 0.4762"
 
 
 def test_every_pixel_of_a_cell_has_its_colour(synthetic_map, tmp_path):
@@ -124,7 +124,7 @@ def test_what_is_no_map_of_two_axes(synthetic_map):
     deep = synthetic_map.drop_vars("location").expand_dims(location=[0.3, 0.4])
     with pytest.raises(InputError, match="select one value of location, by --at location=VALUE or"):
         plot_response_map(deep)
-    assert plot_response_map(deep.isel(location=[1])).get_title("left").endswith("0.4")
+    assert plot_response_map(deep.isel(location=[1])).get_title().endswith("0.4")
 
 
 @pytest.mark.parametrize("dpi", [72, 150, 300])

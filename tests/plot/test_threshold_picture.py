@@ -66,7 +66,7 @@ def test_band(curve):
         quasi_static.get_ydata(), curve["frequency_ratio"] * np.sin(np.pi * 0.4) ** 2, rtol=1e-12
     )
     assert ax.get_xlabel().startswith("Excitation frequency") and "V" in ax.get_ylabel()
-    assert ax.get_title("left") == "$x_\\mathrm{s}$ = 0.4\n200 cycles, steps of 0.01 in $V$"
+    assert ax.get_title() == "200 cycles, $x_\\mathrm{s}$ = 0.4\nsteps of 0.01 in $V$"
     assert len([each for each in ax.collections if isinstance(each, PolyCollection)]) == 2
     assert ax.get_ylim() == pytest.approx((0.0, 1.4 * 0.34))
     (none,) = [line for line in ax.lines if line.get_marker() == "^"]

@@ -109,3 +109,44 @@ def test_the_command(tmp_path, monkeypatch, synthetic_map):
     (tmp_path / "own.csv").write_text("mine\n1\n")
     assert CliRunner().invoke(app, ["info", "map.nc", "--export", "own.csv"]).exit_code == 2
     assert (tmp_path / "own.csv").read_text() == "mine\n1\n"
+
+
+def test_a_threshold_is_a_table_in_long_form_with_its_units(tmp_path):
+    """A row for each acceleration at each frequency, with the threshold of the frequency in g beside it."""
+    import csv
+
+    from snapbeam.plot.units import in_units
+    from snapbeam.util.tables import write_table
+
+    ratio, amplitude = np.array([0.5, 1.0]), np.array([0.1, 0.2, 0.3])
+    names = ("base_excitation_frequency_ratio", "base_excitation_acceleration_amplitude")
+    parameters = ("base_excitation.frequency_ratio", "base_excitation.acceleration_amplitude")
+    curve = xr.Dataset(
+        {
+            "lower_threshold": (names[0], [0.2, np.nan], {"units": "1"}),
+            "upper_threshold": (names[0], [0.3, np.nan], {"units": "1"}),
+            "failed_runs": (names[0], [0, 1]),
+            "response_class": (names, np.array([[0, 3, 3], [0, 0, -1]], dtype=np.int8)),
+            "max_midspan_displacement": (
+                names,
+                np.ones((2, 3)),
+                {"units": "1", "long_name": "maximum, over b"},
+            ),
+        },
+        {
+            name: (name, values, {"parameter": parameter})
+            for name, values, parameter in zip(names, (ratio, amplitude), parameters, strict=True)
+        },
+        {"parameter": names[1], "length_scale": 5e-6, "reference_frequency": 4e4},
+    )
+    unit = 5e-6 * (2.0 * np.pi * 4e4) ** 2 / 9.80665
+    assert write_table(in_units(curve), tmp_path / "threshold.csv") == []
+    rows = list(csv.DictReader((tmp_path / "threshold.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == 6
+    assert [float(row["base_excitation_frequency_hz (Hz)"]) for row in rows] == [2e4] * 3 + [4e4] * 3
+    given = [float(row["base_excitation_amplitude_g (g)"]) for row in rows]
+    np.testing.assert_allclose(given, np.tile(amplitude, 2) * unit)
+    assert [row["response_class"] for row in rows] == ["0", "3", "3", "0", "0", "-1"]
+    np.testing.assert_allclose([float(row["lower_threshold (g)"]) for row in rows[:3]], 0.2 * unit)
+    assert [row["lower_threshold (g)"] for row in rows[3:]] == [""] * 3
+    assert "max_midspan_displacement (over 5e-06 m)" in rows[0]

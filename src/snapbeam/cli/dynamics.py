@@ -89,8 +89,10 @@ def _checked(output: Path, plot: Path | None) -> None:
 
 def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
     """Return the maximum of a statistic in each direction of a sweep, and where both directions differ."""
-    from snapbeam.cli.summary import coordinate_text, value_text
+    from snapbeam.cli.summary import coordinate_text, statistic_text
+    from snapbeam.plot.units import in_units
 
+    dataset = in_units(dataset)
     values, name = dataset[statistic], str(dataset.attrs["parameter"])
     lines = []
     for direction in values["sweep"].values:
@@ -102,9 +104,9 @@ def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
         if part.size:
             at = part.isel({name: int(part.values.argmax())})
             where = coordinate_text(dataset, name, at[name].item())
-            lines.append(
-                f"{direction}: maximum {part.attrs['long_name']}: {value_text(dataset, statistic, at.item())} at {where}"
-            )
+            text = statistic_text(dataset, statistic, at.item())
+            text = text if text.startswith("maximum ") else f"maximum {text}"
+            lines.append(f"{direction}: {text} at {where}")
     if values.sizes["sweep"] == 2 and values.dtype.kind == "f":
         one, other = (values.isel(sweep=i).values for i in (0, 1))
         apart = np.abs(one - other) > _BRANCHES * np.nanmax(np.abs(values.values), initial=0.0)

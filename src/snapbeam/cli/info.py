@@ -62,9 +62,10 @@ def info(
 
 def _export(dataset: xr.Dataset, path: Path) -> None:
     """Write a table or arrays, and print the names of the variables that a table does not contain."""
+    from snapbeam.plot.units import in_units
     from snapbeam.util.tables import write_table
 
-    left_out = write_table(dataset, path)
+    left_out = write_table(in_units(dataset), path)
     if left_out:
         notes().print(f"not in the file, with other dimensions: {', '.join(left_out)}", markup=False)
     add_json(files=[path], left_out=left_out)

@@ -15,8 +15,9 @@ from rich.table import Table
 
 from snapbeam.cli.console import duration, file_line
 from snapbeam.cli.parameter_options import point_text
-from snapbeam.model.parameters import PHYSICAL, Physical, lookup, parameters
+from snapbeam.model.parameters import lookup, parameters
 from snapbeam.model.quantity import numbered, split_name
+from snapbeam.plot.units import in_units, ratio_name, scale_text
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass, RunStatus, wells_of
 from snapbeam.util.validation import InputError, printable
@@ -39,6 +40,7 @@ def map_summary(
     The amplitude is that of an axis of the map that drives the system.  The statistic is *variable*, or the power of a
     harvester.  For a beam with one well the range of the centre's displacement is added.
     """
+    dataset = in_units(dataset)
     attrs = dataset.attrs
     runs = dataset["response_class"].size
     noun = "point" if "computed" in dataset or "class_fraction" in dataset else "run"
@@ -107,7 +109,7 @@ def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any],
     at = np.unravel_index(int(np.nanargmax(values.values)), values.shape)
     point = _point(values, dict(zip(values.dims, at, strict=True)))
     where = ", ".join(coordinate_text(dataset, each, point[each]) for each in point)
-    line = f"Highest {_long_name(dataset, name)}: {value_text(dataset, name, values.values[at])}"
+    line = f"Highest {statistic_text(dataset, name, values.values[at])}"
     line += f" at {where}" if where else ""
     return point, line + (f"; not known at {unknown} of {values.size} points" if unknown else "")
 
@@ -119,12 +121,14 @@ def _ranges(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
         unit = dataset[name].attrs.get("units", "1")
         unit = "" if unit == "1" else f" {unit}"
         low, high = float(dataset[name].min()), float(dataset[name].max())
-        lines.append(f"{dataset[name].attrs.get('long_name', name)}: {low:.4g} to {high:.4g}{unit}")
+        words = scale_text(dataset.attrs, str(dataset[name].attrs.get("long_name", name)))
+        lines.append(f"{words}: {low:.4g} to {high:.4g}{unit}")
     return lines
 
 
 def map_facts(dataset: xr.Dataset) -> dict[str, Any]:
     """Summary of a map as plain values: points of each class and status, the lowest interwell point, the notch."""
+    dataset = in_units(dataset)
     kinds, codes = np.asarray(dataset["response_class"].values), np.asarray(dataset["status"].values)
     low = lowest_interwell(dataset)
     return {
@@ -194,49 +198,44 @@ def _strength_words(dataset: xr.Dataset) -> str | None:
 
 
 def _without_scale(words: str) -> str:
-    return _NORMALISED.sub("", words).replace(", of the", " of the")
+    return _NORMALISED.sub("", words).replace(", of the", " of the").rstrip(",")
 
 
 def _long_name(dataset: xr.Dataset, name: str) -> str:
     return str(dataset[name].attrs.get("long_name", name.replace("_", " ")))
 
 
-def _physical(dataset: xr.Dataset, name: str) -> tuple[float, Physical] | None:
-    """Return factor and row of a ratio of a base's motion, where one reference frequency holds for all points."""
-    frequency, length = (dataset.attrs.get(each) for each in ("reference_frequency", "length_scale"))
-    parameter = _parameter(dataset, name)
-    for row in PHYSICAL.values():
-        if row.parameter == parameter and parameter.startswith("base_excitation.") and frequency and length:
-            return row.unit_of(float(length), 2.0 * np.pi * float(frequency)), row
-    return None
-
-
 def _words(dataset: xr.Dataset, name: str) -> str:
     """Return the words for an axis, without what normalises it."""
     if name in _SYMBOLS:
         return name.replace("_", " ")
-    physical = _physical(dataset, name)
-    return _without_scale(_long_name(dataset, name)) if physical is None else physical[1].words
+    return _without_scale(_long_name(dataset, name))
 
 
 def value_text(dataset: xr.Dataset, name: str, value: Any, digits: int = 4) -> str:
-    """Return a value with its unit, in physical units where they are known, or with what normalises it."""
+    """Return a value with its unit, or with what normalises it; :func:`in_units` gives axes their units."""
     if not isinstance(value, float):
         return str(value)
     if name in _SYMBOLS:
         return f"{value:.{digits}g}"
-    physical = _physical(dataset, name)
-    unit = dataset[name].attrs.get("units", "1") if physical is None else physical[1].unit
-    factor = 1.0 if physical is None else physical[0]
+    unit = dataset[name].attrs.get("units", "1")
     if unit in _WITH_PREFIX:
-        return prefixed(factor * value, unit, digits)
+        return prefixed(value, unit, digits)
     scale = _NORMALISED.search(_long_name(dataset, name))
     if unit == "1":
         unit = scale[1] if scale else ""
-    text = f"{factor * value:.{digits}g}"
-    if "e+0" in text and abs(factor * value) < 1e6:
+    text = f"{value:.{digits}g}"
+    if "e+0" in text and abs(value) < 1e6:
         text = f"{float(text):.0f}"
     return f"{text} {unit}".rstrip()
+
+
+def statistic_text(dataset: xr.Dataset, name: str, value: Any) -> str:
+    """Return the words of a statistic and a value of it, with the length scale b where it is over b: ``0.5 b (b = 6 µm)``."""
+    words, text = _long_name(dataset, name), value_text(dataset, name, value)
+    if _NORMALISED.search(words):
+        words, text = _without_scale(words), scale_text(dataset.attrs, text)
+    return f"{words}: {text}"
 
 
 def _count(number: int, noun: str) -> str:
@@ -276,7 +275,8 @@ def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
 def _point(values: xr.DataArray, index: dict[Any, Any]) -> dict[str, Any]:
     """Return the coordinates of a point of a map: those of its axes, and the paper's."""
     point = values.isel(index)
-    names = [str(name) for name in values.coords if name in values.dims or name in _PAPER]
+    in_unit = {ratio_name(str(name)) for name in values.dims}
+    names = [str(name) for name in values.coords if name in values.dims or name in {*_PAPER} - in_unit]
     return {name: point[name].item() for name in names}
 
 
@@ -298,20 +298,22 @@ def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
     from scipy.signal import find_peaks
 
     response = dataset["response_class"].squeeze()
-    if set(response.dims) != {"frequency_ratio", "velocity_amplitude"}:
+    axes = {ratio_name(str(name)): str(name) for name in response.dims}
+    if axes.keys() != {"frequency_ratio", "velocity_amplitude"}:
         return None
-    velocity = dataset["velocity_amplitude"]
+    across, raised = axes["frequency_ratio"], axes["velocity_amplitude"]
+    velocity = dataset[raised]
     interwell = response >= _SNAPPED
-    lowest = velocity.where(interwell).min("velocity_amplitude").fillna(np.inf)
-    known = ~((response == ResponseClass.UNKNOWN) & (velocity < lowest)).any("velocity_amplitude").values
+    lowest = velocity.where(interwell).min(raised).fillna(np.inf)
+    known = ~((response == ResponseClass.UNKNOWN) & (velocity < lowest)).any(raised).values
     threshold = np.minimum(lowest.values, float(velocity.max()))[known]
     dips, shape = find_peaks(-threshold, prominence=float(np.ptp(velocity.values)) / 50.0)
     if not dips.size:
         return None
     at = dips[np.argmax(shape["prominences"])]
     place = {
-        "frequency_ratio": float(dataset["frequency_ratio"][known][at]),
-        "velocity_amplitude": float(threshold[at]),
+        across: float(dataset[across][known][at]),
+        raised: float(threshold[at]),
     }
     return place | {"location": float(dataset["location"].squeeze())}
 
@@ -375,19 +377,22 @@ def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any]
         point = point_text({name: low[name] for name in axes})
         at = f" --point {shlex.quote(point)}" if point else ""
         lines.append(f"run this point    snapbeam simulate --from {file}{at} --plot run.png")
-        if {"frequency_ratio", "velocity_amplitude"} <= set(axes) and min(
+        ratios = {ratio_name(name): name for name in axes}
+        if {"frequency_ratio", "velocity_amplitude"} <= ratios.keys() and min(
             dataset.sizes[name] for name in axes
         ) > 1:
             closer = _closer(files[0].stem)
-            omega, velocity = low["frequency_ratio"], low["velocity_amplitude"]
+            names = [ratios[name] for name in ("frequency_ratio", "velocity_amplitude")]
+            options = [f"--{name.replace('_', '-')}" for name in names]
+            omega, velocity = (low[name] for name in names)
             lines.append(
                 f"zoom in           snapbeam map --from {file}{at} "
-                f"--frequency-ratio {0.8 * omega:.3g}:{1.2 * omega:.3g}:40 "
-                f"--velocity-amplitude {0.5 * velocity:.3g}:{2.0 * velocity:.3g}:40 "
+                f"{options[0]} {0.8 * omega:.3g}:{1.2 * omega:.3g}:40 "
+                f"{options[1]} {0.5 * velocity:.3g}:{2.0 * velocity:.3g}:40 "
                 f"-o {closer}.nc --plot {closer}.png"
             )
     if file is not None:
-        line = " --quasi-static-line" if set(axes) <= set(_PAPER) else ""
+        line = " --quasi-static-line" if set(map(ratio_name, axes)) <= set(_PAPER) else ""
         if sum(dataset.sizes[name] > 1 for name in axes) == 2:
             lines.append(f"plot again        snapbeam plot {file}{line} -o map.pdf")
         lines.append(

@@ -77,6 +77,7 @@ def threshold(
     axes = _axes_of(settings, parameter, values)
     name, chosen = axes.popitem()
 
+    from snapbeam.plot.units import in_units
     from snapbeam.sweeps.threshold import threshold as find
 
     system = settings.system
@@ -89,18 +90,20 @@ def threshold(
     files = [write_map(dataset, output)]
     if plot is not None:
         files.append(draw_computed(dataset, plot, output))
+    told = in_units(dataset)
     names = (
         "lower_threshold", "upper_threshold", "lower_threshold_min", "upper_threshold_max", "failed_runs",
     )  # fmt: skip
     add_json(
-        parameter=dataset.attrs["parameter"],
+        parameter=told.attrs["parameter"],
+        unit=told[told.attrs["parameter"]].attrs.get("units", "1"),
         initial_well=dataset.attrs.get("initial_well"),
-        axes={str(each): dataset[each].values for each in dataset["lower_threshold"].dims},
-        **{each: dataset[each].values for each in names},
+        axes={str(each): told[each].values for each in told["lower_threshold"].dims},
+        **{each: told[each].values for each in names},
         outcome=np.array(_kinds(dataset))[dataset["outcome"].values],
         runs=dataset.attrs["runs"], seconds=elapsed, files=files,
     )  # fmt: skip
-    out().print(*_summary(dataset, elapsed), *(f"Written: {file_line(path)}" for path in files), sep="\n")
+    out().print(*_summary(told, elapsed), *(f"Written: {file_line(path)}" for path in files), sep="\n")
 
 
 def _axes_of(settings: Config, parameter: str, text: str | None) -> dict[str, Any]:

@@ -217,23 +217,27 @@ def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
         f"{runs} runs of {dataset.sizes['tried']} designs in {duration(elapsed)}",
         *initial_well_lines(dataset),
     ]
+    from snapbeam.cli.summary import coordinate_text, statistic_text, value_text
+
     words = str(dataset["constraints_satisfied"].attrs["flag_meanings"]).split()
     share = 100.0 * float(dataset.attrs["confidence"])
     for i in range(min(count, 12)):
         one = dataset.isel(design=i)
         names = [name for name in map(str, one.data_vars) if not name.startswith("tried_")]
         chosen = [name for name in names if "parameter" in one[name].attrs]
-        lines.append(", ".join(f"{name} = {float(one[name]):.5g}" for name in chosen))
+        lines.append(", ".join(coordinate_text(one, name, float(one[name])) for name in chosen))
         for name in map(str, one.data_vars):
             if f"{name}_low" not in one:
                 continue
-            low, high, unit = float(one[f"{name}_low"]), float(one[f"{name}_high"]), one[name].attrs["units"]
             kind, _, of = name.partition("_")
-            head = f"satisfied: {of}" if kind == "satisfied" else of
-            lines.append(
-                f"  {head} {float(one[name]):.4g} ({low:.4g} to {high:.4g} at {share:g} %)"
-                f"{'' if unit == '1' else ' ' + unit}"
+            ends = [value_text(one, name, float(one[f"{name}{end}"])) for end in ("_low", "_high")]
+            value = statistic_text(one, name, float(one[name]))
+            value = (
+                f"satisfied: {of.replace('_', ' ')} {value.rpartition(': ')[2]}"
+                if kind == "satisfied"
+                else value
             )
+            lines.append(f"  {value} ({' to '.join(ends)} at {share:g} %)")
             if kind == "satisfied":
                 lines.append(f"  {_distance(one, of)}")
         lines.append(f"  constraints on validation samples: {words[int(one['constraints_satisfied'])]}")
@@ -275,6 +279,7 @@ def probability(
     """
     from snapbeam.cli.console import check_pictures
     from snapbeam.plot.uncertainty import plot_probability
+    from snapbeam.plot.units import in_units
     from snapbeam.uncertainty.cost import estimate_cost as cost_of
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
     from snapbeam.util.files import check_writable
@@ -303,14 +308,16 @@ def probability(
         )
     small = {name: dataset[name].values for name in ("probability", "probability_low", "probability_high", "runs")
              if dataset[name].size <= 4000}  # fmt: skip
-    add_json(results=small)
+    told = in_units(dataset)
+    axes = {str(dim): told[dim].values for dim in told["runs"].dims if dim in told.coords}
+    add_json(results=small, axes=axes)
     outcome = str(dataset.attrs["watched_outcome"])
     finish(
         dataset,
         output,
         plot,
         lambda ds: plot_probability(ds, outcome),
-        _lines_probability(dataset, time.monotonic() - begun),
+        _lines_probability(told, time.monotonic() - begun),
     )
 
 

@@ -332,12 +332,19 @@ def resolved(name: str, labels: Mapping[str, Sequence[str]]) -> str:
     *labels* are those of the parts in their order, by the section of the first.
     """
     kind, _, rest = name.partition(".")
+    if kind not in NUMBERED or not rest:
+        return name
+    own = list(labels["contact" if kind == "drive" else kind])
+    # a label may have dots: the longest that the name begins with, before a field if there is one
+    named = [each for each in own if each and (rest == each or rest.startswith(f"{each}."))]
     given, dot, field = rest.partition(".")
-    if kind not in NUMBERED or not given or (not dot and given != "1" and given.isdigit()):
+    if named:
+        given = max(named, key=lambda each: (rest != each, len(each)))
+        dot, field = rest[len(given) : len(given) + 1], rest[len(given) + 1 :]
+    if not dot and given != "1" and given.isdigit():
         return name
     if not dot and (given in ("law", "striker", "label") or row_of(name) is not None):
         return name  # a field of the first, whatever the labels are
-    own = list(labels["contact" if kind == "drive" else kind])
     if given == "1" or given in own:
         number = 1 if given == "1" else 1 + own.index(given)
         return section_of(kind, number) + dot + field

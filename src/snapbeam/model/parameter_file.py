@@ -23,7 +23,7 @@ from snapbeam.model.external_force import FORCES
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, read_file, resolved
 from snapbeam.model.modal_convergence import converged_modes, error_of_auto
-from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physical, parse_axis
+from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physical, parse_axis, unit_of
 from snapbeam.model.parameters import (
     PHYSICAL,
     Parameter,
@@ -41,7 +41,7 @@ from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import check_label, numbered, quantities, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.striker import Striker
-from snapbeam.model.system import System
+from snapbeam.model.system import System, told_as
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.input_files import read_toml
 from snapbeam.util.units import number_in_unit
@@ -452,10 +452,13 @@ class Config:
         Checked values by section and name.
     extends_paper : bool
         Whether the paper's values complete what is not given.  If not, a missing value is refused.
+    as_given : mapping of str
+        Texts with units, and numbers in physical units, by dotted name.
     """
 
     given: Sections = field(default_factory=dict)
     extends_paper: bool = True
+    as_given: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def extension(self) -> dict[str, Any]:
@@ -646,7 +649,7 @@ class Config:
                 PHYSICAL[name].parameter: checked_physical(system, name, value, split_name(name)[1])
                 for name, value in later.items()
             })  # fmt: skip
-        return self._started(system)
+        return told_as(self._started(system), self.as_given)
 
     def _may_be_axis(self, section: str) -> bool:
         """Return whether a required value of a section may be given by an axis only."""
@@ -716,7 +719,9 @@ class Config:
 
         def given(modes: int) -> Config:
             return Config(
-                {**self.given, "model": self.section("model") | {"modes": modes}}, self.extends_paper
+                {**self.given, "model": self.section("model") | {"modes": modes}},
+                self.extends_paper,
+                self.as_given,
             )
 
         return given(converged_modes(given(_FIRST_MODES).static_system, error))
@@ -861,7 +866,8 @@ def config_from_mapping(
     """
     instance("source", source, str, "text")
     found, lines = checked_sections(sections, folder)
-    config = Config(found, "extends" in sections or not set(found) - set(_OF_RUNS))
+    extends = "extends" in sections or not set(found) - set(_OF_RUNS)
+    config = Config(found, extends, _as_given(found, flattened(sections)))
     lines = lines or contradictions(found)
     if not lines and complete:
         try:
@@ -876,6 +882,43 @@ def config_from_mapping(
     if lines:
         raise InputError("\n".join(f"{source}: {line}" if source else line for line in lines))
     return config
+
+
+def _as_given(found: Sections, flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers of a system that were given as text or in physical units, as they were given, by dotted name."""
+    given = {}
+    for section, values in found.items():
+        for name, value in values.items() if section not in _OF_RUNS else ():
+            raw, full = flat[section].get(name), f"{section}.{name}"
+            if isinstance(value, float) and (isinstance(raw, str) or full in PHYSICAL):
+                given[full] = raw
+    return given
+
+
+def sections_as_given(system: System) -> dict[str, dict[str, Any]]:
+    """The sections of a system with the units in which its values were given, as far as they make the same system."""
+    plain = system.to_mapping()
+    if not system.as_given:
+        return plain
+    sections = {name: dict(values) for name, values in plain.items()}
+    for full, raw in system.as_given.items():
+        section, name = split_name(full)
+        key = split_name(ratio_of(full))[1]
+        unit = PHYSICAL[full].unit if full in PHYSICAL else lookup(full).quantity.unit
+        number = number_in_unit(raw, unit) if isinstance(raw, str) else raw
+        own = sections.get(section, {})
+        if key not in own or number is None:
+            continue
+        value = number / unit_of(system, full) if full in PHYSICAL else number
+        if value == own[key]:
+            sections[section] = {
+                name if each == key else each: raw if each == key else own[each] for each in own
+            }
+    try:
+        written = {name: {k: v for k, v in own.items() if v is not None} for name, own in sections.items()}
+        return sections if config_from_mapping(written).system == system else plain
+    except InputError:  # of a part that a parameter file does not describe so
+        return plain
 
 
 def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: str = "") -> Config:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 import secrets
 from collections import namedtuple
 from collections.abc import Callable, Iterable
@@ -157,11 +156,9 @@ def split_name(name: str) -> tuple[str, str]:
 
 def check_label(label: Any) -> None:
     """Raise an error for a label that cannot replace a number in a dotted name."""
-    if not isinstance(label, str) or (label and not label.isidentifier()):
-        word = re.sub(r"\W+", "_", label).strip("_") if isinstance(label, str) else ""
-        such = f", such as {word!r}" if word.isidentifier() else ""
+    if not isinstance(label, str) or not label.isprintable() or label != label.strip() or label.isdigit():
         raise InputError(
-            f"label = {shown(label)}: must be a name of letters, digits and underscores that begins with a letter{such}"
+            f"label = {shown(label)}: must be printable text without spaces at its ends, and not a number, such as 'tip'"
         )
 
 

@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,12 @@ _A: dict[str, tuple[Any, str]] = {
     "axial_load": (AxialLoadModulation, "an AxialLoadModulation(motion=HarmonicLoad(...))"),
 }
 """Parts of a system other than the model: their classes and names."""
+
+
+def told_as(system: System, given: Mapping[str, Any]) -> System:
+    """The system, just made, which :meth:`System.save` writes with the texts and units *given* where they are its values."""
+    object.__setattr__(system, "as_given", dict(given))
+    return system
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +112,8 @@ class System:
     harvesters: Sequence[Harvester] = ()
     initial_state: State | None = None
     initial_well: str | int | None = None
+    as_given: ClassVar[dict[str, Any]] = {}
+    """Values that were given as texts with units or in physical units, as they were given, by dotted name."""
 
     def __post_init__(self) -> None:
         model, start = self.model, self.initial_state
@@ -170,16 +178,17 @@ class System:
         in_units = {name: changes.pop(name) for name in [*changes] if name in PHYSICAL}
         if in_units:  # of the structure as changed
             found = self.replace(**changes)
-            return found.replace(**{name: float(value) for name, value in ratios_of(found, in_units).items()})
+            ratios = {name: float(value) for name, value in ratios_of(found, in_units).items()}
+            return told_as(found.replace(**ratios), self.as_given | in_units)
         other = {name: value for name, value in changes.items() if not name.startswith(prefix)}
         found = System(**replaced(parts, other))
         start = {name.removeprefix(prefix): changes[name] for name in changes if name not in other}
         if "initial_well" in start:
             found = dataclasses.replace(found, initial_state=None, initial_well=start.pop("initial_well"))
-        if not start:
-            return found
-        state = started(found.model, found.start_state, start)
-        return dataclasses.replace(found, initial_state=state, initial_well=None)
+        if start:
+            state = started(found.model, found.start_state, start)
+            found = dataclasses.replace(found, initial_state=state, initial_well=None)
+        return told_as(found, self.as_given)
 
     def get(self, name: str) -> Any:
         """The value of a parameter by its dotted name."""
@@ -452,12 +461,19 @@ class System:
         return int(self.hash[:15], 16)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the system to a TOML file, whole or not at all; :meth:`load` reads it back equal."""
+        """Write the system to a TOML file, whole or not at all; :meth:`load` reads it back equal.
+
+        Values that were read from a file keep the units that they have there.
+        """
         import tomli_w
+
+        from snapbeam.model.parameter_file import sections_as_given
 
         target = check_writable(path, "path", (".toml",))
         with atomic_path(target) as temporary:
-            temporary.write_text(tomli_w.dumps(nested(_without_none(self.to_mapping()))), encoding="utf-8")
+            temporary.write_text(
+                tomli_w.dumps(nested(_without_none(sections_as_given(self)))), encoding="utf-8"
+            )
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> System:

@@ -10,8 +10,9 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from snapbeam.model.parameters import PHYSICAL, Parameter, lookup
+from snapbeam.model.parameters import Parameter, lookup
 from snapbeam.plot.style import cell_edges
+from snapbeam.util.si_prefixes import scale_of
 from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
@@ -29,16 +30,13 @@ AXIS_LABELS = {
 _LONGEST = 44
 """Characters of a line along an axis of a picture of one column."""
 _SMALL, _LARGE = 0.01, 1e4
-"""Between these the maximum number along an axis is shown as it is."""
-_PREFIXES = {
-    "m": ((-3, "m"), (-6, "µ")),
-    "Pa": ((9, "G"), (6, "M"), (3, "k")),
-    "s": ((-3, "m"), (-6, "µ")),
-    "N": ((-3, "m"), (-6, "µ"), (-9, "n")),
-    "Hz": ((6, "M"), (3, "k")),
-    "ohm": ((6, "M"), (3, "k")),
-}
-"""Powers of ten, from great to small, that have a prefix before a unit."""
+"""Between these the maximum number along an axis of a unit without prefixes is shown as it is."""
+_WITH_PREFIX = frozenset(
+    ("m", "m/s", "s", "N", "N/m", "N m", "Pa", "Hz", "ohm", "F", "H", "V", "A", "W", "J")
+)
+"""Units that take a prefix of the SI, from 1 and up to 10,000 of which none is needed."""
+_PLAIN = {"um": "µm"}
+"""Units of parameters as figures write them."""
 _DECADES = 10.0
 """Ratio of the maximum to the minimum above which geometric points have a logarithmic axis."""
 
@@ -54,71 +52,45 @@ def axis_label(dataset: xr.Dataset, name: str) -> str:
         labels = dataset[name].attrs if name in dataset.coords else {}
         unit = labels.get("units", "1")
         text = f"{labels.get('long_name', name)}{'' if unit == '1' else f' ({unit})'}"
-    power, unit = _power(dataset, name)
-    if power:
+    _, unit = _scaled(dataset, name)
+    if unit:
         text = f"{text.rpartition(' (')[0] or text} ({unit})"
     return textwrap.fill(text, _LONGEST, break_long_words=False)
 
 
-def in_units(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with its axes in the physical units in which they were given, and those of a base's motion always.
-
-    The paper's own plane keeps its ratios unless it was given in physical units.
-    """
-    for dim in map(str, dataset.dims):
-        given = [
-            str(name)
-            for name, each in dataset.coords.items()
-            if each.dims == (dim,) and name != dim and each.attrs.get("parameter") in PHYSICAL
-        ]
-        if given and dataset.sizes[dim] > 1:
-            dataset = dataset.swap_dims({dim: given[0]})
-    frequency, length = (dataset.attrs.get(each) for each in ("reference_frequency", "length_scale"))
-    if frequency is None or length is None:
-        return dataset
-    rows = {
-        row.parameter: (name, row) for name, row in PHYSICAL.items() if name.startswith("base_excitation.")
-    }
-    for dim in map(str, dataset.dims):
-        found = (
-            rows.get(dataset[dim].attrs.get("parameter", ""))
-            if dim in dataset.coords and dataset.sizes[dim] > 1
-            else None
-        )
-        if found is not None:
-            name, row = found
-            unit = row.unit_of(float(length), 2.0 * np.pi * float(frequency))
-            words = f"{row.words[:1].upper()}{row.words[1:]}"
-            attrs = {"units": row.unit, "long_name": words, "parameter": name}
-            dataset = dataset.assign_coords({dim: (dim, dataset[dim].values * unit, attrs)})
-    return dataset
-
-
-def _power(dataset: xr.Dataset, name: str) -> tuple[int, str]:
-    """The power of ten that numbers along an axis are counted in, so that ticks are short, and the unit that makes."""
-    points, words = positions(dataset, name)
-    most = float(np.abs(points).max())
-    if (
-        words is not None
-        or name in AXIS_LABELS
-        or is_geometric(points)
-        or most == 0.0
-        or _SMALL <= most < _LARGE
-    ):
-        return 0, ""
+def _scaled(dataset: xr.Dataset, name: str) -> tuple[float, str]:
+    """The number that those along an axis are divided by, so that ticks are short, and the unit that makes."""
     row = _parameter(dataset, name)
     unit = "1" if row is None else row.quantity.unit
-    for power, prefix in _PREFIXES.get(unit, ()):
-        if most >= 0.01 * 10.0**power:
-            return power, f"{prefix}{unit}"
+    own = 1.0, _PLAIN.get(unit, "")
+    if name not in dataset.coords:
+        return own
+    points, words = positions(dataset, name)
+    most = float(np.abs(points).max())
+    if words is not None or name in AXIS_LABELS or is_geometric(points) or most == 0.0:
+        return own
+    if unit in _WITH_PREFIX:
+        return own if 1.0 <= most < _LARGE else scale_of(points, unit)
+    if _SMALL <= most < (1e6 if unit == "g" else _LARGE):  # kg would be another unit
+        return own
     power = int(np.floor(np.log10(most)))
-    return power, f"10$^{{{power}}}${'' if unit == '1' else f' {unit}'}"
+    return 10.0**power, f"10$^{{{power}}}${'' if unit == '1' else f' {unit}'}"
 
 
 def symbol_of(dataset: xr.Dataset, name: str) -> str:
-    """The symbol of an axis, or its name."""
+    """The symbol of an axis; empty without one."""
     row = _parameter(dataset, name)
-    return name if row is None or not row.quantity.symbol else f"${row.quantity.symbol}$"
+    return "" if row is None or not row.quantity.symbol else f"${row.quantity.symbol}$"
+
+
+def tick_text(dataset: xr.Dataset, name: str, value: float, digits: int = 2) -> str:
+    """A number along an axis in the unit of its label, such as ``5 kHz``."""
+    divisor, unit = _scaled(dataset, name)
+    row = _parameter(dataset, name)
+    if not unit and row is not None and row.quantity.unit != "1":
+        unit = row.quantity.unit
+    symbol = "" if unit else f" in {symbol_of(dataset, name)}".removesuffix(" in ")
+    return f"{float(f'{value / divisor:.{digits}g}'):.6g} {unit}".rstrip() + symbol
 
 
 def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
@@ -166,6 +138,6 @@ def dress(axis: Axis, dataset: xr.Dataset, name: str) -> None:
     elif is_geometric(points):
         set_scale = axis.axes.set_xscale if axis.axis_name == "x" else axis.axes.set_yscale  # type: ignore[attr-defined]
         set_scale("log")
-    power, _ = _power(dataset, name)
-    if power:
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**power:.6g}"))
+    divisor, _ = _scaled(dataset, name)
+    if divisor != 1.0:
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / divisor:.6g}"))

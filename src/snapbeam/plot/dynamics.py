@@ -14,6 +14,7 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from snapbeam.plot.axes import dress, edges_of, positions
+from snapbeam.plot.map import in_order
 from snapbeam.plot.style import (
     SERIES_COLORS,
     color_bar,
@@ -23,6 +24,7 @@ from snapbeam.plot.style import (
     frame,
     legend_below,
 )
+from snapbeam.plot.units import in_units, scale_text
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, checked, choice, instance, shown
@@ -94,9 +96,8 @@ def plot_diagram(
             dress(ax.xaxis, branches[0].swap_dims(orbit=along).drop_duplicates(along), along)
         kind = "Velocity" if "velocity" in variable else "Displacement"
         unit = r"$\dot w\,/\,b\omega_1$" if kind == "Velocity" else "$w/b$"
-        ax.set_ylabel(
-            f"{kind} at {'mid-span' if variable.startswith('midspan') else 'the striker'}\nonce a period, {unit}"
-        )
+        place = "mid-span" if variable.startswith("midspan") else "the striker"
+        ax.set_ylabel(f"{kind} at {place}\nonce a period, {scale_text(first.attrs, unit)}")
         unique = {handle.get_label(): handle for handle in handles}
         legend_below(ax, list(unique.values()), 3)
         if new:
@@ -202,6 +203,7 @@ def plot_lifetimes(
     >>> ax = sb.plot.plot_lifetimes(lifetimes)
     """
     contains(dataset, "lifetimes", "lifetime")
+    dataset = in_units(dataset)
     dims = [str(name) for name in dataset["lifetime"].dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
         raise InputError(f"lifetime over {dims}: is drawn over one or two parameters")
@@ -217,14 +219,14 @@ def plot_lifetimes(
             ax.legend(loc="best")
             dress(ax.xaxis, dataset, dims[0])
         else:
-            _lifetime_cells(dataset, ax, dims, limits, legend)
+            _lifetime_cells(dataset, ax, list(in_order(dataset, dims)), limits, legend)
     return ax
 
 
 def _lifetime_cells(
     dataset: xr.Dataset, ax: Axes, dims: list[str], limits: tuple[float, float] | None, legend: bool
 ) -> None:
-    values = dataset["lifetime"].values.T
+    values = dataset["lifetime"].transpose(*reversed(dims)).values
     known = values[np.isfinite(values) & (values > 0.0)]
     edges = [edges_of(dataset, name) for name in dims]
     if known.size:
@@ -232,7 +234,7 @@ def _lifetime_cells(
         norm = LogNorm(*((max(low, 1.0), max(high, low) * 1.001) if limits is None else limits))
         cells = ax.pcolormesh(*edges, values, cmap=cm.batlow, norm=norm, rasterized=True)
         color_bar(cells, ax, "Lifetime of snapping (cycles)", extend="both")
-    endless = np.isnan(values) & (dataset["runs_snapping"].values.T > 0)
+    endless = np.isnan(values) & (dataset["runs_snapping"].transpose(*reversed(dims)).values > 0)
     hatched: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.4", "hatch": "//////", "linewidth": 0.0}
     for row, column in np.argwhere(endless):
         low, left = edges[1][row], edges[0][column]
@@ -353,6 +355,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     >>> ax = sb.plot.plot_exponents(sb.dynamics.lyapunov_spectrum(system, periods=40, transient=20))
     """
     contains(dataset, "exponents", "exponent")
+    dataset = in_units(dataset)
     unit = _PER[choice("per", per, tuple(_PER))]
     of_map = str(dataset["exponent"].attrs.get("units", "1/s")) == "1"
     factor: Any = 1.0
@@ -364,6 +367,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     first = {"exponent_number": 0} if "exponent_number" in dataset.dims else {}
     value, error = (factor * dataset[name].isel(first) for name in ("exponent", "exponent_error"))
     dims = [str(name) for name in dataset["exponent"].dims if name != "exponent_number"]
+    dims = list(in_order(dataset, dims)) if len(dims) == 2 else dims
     value, error = (each.transpose(*dims) for each in (value, error))
     with frame(ax, dataset) as ax:
         if "running" in dataset:
@@ -546,7 +550,8 @@ def plot_backbone(
                     kinds.add(kind)
             handles.append(Line2D([], [], label=label, **look))
         unit = f" (1: {prefixed(curves[0].attrs['reference_frequency'], 'Hz')})" if one_model else ""
-        ax.set(xlabel=rf"Frequency $\Omega$ of free vibration{unit}", ylabel="Amplitude at mid-span $w/b$")
+        ax.set(xlabel=rf"Frequency $\Omega$ of free vibration{unit}")
+        ax.set_ylabel(scale_text(curves[0].attrs if one_model else {}, "Amplitude at mid-span $w/b$"))
         ax.set_ylim(bottom=0.0)
         for line, name in (_STABILITY[kind] for kind in sorted(kinds, reverse=True)):
             handles.append(Line2D([], [], color="0.3", linestyle=line, label=f"{name} motion"))
@@ -733,7 +738,8 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
             if 0.0 < least > np.ptp(values):
                 ax.set(**{limits: (middle - 10.0 * least, middle + 10.0 * least)})
         where = "at mid-span" if x.startswith("midspan") else "at the striker"
-        ax.set(xlabel=f"Displacement {where} $w/b$", ylabel=rf"Velocity {where} $\dot w\,/\,b\omega_1$")
+        ax.set_xlabel(scale_text(dataset.attrs, f"Displacement {where} $w/b$"))
+        ax.set_ylabel(rf"Velocity {where} $\dot w\,/\,b\omega_1$")
     return ax
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.agreement import draw_agreement
-from snapbeam.plot.axes import axis_label, dress, edges_of, in_units, positions
+from snapbeam.plot.axes import axis_label, dress, edges_of, positions
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
@@ -30,6 +30,7 @@ from snapbeam.plot.style import (
     legend_below,
     set_title,
 )
+from snapbeam.plot.units import in_units, ratio_along, scale_text
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.si_prefixes import scale_of
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 
 _Array = NDArray[np.float64]
 
-UPWARD = ("velocity_amplitude", "location")
+UPWARD = ("velocity_amplitude", "location", "base_excitation_acceleration_amplitude")
 """Axes that are drawn upward rather than across, the first of them first."""
 
 _CURVES = ("min_midspan_displacement", "max_midspan_displacement")
@@ -95,17 +96,17 @@ def plot_response_map(
     over: dict[str, Any] = {"measurements": measurements, "quasi_static_line": quasi_static_line}
     if "response_class" in dataset and dataset["response_class"].dims == ("point",):
         return plot_points(dataset, "response_class", ax, legend=legend, **over)
-    if measurements is None and not quasi_static_line:  # which are drawn over ratios
-        dataset = in_units(dataset)
+    dataset = in_units(dataset)
     response = dataset["response_class"].squeeze() if "response_class" in dataset else dataset
     if "response_class" in dataset and response.ndim == 1 and "point" not in response.dims:
         return _line(dataset, ax, measurements is not None or quasi_static_line, legend)
     across, upward, kinds = _two_axes(dataset)
+    ratios = [ratio_along(dataset, name)[0] for name in (across, upward)]
     edges = tuple(edges_of(dataset, name) for name in (across, upward))
     fixed = {
         name: fixed_value(dataset, name)
         for name in ("frequency_ratio", "location", "velocity_amplitude")
-        if name not in (across, upward)
+        if name not in ratios
     }
     with frame(ax, height=92.0 if legend else 70.0) as ax:
         class_cells(ax, edges[0], edges[1], kinds)
@@ -119,7 +120,7 @@ def plot_response_map(
         if quasi_static_line:
             handles.append(draw_quasi_static_line(ax, dataset, across, upward, fixed))
         if measurements is not None:
-            handles.append(draw_measurements(ax, measurements, across, upward, fixed))
+            handles.append(draw_measurements(ax, measurements, dataset, across, upward, fixed))
         if legend:
             legend_below(ax, handles)
     return ax
@@ -153,7 +154,7 @@ def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
         ax.plot(points, curve, color="white", linewidth=2.0)
         ax.plot(points, curve, ".-", color="black", linewidth=0.8, markersize=2.5)
     dress(ax.xaxis, dataset, name)
-    ax.set_ylabel("Mid-span displacement $w/b$,\nminimum and maximum")
+    ax.set_ylabel(f"Mid-span displacement {scale_text(dataset.attrs, '$w/b$')},\nminimum and maximum")
     ax.set(xlim=edges[[0, -1]], ylim=(low - pad, high + pad))
 
 
@@ -173,13 +174,14 @@ def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
             else "select fewer values"
         )
         raise InputError(f"a map is drawn over two axes of more than one point; this one has {sizes}: {more}")
-    across, upward = _in_order(named)
+    across, upward = in_order(dataset, named)
     return across, upward, response.transpose(upward, across).values
 
 
-def _in_order(dims: list[str]) -> tuple[str, str]:
+def in_order(dataset: xr.Dataset, dims: list[str]) -> tuple[str, str]:
     """The names of two axes: the one that is drawn across, then the one that is drawn upward."""
-    upward = next((name for name in UPWARD if name in dims), dims[1])
+    ratios = {ratio_along(dataset, name)[0]: name for name in dims}
+    upward = next((ratios[name] for name in UPWARD if name in ratios), dims[1])
     return dims[0] if dims[1] == upward else dims[1], upward
 
 
@@ -228,18 +230,20 @@ def draw_quasi_static_line(
     """Draw V_QS1 of one mode (Eq. 21) over two of the paper's coordinates, the third of them fixed."""
     if (objection := quasi_static_objection(dataset.attrs)) is not None:
         raise InputError(f"quasi_static_line with {objection}; leave quasi_static_line out")
-    x = np.linspace(*ax.get_xlim(), 402)[1:-1]
+    (across, wide), (upward, high) = (ratio_along(dataset, name) for name in (across, upward))
+    x = np.linspace(*ax.get_xlim(), 402)[1:-1] / wide
     if {across, upward} - {"frequency_ratio", "location", "velocity_amplitude"}:
         raise InputError(
             f"quasi_static_line: is drawn over frequency ratio, location and velocity amplitude, not {across}, {upward}"
         )
     if (across, upward) == ("frequency_ratio", "location"):
-        height = np.linspace(*ax.get_ylim(), 402)[1:-1]
+        height = np.linspace(*ax.get_ylim(), 402)[1:-1] / high
         line = _given(fixed, "velocity_amplitude") / quasi_static_threshold(height, 1.0), height
     elif across == "location":
         line = x, quasi_static_threshold(x, _given(fixed, "frequency_ratio"))
     else:
         line = x, quasi_static_threshold(_given(fixed, "location"), x)
+    line = wide * line[0], high * line[1]
     ax.plot(*line, color="white", linewidth=1.8)
     inside = [
         (min(lim) < at) & (at < max(lim))
@@ -264,9 +268,15 @@ def _given(fixed: dict[str, float | None], name: str) -> float:
 
 
 def draw_measurements(
-    ax: Axes, measurements: MeasuredPoints, across: str, upward: str, fixed: dict[str, float | None]
+    ax: Axes,
+    measurements: MeasuredPoints,
+    dataset: xr.Dataset,
+    across: str,
+    upward: str,
+    fixed: dict[str, float | None],
 ) -> Line2D:
     """Draw measured responses over a map, those at other values of its fixed coordinates left out with a warning."""
+    (across, wide), (upward, high) = (ratio_along(dataset, name) for name in (across, upward))
     keep = np.ones(len(measurements), dtype=bool)
     for name, value in fixed.items():
         there = getattr(measurements, name)
@@ -281,7 +291,7 @@ def draw_measurements(
             stacklevel=3,
         )
     colors = [CLASS_COLORS[ResponseClass(int(kind))] for kind in measurements.response_class[keep]]
-    where = getattr(measurements, across)[keep], getattr(measurements, upward)[keep]
+    where = wide * getattr(measurements, across)[keep], high * getattr(measurements, upward)[keep]
     ends = zip(where, (ax.get_xlim(), ax.get_ylim()), strict=True)
     outside = np.any([(at < low) | (at > high) for at, (low, high) in ends], axis=0)
     if outside.any():
@@ -364,7 +374,7 @@ def plot_statistic(
             ax.set_ylabel(label)
             ax.set_yscale("log" if log else "linear")
         else:
-            across, upward = _in_order(dims)
+            across, upward = in_order(dataset, dims)
             field = np.ma.masked_invalid(data.transpose(upward, across).values)
             positive = scaled[scaled > 0.0]
             norm = LogNorm(positive.min(), positive.max()) if log else Normalize()
@@ -413,6 +423,7 @@ def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, s
     unit = str(attrs.get("units", row.unit if row else "1"))
     words = words[:1].upper() + words[1:]
     if unit == "1":
+        words = scale_text(dataset.attrs, words) if "over b" in words else words
         return 1.0, textwrap.fill(words, _LONGEST)
     factor, scaled = scale_of(values, unit)
     return factor, textwrap.fill(f"{words} ({scaled})", _LONGEST)
@@ -481,6 +492,7 @@ def plot_points(
     >>> dataset = sb.sweep(system, points, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_points(dataset, "peak_force")
     """
+    dataset = in_units(dataset)
     if name not in dataset.data_vars or dataset[name].dims != ("point",):
         named = [str(key) for key, item in dataset.data_vars.items() if item.dims == ("point",)]
         raise InputError(f"variable = {shown(name)}: the points have {', '.join(named) or 'no variables'}")
@@ -511,17 +523,22 @@ def _over(
     """Draw what lies over the points; what a legend needs for it."""
     if measurements is None and not line:
         return []
-    if along not in _PAPER:
+    ratios = tuple(ratio_along(dataset, name)[0] for name in along)
+    if ratios not in _PAPER:
         raise InputError(
             "measurements, quasi_static_line: need velocity amplitude, or location, upward over frequency or location, "
             f"not {along[1]} over {along[0]}"
         )
     fixed: dict[str, float | None] = {}
-    for name in {name for pair in _PAPER for name in pair} - set(along):
+    for name in {name for pair in _PAPER for name in pair} - set(ratios):
         values = np.unique(dataset[name].values) if name in dataset.coords else np.empty(0)
         fixed[name] = float(values[0]) if values.size == 1 else None
     handles: list[Any] = [draw_quasi_static_line(ax, dataset, *along, fixed)] if line else []
-    return handles if measurements is None else [*handles, draw_measurements(ax, measurements, *along, fixed)]
+    return (
+        handles
+        if measurements is None
+        else [*handles, draw_measurements(ax, measurements, dataset, *along, fixed)]
+    )
 
 
 def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple[str, str]:
@@ -536,10 +553,14 @@ def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple
             raise InputError(
                 f"{what} = {shown(given)}: the points are given by {', '.join(names) or 'nothing'}"
             )
+    ratios = {name: ratio_along(dataset, name)[0] for name in names}
+    known = {ratio for name, ratio in ratios.items() if ratio != name}  # in the unit in which they were given
+    names = [name for name in names if name not in known]
     differing = [name for name in names if np.unique(dataset[name].values).size > 1]
     free = [name for name in (*differing, *names) if name not in (across, upward)]
     if upward is None:
-        upward = next((name for name in UPWARD if name in free), None) or (free[-1] if free else None)
+        found = {ratios[name]: name for name in reversed(free)}
+        upward = next((found[name] for name in UPWARD if name in found), free[-1] if free else None)
     if across is None:
         across = next((name for name in free if name != upward), None)
     if across is None or upward is None or across == upward:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,8 +29,10 @@ from snapbeam.plot.style import (
     fix_ticks,
     frame,
     new_figure,
+    say_scale_once,
     set_title,
 )
+from snapbeam.plot.units import scale_text
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.simulation.run import Run
 from snapbeam.util.diagnostics import diagnostics_of
@@ -194,7 +197,7 @@ def plot_spectrum(
         ax.set(xlim=(0.0, top), yscale="log", ylim=(max(shown.max() * 1e-5, 1e-300), shown.max() * 2.0))
         ax.set_xlabel(_FREQUENCY[name])
         words = _words(dataset, variable)
-        ax.set_ylabel(words if unit == "1" else f"{words} ({unit})")
+        ax.set_ylabel(textwrap.fill(words if unit == "1" else f"{words} ({unit})", 40))
     return ax
 
 
@@ -231,6 +234,7 @@ def _even_samples(
 def _words(dataset: xr.Dataset, variable: str) -> str:
     """Long name of a variable, as the label of an axis."""
     words = str(dataset[variable].attrs.get("long_name", variable)).replace(", over b", " over $b$")
+    words = scale_text(dataset.attrs, words) if "$b$" in words else words
     return f"{words[:1].upper()}{words[1:]}"
 
 
@@ -397,7 +401,8 @@ def plot_perturbation(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             np.where(dataset["separation"] > 0.0, dataset["separation"], np.nan),
             color=BEAM_COLOR,
         )
-        ax.set(yscale="log", xlabel=label, ylabel="Maximum change of the displacement $w/b$")
+        ax.set(yscale="log", xlabel=label)
+        ax.set_ylabel(scale_text(dataset.attrs, "Maximum change of the displacement\n$w/b$"))
         ax.margins(x=0.0)
     return ax
 
@@ -462,7 +467,9 @@ def plot_phase_portrait(
                 label="whole cycles",
             )  # fmt: skip
             _legend(ax, 1)
-        ax.set(xlabel="Displacement $w/b$", ylabel=r"Velocity $\dot w\,/\,b\omega_1$")
+        ax.set(
+            xlabel=scale_text(dataset.attrs, "Displacement $w/b$"), ylabel=r"Velocity $\dot w\,/\,b\omega_1$"
+        )
     return ax
 
 
@@ -537,7 +544,11 @@ def plot_run(
         with frame(ax) as ax:
             x = part[axis_name].values
             _displacements(ax, part, x)
-            ax.set(xlabel=label, ylabel="Displacement $w/b$", xlim=(_from(x[0], x[-1]), x[-1]))
+            ax.set(
+                xlabel=label,
+                ylabel=scale_text(dataset.attrs, "Displacement $w/b$"),
+                xlim=(_from(x[0], x[-1]), x[-1]),
+            )
             _legend(ax, 3, 0.15)
         return ax
     with figure_style():
@@ -558,7 +569,7 @@ def plot_run(
         left[-1].set_xlabel(label)
         first, last = float(part[axis_name][0]), float(part[axis_name][-1])
         left[0].set_xlim(_from(first, last), last)
-        left[0].set_ylabel("Displacement $w/b$")
+        left[0].set_ylabel(scale_text(dataset.attrs, "Displacement $w/b$\n").replace("\n (", "\n("))
         if axis_name == "time" and "length_scale" in dataset.attrs:
             size, unit = scale_of([float(dataset.attrs["length_scale"])], "m")
             metres = float(dataset.attrs["length_scale"]) / size
@@ -567,6 +578,7 @@ def plot_run(
             beside.set_ylabel(f"Displacement ({unit})")
         figure.legend(*left[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
         set_title(left[0], caption(dataset, 2))
+        say_scale_once(left[0])
         figure.align_ylabels(left)
         if has_force:
             near, seconds, peak = _hardest_impact(part)

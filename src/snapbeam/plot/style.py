@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from matplotlib.ticker import AutoLocator
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.parameters import PHYSICAL, lookup
+from snapbeam.plot.units import ratio_name
 from snapbeam.util.diagnostics import Diagnostic, Severity
 from snapbeam.util.files import MADE_BY, atomic_path, check_writable
 from snapbeam.util.si_prefixes import prefixed
@@ -54,6 +56,9 @@ CENTER_COLOR = "#70BBF0"
 
 SERIES_COLORS = ("#16245E", "#B03A27", "#70BBF0", "#858585", "#000000")
 """Colours of curves and regions that are no response classes, in their order."""
+
+_SCALE_OF_LABEL = re.compile(r"\(\$?b\$? = ")
+_SCALE_OF_TITLE = re.compile(r", \$b\$ = [^,\n]*")
 
 _RC: Any = {
     "axes.axisbelow": True,
@@ -181,7 +186,7 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
 @contextmanager
 def frame(
     ax: Axes | None, dataset: xr.Dataset | None = None, width: str = "single", height: float = 72.0,
-    axes: Sequence[str] = (),
+    axes: Collection[str] = (),
 ) -> Iterator[Axes]:  # fmt: skip
     """Axes to draw on in the style of this package, with its ticks in the end.
 
@@ -194,12 +199,22 @@ def frame(
             if dataset is not None:
                 set_title(ax, caption(dataset, 2, axes))
         yield ax
+        say_scale_once(ax)
         fix_ticks(ax)
+
+
+def say_scale_once(ax: Axes) -> None:
+    """Take the length scale b out of the title of *ax* where the label of an axis has it."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    labels = [text for each in figure.axes for text in (each.get_xlabel(), each.get_ylabel())]
+    if any(_SCALE_OF_LABEL.search(text) for text in labels):
+        ax.title.set_text(_SCALE_OF_TITLE.sub("", ax.get_title()))
 
 
 def extend_title(ax: Axes, words: str) -> None:
     """Write a further line below the fixed parameters in the title."""
-    set_title(ax, f"{ax.get_title('left')}\n{words}".strip())
+    set_title(ax, f"{ax.get_title()}\n{words}".strip())
 
 
 def contains(dataset: xr.Dataset, words: str, *names: str) -> None:
@@ -220,8 +235,8 @@ def color_bar(mesh: Any, ax: Axes, label: str, **options: Any) -> None:
 
 
 def set_title(ax: Axes, text: str) -> None:
-    """Write a title that begins at the left edge of *ax* and continues on a new line at the edge of the figure."""
-    ax.set_title(text, loc="left", fontsize=_RC["legend.fontsize"], wrap=True)
+    """Write the title of *ax*, which ``ax.set_title`` replaces; it continues on a new line at the edge of the figure."""
+    ax.set_title(text, loc="center", fontsize=_RC["legend.fontsize"], wrap=True)
 
 
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
@@ -290,16 +305,22 @@ def beam_text(attrs: Any) -> str:
     return ", ".join(words)
 
 
-def caption(dataset: xr.Dataset, lines: int = 1, axes: Sequence[str] = ()) -> str:
+def caption(dataset: xr.Dataset, lines: int = 1, axes: Collection[str] = ()) -> str:
     """Beam, modes, cycles of a map, fixed parameters and class of a run, in one or two lines.
 
     *axes* are the parameters along the axes, which are not fixed.
     """
     attrs = dataset.attrs
+    axes = {*axes, str(attrs.get("parameter", ""))}  # a parameter that is raised or swept
+    axes |= set(map(ratio_name, axes))
     frequency, length = (attrs.get(name, np.nan) for name in ("reference_frequency", "length_scale"))
     parts = ["" if any(name.startswith("beam") for name in axes) else beam_text(attrs)]
     how = [f"$N$ = {int(attrs['modes'])}"] if "modes" in attrs and "modes" not in axes else []
-    how += [f"{int(attrs['cycles'])} cycles"] if "response_class" in dataset and "cycles" in attrs else []
+    how += (
+        [f"{int(attrs['cycles'])} cycles"]
+        if {"response_class", "lower_threshold"} & set(dataset.variables) and "cycles" in attrs
+        else []
+    )
     for name, symbol, scale, unit in (
         ("frequency_ratio", r"\Omega", frequency, "Hz"),
         ("velocity_amplitude", "V", 2.0 * np.pi * frequency * length, "m/s"),
@@ -317,8 +338,12 @@ def caption(dataset: xr.Dataset, lines: int = 1, axes: Sequence[str] = ()) -> st
             and (value := fixed_value(dataset, row.short, axes)) is not None
         ):
             unit = row.quantity.unit
-            how.append(f"{value:.4g} µm" if unit == "um" else prefixed(value, unit, 4))
-    how += base_and_load(dataset)
+            how.append(
+                f"{value:.4g} {'µm' if unit == 'um' else unit}"
+                if unit in ("um", "g")
+                else prefixed(value, unit, 4)
+            )
+    how += base_and_load(dataset, axes)
     if "initial_well" in attrs and attrs["initial_well"] != "only":
         well = str(attrs["initial_well"])
         how.append(f"from {well}" if well[-1].isdigit() else f"from the {well} well")
@@ -328,7 +353,7 @@ def caption(dataset: xr.Dataset, lines: int = 1, axes: Sequence[str] = ()) -> st
     return f"{text}: {kind}" if isinstance(kind, str) and text else text
 
 
-def fixed_value(dataset: xr.Dataset, name: str, axes: Sequence[str] = ()) -> float | None:
+def fixed_value(dataset: xr.Dataset, name: str, axes: Collection[str] = ()) -> float | None:
     """Value of a parameter that is the same in the whole dataset; None if it differs or is not known."""
     if name in dataset.coords:
         return float(dataset[name].squeeze()) if dataset[name].size == 1 and name not in axes else None
@@ -338,21 +363,21 @@ def fixed_value(dataset: xr.Dataset, name: str, axes: Sequence[str] = ()) -> flo
 _GRAVITY = 9.80665
 
 
-def base_and_load(dataset: xr.Dataset) -> list[str]:
+def base_and_load(dataset: xr.Dataset, axes: Collection[str] = ()) -> list[str]:
     """The base excitation in Hz and g, and the load resistance of a harvester."""
     attrs, words = dataset.attrs, []
     omega = 2.0 * np.pi * attrs.get("reference_frequency", np.nan)
     unit = omega**2 * attrs.get("length_scale", np.nan)
     names = ("frequency_ratio", "acceleration_amplitude")
     for name in (*(f"base_excitation_{each}" for each in names), "harvester_resistance"):
-        if (value := fixed_value(dataset, name)) is None:
+        if (value := fixed_value(dataset, name, axes)) is None:
             continue
         if name.endswith("resistance"):
             words.append(f"$R$ = {prefixed(value, 'Ω')}")
         elif name.endswith("ratio") and np.isfinite(omega):
             words.append(f"base {prefixed(value * omega / (2.0 * np.pi), 'Hz')}")
         elif name.endswith("amplitude") and np.isfinite(unit):
-            words.append(f"{value * unit / _GRAVITY:.3g} $g$")
+            words.append(f"{float(f'{value * unit / _GRAVITY:.3g}'):.6g} $g$")
     return words
 
 

@@ -10,9 +10,11 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from snapbeam.model.quasi_static import quasi_static_objection
-from snapbeam.plot.axes import dress, edges_of, positions, symbol_of
+from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of, tick_text
 from snapbeam.plot.map import plot_response_map, quasi_static_along
 from snapbeam.plot.style import contains, extend_title, frame
+from snapbeam.plot.units import in_units, ratio_along
+from snapbeam.util.status_codes import wells_of
 from snapbeam.util.validation import InputError, checked
 
 if TYPE_CHECKING:
@@ -63,6 +65,7 @@ def plot_threshold(
     >>> ax = sb.plot.plot_threshold(dataset)
     """
     contains(dataset, "threshold curve", *_NEEDED)
+    dataset = in_units(dataset)
     dims = [str(name) for name in dataset["lower_threshold"].squeeze().dims]
     if not dims:  # one threshold: the classes along its parameter
         ax = plot_response_map(dataset, ax, legend=legend)
@@ -88,10 +91,11 @@ def plot_threshold(
     with frame(ax, dataset, height=76.0) as ax:
         for curve, (color, dashes) in zip(curves, _STYLES, strict=False):
             _draw_curve(ax, curve, x, (color, dashes), _label(dataset, curve, others, raised))
-        known = raised == "velocity_amplitude" and along in ("frequency_ratio", "location")
+        (ratio, wide), (kind, high) = ratio_along(dataset, along), ratio_along(dataset, raised)
+        known = kind == "velocity_amplitude" and ratio in ("frequency_ratio", "location")
         quasi_static = quasi_static and known and quasi_static_objection(dataset.attrs) is None
         if quasi_static:
-            static = quasi_static_along(dataset, along, x)
+            static = high * quasi_static_along(dataset, ratio, x / wide)
             (line,) = ax.plot(x, static, color="black", linewidth=0.8, dashes=(4, 2))
         amplitude = dataset[raised].values
         upper = dataset["upper_threshold_max"].where(dataset["lower_threshold"].notnull(), -np.inf)
@@ -105,10 +109,10 @@ def plot_threshold(
             where = ": above the range" if static.min() > top else ""
             line.set_label(rf"quasi-static, $V_\mathrm{{QS1}}${where}")
         marks = _mark_no_threshold(ax, curves, x, edges)
-        if "cycles" in dataset.attrs:
-            step = float(np.max(np.diff(amplitude)))
-            cycles = int(dataset.attrs["cycles"])
-            extend_title(ax, f"{cycles} cycles, steps of {step:.2g} in {symbol_of(dataset, raised)}")
+        if is_geometric(amplitude):
+            extend_title(ax, f"steps of a factor of {amplitude[1] / amplitude[0]:.3g}")
+        elif amplitude.size > 1:
+            extend_title(ax, f"steps of {tick_text(dataset, raised, float(np.max(np.diff(amplitude))))}")
         if legend:
             handles, _ = ax.get_legend_handles_labels()
             first, always = dataset["lower_threshold"], dataset["upper_threshold"]
@@ -173,7 +177,10 @@ def _label(dataset: xr.Dataset, curve: xr.Dataset, others: list[str], raised: st
     """Legend label of a curve."""
     if others:
         value = curve[others[0]].item()
-        text = str(value) if isinstance(value, (int, str)) else f"{value:.4g}"
-        return f"{symbol_of(dataset, others[0])} = {text}"
-    modes = dataset.attrs.get("modes")
-    return f"lowest interwell {symbol_of(dataset, raised)}" if modes is None else f"$N$ = {int(modes)}"
+        symbol = symbol_of(dataset, others[0])
+        if isinstance(value, (int, str)):
+            return f"{symbol} = {value}"
+        text = tick_text(dataset, others[0], value, 4).partition(" in ")[0]
+        return f"{symbol} = {text}" if symbol else text
+    one = wells_of(dataset.attrs) == 1
+    return f"lowest {symbol_of(dataset, raised) or 'value'} {'with snap-through' if one else 'of an interwell response'}"

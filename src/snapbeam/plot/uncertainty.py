@@ -13,11 +13,11 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameters import PHYSICAL, lookup
 from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection
-from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
-from snapbeam.plot.map import quasi_static_along
+from snapbeam.plot.axes import axis_label, dress, edges_of, is_geometric, positions
+from snapbeam.plot.map import in_order, quasi_static_along
 from snapbeam.plot.style import (
     CLASS_COLORS,
     SERIES_COLORS,
@@ -27,6 +27,7 @@ from snapbeam.plot.style import (
     frame,
     legend_below,
 )
+from snapbeam.plot.units import in_units, ratio_along, ratio_name, scale_text
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, checked, shown
@@ -106,7 +107,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
                     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
                     axis.set_major_formatter("{x:g}")
                     axis.set_minor_formatter(NullFormatter())
-        legend_below(ax)
+        legend_below(ax, columns=1)
     return ax
 
 
@@ -121,7 +122,8 @@ def _errors(dataset: xr.Dataset, name: str, own: np.ndarray) -> np.ndarray | Non
 def _label(dataset: xr.Dataset, name: str) -> str:
     labels = dataset[name].attrs
     unit, words = str(labels.get("units", "1")), str(labels.get("long_name", name))
-    return f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
+    words = scale_text(dataset.attrs, words) if "over b" in words else words
+    return textwrap.fill(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}", 40)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -164,6 +166,7 @@ def plot_probability(
         Probabilities, increasing, each in (0, 1).
     """
     contains(dataset, "probabilities", "probability", "outcome")
+    dataset = in_units(dataset)
     known = [str(name) for name in dataset["outcome"].values]
     if outcome not in known:
         raise InputError(f"outcome = {shown(outcome)}: must be one of {', '.join(known)}")
@@ -176,12 +179,16 @@ def plot_probability(
         if len(dims) == 1:
             _line(data, ax, dims[0], outcome, levels)
         else:
+            dims = list(in_order(data, dims))
             _cells(data, ax, dims, outcome, levels)
         if measurements is not None and len(dims) == 2:
             for kind in ResponseClass:
                 own = measurements.response_class == kind
                 if own.any():
-                    x, y = (getattr(measurements, name)[own] for name in dims)
+                    x, y = (
+                        unit * getattr(measurements, ratio)[own]
+                        for ratio, unit in (ratio_along(data, name) for name in dims)
+                    )
                     ax.scatter(
                         x, y, s=12, color=CLASS_COLORS[kind],
                         edgecolors="black", linewidths=0.5, zorder=3, label=kind.label,
@@ -260,6 +267,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
         Whether to draw V_QS1 (Eq. 21) too, over frequency ratio or location.
     """
     contains(dataset, "quantile thresholds", "threshold", "quantile")
+    dataset = in_units(dataset)
     data = dataset.squeeze([name for name in dataset["is_monotonic"].dims if dataset.sizes[name] == 1])
     dims = [str(name) for name in data["is_monotonic"].dims]
     if len(dims) != 1 or "point" in dims:
@@ -271,8 +279,13 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     along, raised = dims[0], str(data.attrs["parameter"])
     if quasi_static and (objection := quasi_static_objection(data.attrs)) is not None:
         raise InputError(f"quasi_static with {objection}; leave quasi_static out")
-    if quasi_static and along not in ("location", "frequency_ratio"):
-        raise InputError(f"quasi_static over {along}: is known over location and frequency_ratio")
+    ratio, wide = ratio_along(data, along)
+    if quasi_static and (
+        ratio not in ("location", "frequency_ratio") or ratio_name(raised) != "velocity_amplitude"
+    ):
+        raise InputError(
+            f"quasi_static of {raised} over {ratio}: is known of velocity_amplitude over location and frequency_ratio"
+        )
     bottom, top = (float(each) for each in data.attrs["bounds"])
     x, _ = positions(data, along)
     with frame(ax, dataset, height=76.0, axes=(raised,)) as ax:
@@ -283,7 +296,10 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
             look: dict[str, Any] = {"linestyle": dashes, "color": color, "linewidth": 1.1}
             ax.plot(x, one["threshold"].values, label=f"P = {level:g}", **look)
         if quasi_static:
-            line = quasi_static_along(data, along, x)
+            line = quasi_static_along(data, ratio, x / wide)
+            if raised != "velocity_amplitude":  # in m/s
+                omega = 2.0 * np.pi * float(data.attrs["reference_frequency"])
+                line = PHYSICAL["drive.velocity_m_s"].unit_of(float(data.attrs["length_scale"]), omega) * line
             ax.plot(
                 x, line, color="black", linewidth=0.8, dashes=(4, 2), label=r"quasi-static, $V_\mathrm{QS1}$"
             )
@@ -292,7 +308,10 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
             middle = data["threshold"].sel(quantile=0.5, method="nearest").values
             ax.plot(x[falls], middle[falls], "x", color="black", markersize=4, label="not monotone")
         dress(ax.xaxis, data, along)
-        ax.set(xlim=x[[0, -1]], ylabel=f"Threshold of {symbol_of(data, raised)}")
+        ends = data.drop_vars(raised, errors="ignore").assign_coords({raised: (raised, [bottom, top])})
+        dress(ax.yaxis, ends, raised)
+        label = axis_label(ends, raised)
+        ax.set(xlim=x[[0, -1]], ylabel=textwrap.fill(f"Threshold: {label[:1].lower()}{label[1:]}", 44))
         reach = np.nanmax(np.where(np.isfinite(data["threshold_high"]), data["threshold_high"], np.nan))
         ax.set_ylim(min(0.0, bottom), min(top, 1.08 * float(reach)) if np.isfinite(reach) else top)
         share = 100.0 * float(data.attrs.get("confidence", 0.95))
@@ -360,11 +379,14 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
 def _name(data: xr.Dataset, at: int) -> str:
     """Label of a bar: the parameter and, for a local analysis, its step with unit."""
     name = str(data["parameter"].values[at])
-    step = "step" in data and _with_unit(float(data["step"][at]), lookup(name).quantity.unit, 2)
+    size = float(data["step"][at]) if "step" in data else 0.0  # 0 where it is not known
+    step = size and _with_unit(size, lookup(name).quantity.unit, 2)
     return f"{_words(name)}\n± {step}" if step else _words(name)
 
 
 def _words(name: str) -> str:
+    if name in PHYSICAL:
+        return PHYSICAL[name].words
     section, text = split_name(name)
     return f"{'contact ' if section == 'contact' and lookup(name).kinds else ''}{text.replace('_', ' ')}"
 

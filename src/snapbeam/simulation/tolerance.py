@@ -138,6 +138,7 @@ def perturbation_growth(
     )
     attrs = {
         "title": "perturbation growth of a run",
+        "length_scale": system.scale.length,
         "perturbation": size,
         "step": plan.step,
         "order": plan.order,

@@ -29,6 +29,7 @@ _TIME_RESPONSE, _FREQUENCY_RESPONSE, _COHERENCE = 1, 4, 6
 def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
     """Return a dataset as a data frame: one row for each point of the dimensions that most variables have.
 
+    Of a threshold there is a row for each value of the parameter at each point, with the threshold of the point.
     A variable with one dimension more, such as ``modal_amplitude``, has a column for each of its values:
     ``modal_amplitude_1``, ``modal_amplitude_2``.  Other variables are left out; ``attrs["left_out"]`` contains their
     names.
@@ -58,6 +59,9 @@ def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
     if not of_dims:
         raise InputError("dataset: must have a variable with a dimension; a table needs rows")
     main = of_dims.most_common(1)[0][0]
+    # of a threshold a row for each value of the parameter that is raised
+    main = next((dims for dims in of_dims if dataset.attrs.get("parameter") in dims), main)
+    raised = dataset.attrs.get("parameter") in main
     columns: dict[str, Any] = {}
     left_out = []
     names = [*main, *(name for name in dataset.coords if name not in main), *dataset.data_vars]
@@ -71,8 +75,12 @@ def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
         else:
             values, dims, unit = variable.values, variable.dims, str(variable.attrs.get("units", "1"))
         end = f" ({unit})" if units and unit not in ("1", "") else ""
+        if units and not end and variable is not None:
+            end = _divisor(variable.attrs, dataset.attrs)
         more = [dim for dim in dims if dim not in main]
-        if not dims or (not set(dims) & set(main)):
+        if not dims and raised and name in dataset.data_vars:
+            columns[name + end] = np.full(int(np.prod(shape)), values)
+        elif not dims or (not set(dims) & set(main)):
             if name in dataset.data_vars:
                 left_out.append(name)
         elif not more:
@@ -91,6 +99,17 @@ def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
     frame = pd.DataFrame(columns)
     frame.attrs["left_out"] = left_out
     return frame
+
+
+def _divisor(labels: Any, attrs: Any) -> str:
+    """What the values of a variable are over, in a unit of the SI, as the end of a column's name; empty if over nothing."""
+    words = str(labels.get("long_name", ""))
+    length, frequency = attrs.get("length_scale"), attrs.get("reference_frequency")
+    if "over b omega_1^2" in words or "over b" not in words or length is None:
+        return ""
+    if "over b omega_1" not in words:
+        return f" (over {float(length):.9g} m)"
+    return "" if frequency is None else f" (over {2.0 * np.pi * float(frequency) * float(length):.9g} m/s)"
 
 
 def write_table(dataset: xr.Dataset, path: str | os.PathLike[str]) -> list[str]:

@@ -52,7 +52,7 @@ def draw(results: Results, measurements: str | os.PathLike[str] | None = None) -
             )
             cycles = int(short[name].attrs["cycles"])
             below.set_title(
-                f"changed since {cycles} cycles: {100.0 * changed.mean():.1f} % of points", loc="left"
+                f"changed since {cycles} cycles: {100.0 * changed.mean():.1f} % of points", loc="center"
             )
             above.set_xlabel("")
         for ax in axes[:, 1]:

@@ -119,7 +119,7 @@ def draw(results: Results) -> Figure:
             plot_response_map(
                 after.assign(response_class=after.response_class.where(changed)), ax, legend=False
             )
-            ax.set_title(f"{words}: {100.0 * changed.mean():.1f} % changed", loc="left")
+            ax.set_title(f"{words}: {100.0 * changed.mean():.1f} % changed", loc="center")
             drawn.append(ax)
         for ax in axes[:, 1]:
             ax.set_ylabel("")

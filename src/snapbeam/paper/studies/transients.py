@@ -49,7 +49,7 @@ def draw(results: Results) -> Figure:
             ax.set_title(
                 f"$N$ = {int(after.attrs['modes'])}: {100.0 * changed.mean():.1f} % changed from "
                 f"{int(before.attrs['cycles'])} to {int(after.attrs['cycles'])} cycles",
-                loc="left",
+                loc="center",
             )
         axes[1].set_ylabel("")
         panel_letters(axes)
