@@ -184,7 +184,7 @@ def periodic_orbit(
     *,
     phase: float | None = None,
     transient: int = 0,
-    tolerance: float = 1e-11,
+    tolerance: float = 1e-10,
     iterations: int = 40,
     deflate: Sequence[PeriodicOrbit] = (),
 ) -> PeriodicOrbit:
