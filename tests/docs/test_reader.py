@@ -14,7 +14,6 @@ from test_tutorials import follow
 
 ROOT = Path(__file__).parents[2]
 PAGES = {path.stem: path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").glob("*.md"))}
-PAGES.pop("contributing")  # the file above it
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 WRITES = {
     "-o", "--output", "--plot", "--export", "--json", "--picture", "--video", "--report", "--drive-output", "--checkpoint",
@@ -32,7 +31,6 @@ OWN = {
     "faq": "answers about files of the reader",
     "explore": "maps and results of the reader",
     "reproduction": "data of the repository",
-    "contributing": "commands of the repository",
     "finite_elements": "matrices from another program",
 }
 """Pages on files that the reader has, with what they are."""
