@@ -588,7 +588,7 @@ def pages() -> dict[str, Any]:
     """Functions that write the second part of a page, by the name of the page."""
     return {
         "parameters": parameter_tables, "variables": lambda: variable_tables() + "\n" + status_tables(),
-        "command_line": command_line, "support": support_tables, "api": interface_tables,
+        "command_line": command_line, "systems": support_tables, "api": interface_tables,
     }  # fmt: skip
 
 

@@ -27,10 +27,9 @@ CODE = [
     "getting-started.md",
     "long_maps.md",
     "reproduction.md",
-    "states.md",
+    "runs.md",
     "sweeps.md",
     "index.md",
-    "systems.md",
     "variables.md",
     pytest.param("base_and_load.md", marks=pytest.mark.slow),
     pytest.param("basins.md", marks=pytest.mark.slow),
@@ -40,7 +39,7 @@ CODE = [
     pytest.param("harvesters.md", marks=pytest.mark.slow),
     pytest.param("lifetimes.md", marks=pytest.mark.slow),
     pytest.param("orbits.md", marks=pytest.mark.slow),
-    pytest.param("questions.md", marks=pytest.mark.slow),
+    pytest.param("systems.md", marks=pytest.mark.slow),
     pytest.param("strikers.md", marks=pytest.mark.slow),
     pytest.param("finite_elements.md", marks=pytest.mark.slow),
 ]
@@ -251,7 +250,7 @@ def test_every_page_is_in_the_tree():
 
 
 @pytest.mark.parametrize("name", [
-    "api", "parameters", "variables", "command_line", "support",
+    "api", "parameters", "variables", "command_line", "systems",
 ])  # fmt: skip
 def test_tables_of_pages_are_those_of_the_program(name):
     """``python docs/_ext/reference.py`` writes them again."""
@@ -295,7 +294,7 @@ def test_crossings_end_runs_that_energy_does_not(name):
 
 @pytest.mark.slow
 def test_a_proven_well_does_not_prove_the_class():
-    """The page of questions: after more cycles no proven well is another one, while the class may become transient."""
+    """The page on frequent questions: after more cycles no proven well is another one, while the class may become transient."""
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
         contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
