@@ -37,7 +37,6 @@ CODE = [
     pytest.param("design.md", marks=pytest.mark.slow),
     pytest.param("exponents.md", marks=pytest.mark.slow),
     pytest.param("harvesters.md", marks=pytest.mark.slow),
-    pytest.param("lifetimes.md", marks=pytest.mark.slow),
     pytest.param("orbits.md", marks=pytest.mark.slow),
     pytest.param("systems.md", marks=pytest.mark.slow),
     pytest.param("strikers.md", marks=pytest.mark.slow),
@@ -52,11 +51,10 @@ ELSEWHERE = {
     "task_arch.md",
     "task_harvester.md",
     "tutorial_beam.md",
-    "tutorial_sweep.md",
     "tutorial_waveform.md",
 }
 """Pages that other tests run: ``tests/solver/test_extending.py`` and ``test_tutorials.py``."""
-NEEDS_FILES = ('open_dataset("map.nc")', 'open_recording("test.cihx"', 'open_recording("wide.cihx"')
+NEEDS_FILES = ('open_dataset("map.nc")', 'open_dataset("night.nc")', 'open_recording("test.cihx"', 'open_recording("wide.cihx"')
 """Beginnings of blocks that read a file which a command or a camera made."""
 SMALLER = {"modes=32": "modes=2", "4.0, 128)": "4.0, 3)", "0.65, 80)": "0.65, 3)"}
 """The map of the page on long maps, with fewer modes and points."""

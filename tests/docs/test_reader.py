@@ -28,7 +28,6 @@ REFERENCE = {"command_line", "parameters", "variables", "api"}
 OWN = {
     "experiment": "recordings and tables of the reader's laboratory",
     "measurement_diagnostics": "recordings of the reader",
-    "faq": "answers about files of the reader",
     "explore": "maps and results of the reader",
     "reproduction": "data of the repository",
     "finite_elements": "matrices from another program",
