@@ -180,6 +180,19 @@ def summarise_claims(app: Any) -> None:
     (_HERE / "_generated" / "claims.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def summarise_validation(app: Any) -> None:
+    """List for each source of published numbers how many are compared, and the maximum difference with its remark."""
+    rows: dict[str, list[tuple[float, str]]] = {}
+    for line in (DATA / "validation.md").read_text(encoding="utf-8").splitlines()[2:]:
+        source, _, _, _, difference, remark = (cell.strip() for cell in line.split("|")[1:-1])
+        rows.setdefault(source, []).append((abs(float(difference.removeprefix("below "))), remark))
+    lines = ["| source | quantities | maximum difference | remark on the maximum |", "| --- | --- | --- | --- |"]
+    for source, found in rows.items():
+        difference, remark = max(found)
+        lines.append(f"| {source} | {len(found)} | {difference:.0e} | {remark} |")
+    (_HERE / "_generated" / "validation.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def link_gallery(app: Any, name: str, source: list[str]) -> None:
     """Lead links of a page to scripts of the gallery to the pages that show them."""
     source[0] = re.sub(r"\]\(\.\./examples/(ex\d\d_\w+)\.py\)", r"](gallery/\1.rst)", source[0])
@@ -197,5 +210,6 @@ def setup(app: Any) -> None:
     """Connect to Sphinx."""
     app.connect("builder-inited", draw_paper)
     app.connect("builder-inited", summarise_claims)
+    app.connect("builder-inited", summarise_validation)
     app.connect("source-read", link_gallery)
     app.connect("doctree-read", with_dashes)

@@ -397,7 +397,7 @@ def table(name: str) -> list[list[str]]:
 
 def test_numbers_of_the_diagnostics():
     """The page states the counts of the stored tables."""
-    page = " ".join((ROOT / "docs" / "verification_methods.md").read_text(encoding="utf-8").split())
+    page = " ".join((ROOT / "docs" / "verification.md").read_text(encoding="utf-8").split())
     ends = [row[1] for row in table("mistakes.md") if row[1] != "Result"]
     counts = [ends.count(end) for end in ("right", "flagged", "refused")]
     assert sum(counts) == len(ends)
