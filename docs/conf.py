@@ -189,7 +189,7 @@ def summarise_validation(app: Any) -> None:
     lines = ["| source | quantities | maximum difference | remark on the maximum |", "| --- | --- | --- | --- |"]
     for source, found in rows.items():
         difference, remark = max(found)
-        lines.append(f"| {source} | {len(found)} | {difference:.0e} | {remark} |")
+        lines.append(f"| {source} | {len(found)} | {'below 1e-6' if difference == 1e-6 else f'{difference:.0e}'} | {remark} |")
     (_HERE / "_generated" / "validation.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -418,6 +418,6 @@ def test_lifetimes_of_the_pages():
     """Three pages round the lifetimes of the four points with 32 modes."""
     values = [float(row[1]) for row in table("lifetimes.md") if re.match(r"\(\d", row[0])]
     first, last = (round(value, -1) for value in (min(values), max(values)))
-    for name in ("chaos", "exponents", "studies"):
+    for name in ("chaos", "exponents", "reproduction"):
         page = " ".join((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8").split())
         assert f"about {first:.0f} to {last:.0f} cycles" in page, name
