@@ -280,14 +280,8 @@ def _command(
     return parts
 
 
-_INTERFACE = {
-    "Basic": ("system", "contact", "excitation", "forces", "runs", "sweeps", "figures", "errors"),
-    "Advanced": (
-        "orbits", "basins", "probability", "design", "figure_style", "lab_recordings", "lab_signals", "lab_comparison",
-        "lab_figures", "parameters", "paper",
-    ),
-}  # fmt: skip
-"""Pages of the interface: those that most scripts need, and the others."""
+_INTERFACE = ("system", "excitation", "runs", "dynamics", "uncertainty", "figures", "lab", "paper")
+"""Pages of the interface."""
 
 
 def interface_tables() -> str:
@@ -295,22 +289,27 @@ def interface_tables() -> str:
     from importlib import import_module
 
     docs = Path(__file__).parents[1]
-    parts = []
-    for caption, pages in _INTERFACE.items():
-        rows = []
-        for page in pages:
-            text = (docs / f"api_{page}.md").read_text(encoding="utf-8")
+    rows = []
+    for page in _INTERFACE:
+        text = (docs / f"api_{page}.md").read_text(encoding="utf-8")
+        title = text.partition("\n")[0].removeprefix("# ")
+        for heading, part in re.findall(r"^##? (.*)\n((?:(?!## ).*\n)*)", text, re.MULTILINE):
             found: list[str] = []
             for kind, name, members in re.findall(
-                r"^\.\. (auto\w+|py:data):: (\S+)$(?:\n   :members:(.*)$)?", text, re.MULTILINE
+                r"^\.\. (auto\w+|py:data):: (\S+)$(?:\n   :members:(.*)$)?", part, re.MULTILINE
             ):
                 module = kind == "automodule"
                 listed = [each.strip() for each in members.split(",") if each.strip()] if module else []
                 found += listed or (import_module(name).__all__ if module else [name.rpartition(".")[2]])
-            rows.append((f"[{text.partition(chr(10))[0].removeprefix('# ')}](api_{page}.md)", _listed(found)))
-        parts.append(f"## {caption}\n\n" + _table(("page", "names"), rows))
-    tree = "\n".join(f"api_{page}" for pages in _INTERFACE.values() for page in pages)
-    return "\n".join([*parts, f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{tree}\n```"])
+            if found:
+                anchor = (
+                    ""
+                    if heading == title
+                    else "#" + re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
+                )
+                rows.append((f"[{heading}](api_{page}.md{anchor})", _listed(found)))
+    tree = "\n".join(f"api_{page}" for page in _INTERFACE)
+    return _table(("page", "names"), rows) + f"\n```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{tree}\n```"
 
 
 def _paragraphs(text: str) -> list[str]:
