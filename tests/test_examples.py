@@ -13,10 +13,8 @@ DEAR = {
     "ex23_extended_models",
     "ex24_dynamics",
     "ex25_design",
-    "ex26_backbone",
     "ex27_bifurcation_curves",
     "ex30_experiment",
-    "ex42_the_paper",
 }
 """Examples that take seconds."""
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("ex*.py"))

@@ -75,8 +75,6 @@ def follow(name: str, capsys: pytest.CaptureFixture[str], end: str = "") -> None
                 "howto_harvester",
                 "mems_arch",
                 "mems_switch",
-                "task_arch",
-                "task_harvester",
             )
         ),
     ],
