@@ -9,7 +9,6 @@ import matplotlib.pyplot as plt
 import pytest
 
 DEAR = {
-    "ex41_steel_beam",
     "ex23_extended_models",
     "ex24_dynamics",
     "ex25_design",

@@ -41,7 +41,8 @@ _SECTIONS = {
     "drive": "The motion of the striker, selected by `type`: {drives}. "
     "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples can have `file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest. "
-    "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples or a spectrum can have "
+    "Keys that are not in the second table are those of [`[drive]`](#drive), with the same unit, limits, default and level; in datasets their names "
+    "begin with `base_excitation_`. [Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples or a spectrum can have "
     "`file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
     "constant.",
@@ -91,6 +92,7 @@ def parameter_tables() -> str:
         "harvesters": _listed(HARVESTERS), "forces": _listed(FORCES), "local_forces": _listed(LOCAL_FORCES),
     }  # fmt: skip
     parts = []
+    of_drives: dict[str, tuple[str, ...]] = {}
     for section, words in _SECTIONS.items():
         rows = []
         for name, row in parameters().items():
@@ -109,12 +111,17 @@ def parameter_tables() -> str:
             )
             level = "run" if row.is_run else "model"
             rows.append((f"`{key}`", meaning, unit, limits, shown or "–", level, owners))
+        keys = [row[0] for row in rows]
+        if section == "drive":
+            of_drives = {row[0]: row[2:6] for row in rows}
+        elif section == "base_excitation":  # a motion of the base has the keys of that of a tip
+            rows = [row for row in rows if of_drives.get(row[0]) != row[2:6]]
         header = ["key", "meaning", "unit", "allowed", "default", "level", "types"]
         if not any(row[-1] for row in rows):
             header, rows = header[:-1], [row[:-1] for row in rows]
         text = f"## [{section}]\n\n{words.format(**listed)}\n\n"
         if section in types:
-            text += _keys_by_type(types[section], [row[0] for row in rows]) + "\n"
+            text += _keys_by_type(types[section], keys) + "\n"
         parts.append(text + _table(header, rows))
     return "\n".join([*parts, _physical()])
 

@@ -27,7 +27,6 @@ REFERENCE = {"command_line", "parameters", "variables", "api"}
 """Written from the program; each example of a command stands alone."""
 OWN = {
     "experiment": "recordings and tables of the reader's laboratory",
-    "measurement_diagnostics": "recordings of the reader",
     "explore": "maps and results of the reader",
     "reproduction": "data of the repository",
     "finite_elements": "matrices from another program",
