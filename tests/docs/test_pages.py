@@ -382,7 +382,16 @@ def test_glossary_is_sorted_and_complete():
 TEXTS = [
     *(
         ROOT / name
-        for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "benchmarks/README.md")
+        for name in (
+            "README.md",
+            "CONTRIBUTING.md",
+            "CHANGELOG.md",
+            "SECURITY.md",
+            "benchmarks/README.md",
+            "examples/lecture.md",
+            "docs/data/studies.md",
+            "docs/data/verification.md",
+        )
     ),
     *sorted((ROOT / "docs").glob("*.md")),
 ]
