@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import importlib.util
 import logging
@@ -126,6 +127,74 @@ def link_errors_only(self: Any, rolename: str, domain: str, target: str, *more: 
 PyXrefMixin.make_xrefs = link_errors_only
 
 
+_PREAMBLES = {
+    page.stem: (
+        re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+        or [""]
+    )[0]
+    for page in Path(__file__).parent.glob("api_*.md")
+}
+"""Beginning of the examples on each page of the reference, by page."""
+_BRIEF = tuple(
+    name
+    for page in Path(__file__).parent.glob("api_*.md")
+    for block in page.read_text(encoding="utf-8").split("% brief\n")[1:]
+    for name in re.findall(r"^\.\. auto\w+:: (\S+)", block.partition("\n## ")[0], re.MULTILINE)
+)
+"""Names and modules of which the reference has signature and summary only."""
+
+
+def _statements(code: str) -> set[str]:
+    """Statements of a preamble in one form, and the one that makes its system at once."""
+    body = ast.parse(code).body
+    made = {node.targets[0].id: node.value for node in body if isinstance(node, ast.Assign)}
+    at_once = f"system = {ast.unparse(made['system'])}" if "system" in made else ""
+    for name in ("model", "shaker"):
+        if name in made:
+            at_once = re.sub(rf"\b{name}\b(?!=)", ast.unparse(made[name]), at_once)
+    return {*map(ast.unparse, body), at_once}
+
+
+def shorten(app: Any, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+    """Leave out of a docstring what the page states once, and all but the summary of names that are listed only."""
+    if name in _BRIEF or name.startswith(tuple(f"{each}." for each in _BRIEF)):
+        lines[:] = lines[: lines.index("")] if "" in lines else lines
+        return
+    code = _PREAMBLES.get(app.env.docname, "")
+    stated = _statements(code)
+    bound = {
+        each.asname or each.name
+        for node in ast.walk(ast.parse(code))
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for each in node.names
+    }
+    kept: list[str] = []
+    leading = False
+    position = 0
+    while position < len(lines):
+        end = position + 1
+        if lines[position].lstrip().startswith(">>> "):
+            while end < len(lines) and lines[end].lstrip().startswith("..."):
+                end += 1
+            try:
+                node = ast.parse("\n".join(line.lstrip()[4:] for line in lines[position:end])).body[0]
+            except (SyntaxError, IndexError):
+                node = None
+            imported = (
+                isinstance(node, (ast.Import, ast.ImportFrom))
+                and {each.asname or each.name for each in node.names} <= bound
+            )
+            if imported or (leading and node is not None and ast.unparse(node) in stated):
+                position = end
+                continue
+            leading = False
+        elif lines[position].strip() == "Examples":
+            leading = True
+        kept += lines[position:end]
+        position = end
+    lines[:] = kept
+
+
 def with_dashes(app: Any, doctree: Any) -> None:
     """Write a dash between an error and its description."""
     for text in list(doctree.findall(nodes.Text)):
@@ -180,6 +249,24 @@ def summarise_claims(app: Any) -> None:
     (_HERE / "_generated" / "claims.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def summarise_validation(app: Any) -> None:
+    """List for each source of published numbers how many are compared, and the maximum difference with its remark."""
+    rows: dict[str, list[tuple[float, str]]] = {}
+    for line in (DATA / "validation.md").read_text(encoding="utf-8").splitlines()[2:]:
+        source, _, _, _, difference, remark = (cell.strip() for cell in line.split("|")[1:-1])
+        rows.setdefault(source, []).append((abs(float(difference.removeprefix("below "))), remark))
+    lines = [
+        "| source | quantities | maximum difference | remark on the maximum |",
+        "| --- | --- | --- | --- |",
+    ]
+    for source, found in rows.items():
+        difference, remark = max(found)
+        lines.append(
+            f"| {source} | {len(found)} | {'below 1e-6' if difference == 1e-6 else f'{difference:.0e}'} | {remark} |"
+        )
+    (_HERE / "_generated" / "validation.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def link_gallery(app: Any, name: str, source: list[str]) -> None:
     """Lead links of a page to scripts of the gallery to the pages that show them."""
     source[0] = re.sub(r"\]\(\.\./examples/(ex\d\d_\w+)\.py\)", r"](gallery/\1.rst)", source[0])
@@ -197,5 +284,7 @@ def setup(app: Any) -> None:
     """Connect to Sphinx."""
     app.connect("builder-inited", draw_paper)
     app.connect("builder-inited", summarise_claims)
+    app.connect("builder-inited", summarise_validation)
     app.connect("source-read", link_gallery)
     app.connect("doctree-read", with_dashes)
+    app.connect("autodoc-process-docstring", shorten, priority=400)  # before Napoleon

@@ -25,8 +25,8 @@ from PIL import Image
 DOCS = Path(__file__).parents[1]
 EXAMPLES = ("ex24_dynamics", "ex25_design", "ex43_cheapest_place")
 PAGES = (
-    "index", "getting-started", "tutorial_beam", "tutorial_sweep", "mems_arch", "mems_switch",
-    "howto_harvester", "task_arch", "task_harvester", "beams", "orbits", "basins", "design",
+    "index", "getting-started", "tutorial_beam", "long_maps", "mems_arch", "mems_switch",
+    "howto_harvester", "beams", "orbits", "basins", "design",
 )  # fmt: skip
 """Pages with figures ``images/PAGE_1.png``, ``images/PAGE_2.png`` and so on, each of the last block above it that drew one."""
 

@@ -41,7 +41,8 @@ _SECTIONS = {
     "drive": "The motion of the striker, selected by `type`: {drives}. "
     "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples can have `file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest. "
-    "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples or a spectrum can have "
+    "Keys that are not in the second table are those of [`[drive]`](#drive), with the same unit, limits, default and level; in datasets their names "
+    "begin with `base_excitation_`. [Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples or a spectrum can have "
     "`file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
     "constant.",
@@ -91,6 +92,7 @@ def parameter_tables() -> str:
         "harvesters": _listed(HARVESTERS), "forces": _listed(FORCES), "local_forces": _listed(LOCAL_FORCES),
     }  # fmt: skip
     parts = []
+    of_drives: dict[str, tuple[str, ...]] = {}
     for section, words in _SECTIONS.items():
         rows = []
         for name, row in parameters().items():
@@ -109,12 +111,17 @@ def parameter_tables() -> str:
             )
             level = "run" if row.is_run else "model"
             rows.append((f"`{key}`", meaning, unit, limits, shown or "–", level, owners))
+        keys = [row[0] for row in rows]
+        if section == "drive":
+            of_drives = {row[0]: row[2:6] for row in rows}
+        elif section == "base_excitation":  # a motion of the base has the keys of that of a tip
+            rows = [row for row in rows if of_drives.get(row[0]) != row[2:6]]
         header = ["key", "meaning", "unit", "allowed", "default", "level", "types"]
         if not any(row[-1] for row in rows):
             header, rows = header[:-1], [row[:-1] for row in rows]
         text = f"## [{section}]\n\n{words.format(**listed)}\n\n"
         if section in types:
-            text += _keys_by_type(types[section], [row[0] for row in rows]) + "\n"
+            text += _keys_by_type(types[section], keys) + "\n"
         parts.append(text + _table(header, rows))
     return "\n".join([*parts, _physical()])
 
@@ -280,14 +287,8 @@ def _command(
     return parts
 
 
-_INTERFACE = {
-    "Basic": ("system", "contact", "excitation", "forces", "runs", "sweeps", "figures", "errors"),
-    "Advanced": (
-        "orbits", "basins", "probability", "design", "figure_style", "lab_recordings", "lab_signals", "lab_comparison",
-        "lab_figures", "parameters", "paper",
-    ),
-}  # fmt: skip
-"""Pages of the interface: those that most scripts need, and the others."""
+_INTERFACE = ("system", "excitation", "runs", "dynamics", "uncertainty", "figures", "lab", "paper")
+"""Pages of the interface."""
 
 
 def interface_tables() -> str:
@@ -295,22 +296,27 @@ def interface_tables() -> str:
     from importlib import import_module
 
     docs = Path(__file__).parents[1]
-    parts = []
-    for caption, pages in _INTERFACE.items():
-        rows = []
-        for page in pages:
-            text = (docs / f"api_{page}.md").read_text(encoding="utf-8")
+    rows = []
+    for page in _INTERFACE:
+        text = (docs / f"api_{page}.md").read_text(encoding="utf-8")
+        title = text.partition("\n")[0].removeprefix("# ")
+        for heading, part in re.findall(r"^##? (.*)\n((?:(?!## ).*\n)*)", text, re.MULTILINE):
             found: list[str] = []
             for kind, name, members in re.findall(
-                r"^\.\. (auto\w+|py:data):: (\S+)$(?:\n   :members:(.*)$)?", text, re.MULTILINE
+                r"^\.\. (auto\w+|py:data):: (\S+)$(?:\n   :members:(.*)$)?", part, re.MULTILINE
             ):
                 module = kind == "automodule"
                 listed = [each.strip() for each in members.split(",") if each.strip()] if module else []
                 found += listed or (import_module(name).__all__ if module else [name.rpartition(".")[2]])
-            rows.append((f"[{text.partition(chr(10))[0].removeprefix('# ')}](api_{page}.md)", _listed(found)))
-        parts.append(f"## {caption}\n\n" + _table(("page", "names"), rows))
-    tree = "\n".join(f"api_{page}" for pages in _INTERFACE.values() for page in pages)
-    return "\n".join([*parts, f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{tree}\n```"])
+            if found:
+                anchor = (
+                    ""
+                    if heading == title
+                    else "#" + re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
+                )
+                rows.append((f"[{heading}](api_{page}.md{anchor})", _listed(found)))
+    tree = "\n".join(f"api_{page}" for page in _INTERFACE)
+    return _table(("page", "names"), rows) + f"\n```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{tree}\n```"
 
 
 def _paragraphs(text: str) -> list[str]:
@@ -588,7 +594,7 @@ def pages() -> dict[str, Any]:
     """Functions that write the second part of a page, by the name of the page."""
     return {
         "parameters": parameter_tables, "variables": lambda: variable_tables() + "\n" + status_tables(),
-        "command_line": command_line, "support": support_tables, "api": interface_tables,
+        "command_line": command_line, "systems": support_tables, "api": interface_tables,
     }  # fmt: skip
 
 

@@ -14,7 +14,6 @@ from test_tutorials import follow
 
 ROOT = Path(__file__).parents[2]
 PAGES = {path.stem: path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").glob("*.md"))}
-PAGES.pop("contributing")  # the file above it
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 WRITES = {
     "-o", "--output", "--plot", "--export", "--json", "--picture", "--video", "--report", "--drive-output", "--checkpoint",
@@ -28,11 +27,8 @@ REFERENCE = {"command_line", "parameters", "variables", "api"}
 """Written from the program; each example of a command stands alone."""
 OWN = {
     "experiment": "recordings and tables of the reader's laboratory",
-    "measurement_diagnostics": "recordings of the reader",
-    "faq": "answers about files of the reader",
     "explore": "maps and results of the reader",
     "reproduction": "data of the repository",
-    "contributing": "commands of the repository",
     "finite_elements": "matrices from another program",
 }
 """Pages on files that the reader has, with what they are."""
@@ -160,7 +156,7 @@ def test_pages_of_the_change_log_exist() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["harvesters", "systems", "base_and_load"])
+@pytest.mark.parametrize("page", ["systems", "runs", "base_and_load"])
 def test_page_as_a_reader(page, tmp_path, monkeypatch, capsys) -> None:
     """Files, commands and scripts in their order, in an empty folder; the tutorials run in ``test_tutorials.py``."""
     monkeypatch.chdir(tmp_path)

@@ -16,9 +16,12 @@ from snapbeam.cli.parameter_options import LongReport
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def blocks(name: str) -> list[tuple[str, str]]:
-    """Kind and text of every fenced block of a page."""
+def blocks(name: str, end: str = "") -> list[tuple[str, str]]:
+    """Kind and text of every fenced block of a page, or of its part before a heading."""
     text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    if end:
+        assert f"\n{end}\n" in text
+        text = text.partition(f"\n{end}\n")[0]
     return re.findall(r"^```([\w{}]*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
@@ -34,10 +37,10 @@ def assert_shown(shown: str, printed: str, name: str) -> None:
         rest = rest[found[0] + 1 :]
 
 
-def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """Do what a page says, in the present folder."""
+def follow(name: str, capsys: pytest.CaptureFixture[str], end: str = "") -> None:
+    """Do what a page says, up to a heading, in the present folder."""
     printed, scope = "", {}
-    for kind, text in blocks(name):
+    for kind, text in blocks(name, end):
         file = re.match(r"# (\S+\.toml)\b", text)
         if kind == "toml" and file:
             Path(file[1]).write_text(text, encoding="utf-8")
@@ -72,8 +75,6 @@ def follow(name: str, capsys: pytest.CaptureFixture[str]) -> None:
                 "howto_harvester",
                 "mems_arch",
                 "mems_switch",
-                "task_arch",
-                "task_harvester",
             )
         ),
     ],
@@ -97,5 +98,5 @@ def test_tutorial_of_a_long_sweep(tmp_path, monkeypatch, capsys):
             raise KeyboardInterrupt
 
     monkeypatch.setattr(LongReport, "progress", interrupted)
-    follow("tutorial_sweep", capsys)
+    follow("long_maps", capsys, end="## Other parameters than those of the checkpoint")
     assert pressed

@@ -16,7 +16,7 @@ VERSIONS = {
     "src/snapbeam/_version.py": r'^(__version__ = ")([^"]+)(")$',
     "CITATION.cff": r"^(version: )(\S+)()$",
     "codemeta.json": r'^(  "version": ")([^"]+)(",)$',
-    "docs/citing.md": r"^(  version = \{)([^}]+)(\},)$",
+    "docs/getting-started.md": r"^(  version = \{)([^}]+)(\},)$",
 }
 """File and pattern; the second group is the version."""
 
@@ -66,7 +66,7 @@ def prepare(version: str, repository: str = "", day: str = "", root: Path = ROOT
     else:
         day = day or datetime.date.today().isoformat()
         _edit(changelog, r"^## Unreleased$", f"## {version} ({day})")
-        _edit(root / "docs" / "citing.md", r"^(  year    = \{)\d+", rf"\g<1>{day[:4]}")
+        _edit(root / "docs" / "getting-started.md", r"^(  year    = \{)\d+", rf"\g<1>{day[:4]}")
         _state_line(root / "CITATION.cff", r"^date-released: .*$", f"date-released: {day}", r"^version: \S+$")
         _state_line(
             root / "codemeta.json", r'^  "dateModified": .*$', f'  "dateModified": "{day}",',

@@ -42,7 +42,7 @@ def test_metadata_agree():
     )
     author = project["authors"][0]["name"]
     assert meta["author"][0]["name"] == author and f'name: "{author}"' in citation
-    bibtex = (ROOT / "docs" / "citing.md").read_text(encoding="utf-8")
+    bibtex = (ROOT / "docs" / "getting-started.md").read_text(encoding="utf-8")
     title = re.search(r'^title: "(.*)"$', citation, re.MULTILINE)
     assert title and f"title   = {{{title[1]}}}" in bibtex and f"{{{{{author}}}}}" in bibtex
     assert meta["referencePublication"] == project["urls"]["Paper"]
