@@ -145,3 +145,16 @@ def test_result_of_a_function_is_checked(function, message):
     """A function of the wrong result is refused by name."""
     with pytest.raises(InputError, match=message):
         sb.uncertainty.sobol_indices(function, 2, 64)
+
+
+def test_a_parameter_in_its_unit_has_the_derivative_of_its_ratio() -> None:
+    system, found = small_system(), {}
+    for name in ("drive.velocity_m_s", "drive.velocity_amplitude"):
+        varied = sb.uncertainty.ParameterUncertainty(of={name: sb.uncertainty.LogNormal(0.05)})
+        table = sb.uncertainty.sensitivity(
+            system, "peak_force", varied, samples=2, integration=sb.Integration(cycles=2)
+        )
+        found[name] = float(table.derivative[0])
+        assert float(table.step[0]) == pytest.approx(0.05 * system.get(name), rel=1e-2)
+    unit = system.get("drive.velocity_m_s") / system.get("drive.velocity_amplitude")
+    assert found["drive.velocity_m_s"] * unit == pytest.approx(found["drive.velocity_amplitude"], rel=1e-6)

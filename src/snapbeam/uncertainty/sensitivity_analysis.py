@@ -14,7 +14,7 @@ from scipy import special, stats
 from snapbeam.dynamics.flow import InitialConditions
 from snapbeam.dynamics.lifetimes import LifetimeSettings, lifetime_map
 from snapbeam.model.integration import Integration
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameters import lookup, ratio_of
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import STATISTICS, of_one_named
 from snapbeam.sweeps.compute import CheckpointOptions
@@ -663,7 +663,9 @@ def _local(
 
 def _width(trials: Trials, name: str) -> float:
     """Half of what a parameter differs by between the scores -1 and +1."""
-    nominal = np.full(2, trials.system.parameters.get(name, 0.0) or 0.0, dtype=np.float64)
+    system = trials.system
+    given = system.get(name) if ratio_of(name) in system.parameters else None  # a ratio, or one in its unit
+    nominal = np.full(2, 0.0 if given is None else given, dtype=np.float64)
     return 0.5 * float(np.ptp(trials.uncertainty.of[name].at(nominal, np.array([-1.0, 1.0]))))
 
 
