@@ -18,7 +18,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.model.contact.base import LAWS, LawProperties
+from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES, Drive, Timed
 from snapbeam.model.external_force import FORCES, ForceHistory
 from snapbeam.model.harvester import HARVESTERS, Harvester
@@ -352,7 +352,6 @@ def test_names_of_ones_own_are_taken() -> None:
         "_table": (1.0, 2.0),
         "steepest": lambda self: 1.0,
         "from_steel": classmethod(lambda cls: cls()),
-        "properties": LawProperties(smooth=False),
         "__module__": __name__,
     }
     assert type("Own", (sb.ContactLaw,), SPRING | body).hooks == sb.ContactLaw.hooks

@@ -97,10 +97,7 @@ class Stroboscope:
     @property
     def jumps(self) -> bool:
         """True if the derivatives of the map may jump, by a contact force that does, depends on the velocity or has a memory."""
-        laws = [each.law for each in self.system.contacts]
-        return any(
-            law.is_dissipative or not (law.properties.smooth and law.properties.tangent) for law in laws
-        )
+        return any(each.law.is_dissipative for each in self.system.contacts)
 
     @property
     def refined(self) -> Stroboscope:

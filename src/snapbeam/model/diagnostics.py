@@ -115,7 +115,7 @@ def _of_modes(model: ReducedModel, beam: Beam, striker: Striker | None) -> list[
     words = {"upper": "the upper well", "lower": "the lower well", "only": "the equilibrium"}
     name = words.get(model.reference_well, "a well")
     perfect = f"b/r = {level:.3g}: " if model.imperfection is None else ""
-    limit = " (of a clamped beam above 6.21)" if model.imperfection is None else ""
+    limit = " (of a clamped beam above about 6.2)" if model.imperfection is None else ""
     central = striker is None or abs(striker.location - 0.5) < _CENTRAL
     hint = ", which a striker at the centre does not excite" if central else ""
     return [

@@ -660,8 +660,7 @@ def _decisions(
 ) -> None:
     """Set the criteria of early termination of each run: crossings, energy and reach of the tip."""
     table["decide_crossings"], table["decide_energy"] = -1, -math.inf
-    properties = system.contact_law is None or system.contact_law.properties.energy_bound
-    if not integration.early_termination or not properties or len(system.contacts) > 1 or system.local_forces:
+    if not integration.early_termination or len(system.contacts) > 1 or system.local_forces:
         return
     if system.striker is not None and structure.wells_are_mirror_images:
         # elsewhere the class also depends on whether the other well is reached

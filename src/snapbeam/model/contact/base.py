@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -51,25 +50,11 @@ def _of_impact(function: Callable[[Any, float, float], float]) -> Callable[[Any,
     return checked
 
 
-@dataclass(frozen=True)
-class LawProperties:
-    """Properties that a contact law preserves; functions that need a missing one raise an error or switch it off."""
-
-    mirror: bool = True
-    """The mirror image of a run is a run."""
-    energy_bound: bool = True
-    """Untouched, the beam's energy only falls: which early termination needs."""
-    smooth: bool = True
-    """The force is continuous where contact begins and ends, so that tangents do not jump."""
-    tangent: bool = True
-    """Small changes of the state can be carried along."""
-
-
 class ContactLaw:
     """A law of contact between the striker's tip and the beam: a frozen dataclass in a file of its own.
 
     Its fields are quantities of scope *run*, each a positive number or zero.  Its physics are scalar functions
-    of numbers, which every solver compiles; ``law`` contains the numbers, by the names of the fields:
+    of numbers; ``law`` contains the numbers, by the names of the fields:
 
     - ``force(law, penetration)``: force on both, N, for a penetration > 0 (m);
     - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
@@ -101,12 +86,11 @@ class ContactLaw:
 
     hooks: ClassVar[tuple[str, ...]] = (
         "name", "force", "energy", "slope", "rate_dependent", "damping_coefficient", "memory", "yield_penetration",
-        "memory_after", "properties", "impact_duration", "time_scale",
+        "memory_after", "impact_duration", "time_scale",
     )  # fmt: skip
     """Names that are read of a law of one's own."""
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
-    properties: ClassVar[LawProperties] = LawProperties()
     impulsive: ClassVar[bool] = False
     """True if an impact has zero duration: a jump of the velocity instead of a force."""
     rate_dependent: ClassVar[bool] = False

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.model.contact.base import ContactLaw, LawProperties
+from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import InputError
 
@@ -58,7 +58,6 @@ class ElasticPlasticContact(ContactLaw):
 
     name = "elastic_plastic"
     memory = "indentation"
-    properties = LawProperties(tangent=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.model.contact.base import ContactLaw, LawProperties
+from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.loss import loss_number, preset_loss, restitution_of_loss
 from snapbeam.model.quantity import RUN, quantity
@@ -49,7 +49,6 @@ class HuntCrossley(ContactLaw):
 
     name = "hunt_crossley"
     rate_dependent = True
-    properties = LawProperties(tangent=False)
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.model.contact.base import ContactLaw, LawProperties
+from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import positive, within
 
@@ -55,7 +55,6 @@ class KelvinVoigt(ContactLaw):
 
     name = "kelvin_voigt"
     rate_dependent = True
-    properties = LawProperties(smooth=False, tangent=False)
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:

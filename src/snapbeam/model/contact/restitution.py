@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.model.contact.base import ContactLaw, LawProperties
+from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.quantity import RUN, quantity
 
 INSTEAD_OF_RESTITUTION = (
@@ -41,7 +41,6 @@ class Restitution(ContactLaw):
     )  # fmt: skip
 
     name = "restitution"
-    properties = LawProperties(smooth=False)
     impulsive = True
 
     @staticmethod
