@@ -74,7 +74,7 @@ class Ball:
     radius: float
 
     def holds(self, rows: _Array) -> NDArray[np.bool_]:
-        """Which states of shape (runs, d) are within, each by itself."""
+        """Mask of the states of shape (runs, d) that are within, each by itself."""
         away = rows - self.center
         total = np.zeros(len(rows))
         for column in self.factor.T:
@@ -123,7 +123,7 @@ class Cloud:
     reach: float
 
     def holds(self, rows: _Array) -> NDArray[np.bool_]:
-        """Which states lie among the points."""
+        """Mask of the states that lie among the points."""
         known = np.asarray(np.isfinite(rows).all(axis=1))
         away, _ = self.tree.query(np.where(known[:, None], rows, 0.0))
         found: NDArray[np.bool_] = known & (away <= self.reach)
@@ -204,7 +204,7 @@ class Attractors:
     check_periods: int
     """Periods over which a chaotic attractor was seen not to end."""
     termination_reason: str
-    """After how many periods the search stopped, by which rule, and why states are undecided."""
+    """Periods after which the search stopped, the rule that stopped it, and the reason why states are undecided."""
 
     @property
     def shares(self) -> _Array:
@@ -324,9 +324,9 @@ def find_attractors(
     check_periods : int
         Periods over which a chaotic attractor must not end.
     rng : int, numpy.random.Generator or None
-        Of the initial states: a seed; a generator, which gives one; None takes one from the system.
+        Seed of the initial states; a generator, which gives one; None takes one from the system.
     tolerance : float
-        Of the orbits, as in :func:`periodic_orbit`.
+        Tolerance of the orbits, as in :func:`periodic_orbit`.
     integration : Integration, optional
     progress : callable, optional
         Called as ``progress(done, total)`` with parts of the work; True writes a line to standard error.

@@ -417,20 +417,20 @@ def continuation(
     Parameters
     ----------
     orbit : PeriodicOrbit
-        Of :func:`periodic_orbit`, or of a branch.
+        Orbit to begin with, of :func:`periodic_orbit` or of a branch.
     name : str
         Parameter, by dotted name or the name in datasets.
     bounds : pair of float
         Minimum and maximum value.
     direction : {"up", "down"}
-        Which way the parameter goes at first.
+        Direction of the parameter at first.
     max_points : int
         Orbits at most.
     step, max_step : float
         First and maximum distance between orbits, in units of the well's amplitude for the state and of the range
         for the parameter; between 1e-8 and 1.
     tolerance : float
-        Of the orbits, as in :func:`periodic_orbit`.
+        Tolerance of the orbits, as in :func:`periodic_orbit`.
     progress : callable, optional
         Called as ``progress(done, total)`` with orbits, of which there are at most *max_points*; True writes a line to
         standard error.

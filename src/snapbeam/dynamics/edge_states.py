@@ -53,9 +53,9 @@ class EdgeState:
 
     flow: Flow
     states: _Array
-    """Once a period, shape (periods, d)."""
+    """States once a period, shape (periods, d)."""
     distance: _Array
-    """Between the two states that hold it, at each."""
+    """Distance between the two states that enclose it, once a period, shape (periods,)."""
     orbit: PeriodicOrbit | None
     """The unstable orbit that it comes to, if it comes to one."""
     termination_reason: str
@@ -117,12 +117,12 @@ def edge_tracking(
     u1, u2 : State or array_like of shape (d,)
         A state from which the beam does not leave its well within *horizon* periods, and one from which it does.
     periods : int
-        To follow the border for.
+        Number of periods for which the border is followed.
     horizon : int
         Periods after which the outcome is evaluated.
     bisect_threshold, diverge_threshold : float
-        In units of the well's amplitude.  The bisection also stops where rounding leaves no state between the two.
-        *diverge_threshold* must be at most a tenth of the distance between *u1* and *u2*.
+        Distances in units of the well's amplitude.  The bisection also stops where rounding leaves no state between the
+        two. *diverge_threshold* must be at most a tenth of the distance between *u1* and *u2*.
     outcome : callable, optional
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
     integration : Integration, optional
@@ -132,8 +132,8 @@ def edge_tracking(
     Returns
     -------
     EdgeState
-        With the unstable periodic orbit that it settles on, if it does; ``termination_reason`` gives the reason
-        why it stopped.
+        Edge state, with the unstable periodic orbit that the motion settles on, if it does; ``termination_reason``
+        gives the reason why it stopped.
 
     Examples
     --------

@@ -67,7 +67,7 @@ class LifetimeSettings:
         Cycles without a zero crossing after which snap-through counts as ended, greater than 0.  A run with a crossing
         in its last *settling_cycles* cycles is censored: its lifetime is known only to be longer.
     confidence : float
-        Of the intervals, in (0, 1).
+        Confidence level of the intervals, in (0, 1).
 
     Examples
     --------
@@ -125,7 +125,7 @@ def fit_lifetime(
     time : array_like of shape (..., runs)
         Lifetimes, or for how long a run was seen to last; NaN: no run.
     ended : array_like of bool of the same shape
-        Whether it ended then.
+        True if the run ended at that time; False if it was only seen to last so long.
     delay : float, optional
         t0; times before it are left out.
     confidence : float
@@ -361,7 +361,7 @@ def lifetime_map(
     ----------
     system : System
     axes : optional
-        As in :func:`snapbeam.sweep`; by default one point, the system itself.
+        Parameters and their values, as in :func:`snapbeam.sweep`; by default one point, the system itself.
     integration : Integration, optional
         1000 cycles by default. Early termination is always used, also if ``integration.early_termination`` is
         False.
@@ -373,12 +373,12 @@ def lifetime_map(
         Cycles n for the probability that a run still snaps then; an eighth, a quarter and a half of the cycles, and
         all of them less ``settling_cycles``, by default.
     checkpoint, cluster, progress
-        As in :func:`snapbeam.sweep`.
+        Folder, cluster and report of progress, as in :func:`snapbeam.sweep`.
 
     Returns
     -------
     xarray.Dataset
-        Over the axes, in cycles: ``lifetime`` with ``lifetime_low`` and ``lifetime_high``, ``delay``,
+        Variables over the axes, times in cycles: ``lifetime`` with ``lifetime_low`` and ``lifetime_high``, ``delay``,
         ``goodness`` (the probability of so great a distance from an exponential), ``runs_ended``, ``runs_snapping``,
         ``runs_never`` (never crossed) and ``runs_failed``; ``end_probability`` over ``well`` and
         ``snapping_probability`` over ``after``, each with ``_low`` and ``_high``; and for every ``start``:
@@ -516,10 +516,10 @@ def refit(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`lifetime_map`.
+        Result of :func:`lifetime_map`.
     settings : LifetimeSettings, optional
     after : array_like of int, optional
-        As in :func:`lifetime_map`; those of the dataset by default.
+        Numbers of cycles, as in :func:`lifetime_map`; those of the dataset by default.
 
     Returns
     -------

@@ -71,7 +71,7 @@ def lyapunov_spectrum(
     transient : int, optional
         Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
     states : State or array_like of shape (runs, d), optional
-        Where to begin; the system's start by default.
+        States where the runs begin; the system's start by default.
     axes : mapping, optional
         Parameters that may differ between the runs of an ensemble, each with its values: a map of exponents, every
         point from the first state.
@@ -260,7 +260,7 @@ def _unit(flow: Flow) -> str:
 
 
 def _sums(values: _Array) -> _Array:
-    """Over the first axis, each run by itself: numpy's order of adding depends on the shape of the whole."""
+    """Sums over the first axis, each run by itself: numpy's order of adding depends on the shape of the whole."""
     return np.ascontiguousarray(np.moveaxis(values, 0, -1)).sum(axis=-1)
 
 
@@ -304,9 +304,9 @@ def largest_lyapunov(
     Parameters
     ----------
     system, periods, transient, states, integration, progress
-        As in :func:`lyapunov_spectrum`.
+        System, run lengths, start and settings, as in :func:`lyapunov_spectrum`.
     distance : float
-        To which they are brought back, in units of the well's amplitude; in [1e-12, 1e-3].
+        Distance to which the trajectories are brought back, in units of the well's amplitude; in [1e-12, 1e-3].
 
     Returns
     -------

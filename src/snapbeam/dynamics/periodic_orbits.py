@@ -203,7 +203,7 @@ def periodic_orbit(
     integration : Integration, optional
         ``accuracy="reference"`` by default: an orbit is only as accurate as the steps.
     phase : float, optional
-        Of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that
+        Phase of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that
         is not smooth, where a contact is near that, the phase farthest from all contacts.  ``orbit.flow.phase``
         contains it.
     transient : int

@@ -61,17 +61,17 @@ def poincare_section(
     transient : int, optional
         Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
     phase : float, optional
-        Of the primary excitation, rad, for the stroboscopic section; that at the start by default.
+        Phase of the primary excitation, rad, for the stroboscopic section; that at the start by default.
     integration : Integration, optional
 
     Returns
     -------
     xarray.Dataset
-        Over ``point``: ``time`` (s, since the transient), ``drive_phase`` (rad), displacements and velocities of the
-        contact point and the centre as of a run, ``modal_amplitude`` and ``modal_velocity`` over ``mode``.  Passages of
-        a level are found between 128 samples a period and placed on it by the run itself; the attribute ``level_error``
-        is the maximum distance from the level, in its unit.  The attribute ``termination_reason`` states the transient
-        that was left out and its rule, and why the search for passages stopped.
+        Variables over ``point``: ``time`` (s, since the transient), ``drive_phase`` (rad), displacements and velocities
+        of the contact point and the centre as of a run, ``modal_amplitude`` and ``modal_velocity`` over ``mode``.
+        Passages of a level are found between 128 samples a period and placed on it by the run itself; the attribute
+        ``level_error`` is the maximum distance from the level, in its unit.  The attribute ``termination_reason``
+        states the transient that was left out and its rule, and why the search for passages stopped.
 
     Examples
     --------

@@ -108,10 +108,10 @@ def bifurcation_diagram(
     Returns
     -------
     xarray.Dataset
-        Over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of the
-        centre and of the contact point at the phase of the start; over ``sweep`` and the parameter:
-        ``impacts_per_period``, ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that
-        failed are NaN, as are all that follow them in their sweep; ``failed`` marks them.
+        Variables over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of
+        the centre and of the contact point at the phase of the start; over ``sweep`` and the parameter:
+        ``impacts_per_period``, ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that failed are
+        NaN, as are all that follow them in their sweep; ``failed`` marks them.
 
     Examples
     --------

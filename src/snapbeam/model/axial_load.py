@@ -38,7 +38,7 @@ class HarmonicLoad(LoadMotion):
     amplitude : float
         P_1, N.
     phase : float
-        At the start, rad.
+        Phase at the start, rad.
 
     Examples
     --------
@@ -175,7 +175,7 @@ class AxialLoadModulation:
     motion: Drive
 
     noun: ClassVar[str] = "a changing axial load"
-    """In messages."""
+    """Name in messages."""
     rate_dependent: ClassVar[bool] = False
     """True if the force depends on the velocity of the structure."""
 

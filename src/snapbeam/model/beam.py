@@ -158,7 +158,7 @@ class Beam:
 
     @property
     def given(self) -> str:
-        """Which of ``buckling_level`` and ``axial_load`` the beam was made with."""
+        """Name of the one of ``buckling_level`` and ``axial_load`` with which the beam was made."""
         return self._given
 
     def replace(self, **changes: float) -> Beam:

@@ -47,7 +47,7 @@ def identify_imperfection(
     Returns
     -------
     ReducedModel
-        With ``beam``, ``imperfection`` and ``well_frequencies``.
+        Model of the identified ``beam`` and ``imperfection``; its ``well_frequencies`` are those that were given.
 
     Raises
     ------

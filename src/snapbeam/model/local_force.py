@@ -50,11 +50,11 @@ class LocalForce:
     Parameters
     ----------
     location : float, optional
-        Of a beam: where the force acts, over the length.
+        Location of the force on a beam, over the length.
     coordinate : {"displacement", "rotation"}
-        Of a beam: the coordinate u, in m or rad.
+        Coordinate u of a beam at the location: its displacement, m, or its rotation, rad.
     shape : array_like of shape (N,), optional
-        Of a structure given by matrices: u = shape . alpha; its contact point by default.
+        Row of a structure given by matrices: u = shape . alpha; its contact point by default.
     label : str, optional
         Name in parameter names, in place of the number of the force: ``"magnet"`` in ``force.magnet.gap``.
 
@@ -99,9 +99,9 @@ class LocalForce:
     )  # fmt: skip
     """Names that are read of a law of one's own; a law has no others, but for those that begin with an underscore."""
     name: ClassVar[str] = ""
-    """In parameter files and attributes."""
+    """Name in parameter files and attributes."""
     noun: ClassVar[str] = "a local force"
-    """In messages."""
+    """Name in messages."""
     constant_part: ClassVar[float] = 0.0
     """Part of the force that does not depend on the motion, N."""
     dissipative: ClassVar[bool] = False

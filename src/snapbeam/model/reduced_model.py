@@ -373,7 +373,7 @@ class Wells:
 
     @cached_property
     def two_well_limits(self) -> str:
-        """In words, the nearest imperfection and the minimum axial load with two wells, of a beam with one; computed.
+        """Words for the nearest imperfection and the minimum axial load with two wells, of a beam with one; computed.
 
         Raises
         ------
@@ -457,7 +457,7 @@ class Wells:
 _FURTHEST_IMPERFECTION = 100.0
 """Maximum and, inverted, minimum factor of the imperfection at which two wells are looked for."""
 _FURTHEST_LOAD = 40.0
-"""Over the critical load."""
+"""Maximum axial load over the critical load at which two wells are looked for."""
 _HINT_STEPS = 81
 
 
@@ -937,7 +937,7 @@ class ReducedModel(Wells):
 
     @property
     def reference_text(self) -> str:
-        """In words, the frequency that normalises, its well, and the well where a run without a striker begins."""
+        """Words for the frequency that normalises, its well, and the well where a run without a striker begins."""
         names = {
             "given": "as given",
             "only": "the first frequency about the equilibrium",

@@ -167,7 +167,7 @@ class Contact:
     ----------
     law : ContactLaw
     striker : Striker or Shaker
-        Of several, each has its own location, side, gap and drive.  Without a gap its tip touches the beam at rest in the
+        Striker with its own location, side, gap and drive.  Without a gap its tip touches the beam at rest in the
         well that the first striker pushes away from.
     label : str, optional
         Name in parameter names, in place of the number of the contact: ``"stop"`` in ``contact.stop.gap``.

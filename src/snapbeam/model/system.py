@@ -83,7 +83,7 @@ class System:
     harvesters : sequence of PiezoelectricHarvester or ElectromagneticHarvester, optional
         Circuits that turn motion into power in a resistor.
     initial_state : State, optional
-        Where runs begin, one state; by default at rest in *initial_well*.
+        State in which runs begin, one and not a batch; at rest in *initial_well* by default.
     initial_well : {"lower", "upper"} or int, optional
         Well in which runs begin at rest, by name or by its index in ``unloaded_potential.wells``.  By default the one that the
         first striker or stop pushes away from, touched by it; :attr:`initial_well_text` names it.
@@ -301,7 +301,8 @@ class System:
 
     @cached_property
     def rest_state(self) -> State:
-        """At rest in the well that the first striker pushes away from, touched by it; without one, in the well of the start.
+        """State at rest in the well that the first striker pushes away from, touched by it; without one, in the well of
+        the start.
 
         With local forces it is the well of the system that a beam comes to, without inertia, from that well of the
         structure.  An external force begins with the run, its constant part too.
@@ -388,7 +389,7 @@ class System:
 
     @property
     def _start_at_rest(self) -> State:
-        """At rest in the initial well."""
+        """State at rest in the initial well."""
         if self.initial_well is None:
             return self.rest_state
         try:

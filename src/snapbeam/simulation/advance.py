@@ -65,7 +65,7 @@ def advance(
     integration : Integration, optional
         Solver settings.  The states are advanced for *periods*, without early termination.
     save_every_period : bool
-        Whether to return the state after each period, along a new first dimension, instead of the last one.  The
+        Return the state after each period, along a new first dimension, instead of the last one.  The
         ``statistics`` are those of all periods, except the status, which is that of each state.
     progress : callable, optional
         Function that receives ``(done, total)``, numbers of states; True writes a line to standard error.

@@ -62,11 +62,11 @@ def simulate_to_file(
     ----------
     system : System
     integration : Integration, optional
-        As for :func:`snapbeam.simulate`.
+        Solver settings, as for :func:`snapbeam.simulate`.
     path : path
         NetCDF file, ending in ``.nc``.  It appears when the run has ended, complete or not at all.
     sample_times : array_like, optional
-        As for :func:`snapbeam.simulate`.  Times that the run did not reach are omitted.
+        Times of the samples, s, as for :func:`snapbeam.simulate`.  Times that the run did not reach are omitted.
     progress : callable, optional
         Function that receives the finished fraction of the run, several times per second; True writes a line to standard
         error.

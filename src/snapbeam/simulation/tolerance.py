@@ -111,7 +111,7 @@ def perturbation_growth(
     Returns
     -------
     xarray.Dataset
-        Over ``time`` (s) and ``cycle``: ``separation``, the maximum change up to that time of the displacement
+        Variable ``separation`` over ``time`` (s) and ``cycle``: the maximum change up to that time of the displacement
         at the striker and at mid-span, in units of b.
 
     Examples

@@ -76,7 +76,7 @@ class FurtherContactTable:
     since: _Array
     """s since the contact began; negative: apart; NaN: the penetration decides; shape (runs, strikers)."""
     places: _Integers
-    """Which row each has, shape (runs, strikers)."""
+    """Row of each contact, shape (runs, strikers)."""
     rows: _Array
     """Contact rows, each with the sign of its own side, shape (rows, N)."""
 

@@ -78,7 +78,7 @@ def threshold(
     Returns
     -------
     xarray.Dataset
-        Over the axes:
+        Variables over the axes:
 
         - ``lower_threshold``: lowest value with an interwell run; NaN if no run is interwell.
         - ``upper_threshold``: lowest value from which every run with a response class is interwell; NaN if the

@@ -24,7 +24,7 @@ class DifferentialEvolution:
     ----------
     bounds : array_like of shape (variables, 2)
     population : int
-        At least 6.
+        Number of designs of a generation, at least 6.
     rng : int, numpy.random.Generator or None
         A seed; a generator, which gives one; None takes one from the system.  Generation g samples from its number and the
         seed alone.
@@ -151,7 +151,7 @@ def _beats(objectives: _Array, broken: float, others: _Array, others_broken: flo
 
 
 def front_of(objectives: _Array) -> NDArray[np.bool_]:
-    """Which of some designs no other one dominates."""
+    """Mask of the designs that no other one dominates, shape (designs,)."""
     return np.array(
         [not any(dominates(other, own) for other in objectives) for own in objectives], dtype=bool
     )

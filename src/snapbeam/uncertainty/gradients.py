@@ -53,14 +53,15 @@ def gradient(
     parameters : str or sequence of str
         Numbers of the system that are not zero, by dotted or short name.
     integration : Integration, optional
-        Of the runs; early termination is off.
+        Settings of the runs; early termination is off.
 
     Returns
     -------
     xarray.Dataset
-        Over ``parameter``: ``derivative`` (per unit of the parameter), ``elasticity`` (relative change of the quantity per relative
-        change of the parameter) and ``relative_error``, infinite where neighbouring runs have other numbers of impacts at any
-        distance.  The elasticity is NaN where the quantity is zero.  The attributes have the ``quantity``, its ``value`` and its ``units``.
+        Variables over ``parameter``: ``derivative`` (per unit of the parameter), ``elasticity`` (relative change of the
+        quantity per relative change of the parameter) and ``relative_error``, infinite where neighbouring runs have
+        other numbers of impacts at any distance.  The elasticity is NaN where the quantity is zero.  The attributes
+        have the ``quantity``, its ``value`` and its ``units``.
 
     Raises
     ------

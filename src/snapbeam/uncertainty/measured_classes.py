@@ -53,10 +53,11 @@ def score_measurements(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`snapbeam.uncertainty.probability_map` over frequency ratio, velocity amplitude and location, or some of them, as
-        a grid; a measured point belongs to the nearest point of the grid, and must lie within half a spacing of the grid.
+        Probability map of :func:`snapbeam.uncertainty.probability_map` over frequency ratio, velocity amplitude and
+        location, or some of them, as a grid; a measured point belongs to the nearest point of the grid, and must lie
+        within half a spacing of the grid.
     measurements : MeasuredPoints
-        As :func:`snapbeam.sweeps.measured_points.read_measured_points` reads them; points of unknown class are left out.
+        Measured points, as :func:`snapbeam.read_measured_points` reads them; points of unknown class are left out.
     samples : int
         Sets of responses sampled from the map, with which the measured ones are compared.
     rng : int, numpy.random.Generator or None

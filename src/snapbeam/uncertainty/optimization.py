@@ -66,7 +66,7 @@ class DesignQuantity(NamedTuple):
     kind: str
     """``"outcome"`` and ``"run"``: of a run; ``"design"``: of the nominal design alone."""
     of: Callable[[System, Values], NDArray[Any]]
-    """From the nominal system and columns, parameters of designs or statistics of runs, to numbers."""
+    """Function of the nominal system and columns, parameters of designs or statistics of runs; returns numbers."""
 
 
 def _own(name: str, values: Values, system: System) -> _Array:
@@ -159,7 +159,7 @@ class Objective:
     quantile : float, optional
         Quantile of a statistic, in (0, 1), to optimise; its mean by default.
     maximize : bool
-        Whether it is to be large.
+        True if the quantity is to be large.
 
     Examples
     --------
@@ -242,11 +242,11 @@ class Constraint:
     Parameters
     ----------
     quantity : str
-        As in :class:`Objective`.
+        Name of the quantity, as in :class:`Objective`.
     lower, upper : float, optional
         One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
-        Of a statistic of runs: required fraction of all systems that satisfy it, in (0, 1).
+        Required fraction of all systems that satisfy a constraint of a statistic of runs, in (0, 1).
 
     Examples
     --------
@@ -391,7 +391,7 @@ class DesignProblem:
         Parameters
         ----------
         designs : array_like of shape (designs, variables)
-            In the order of :attr:`names`.
+            Values of the variables in the order of :attr:`names`.
         """
         return self.judge(designs)[0]
 
@@ -406,8 +406,8 @@ class DesignProblem:
         -------
         Worth
         distances : array of shape (designs, constraints)
-            Of the fraction of the runs that satisfy a constraint from the required one, or of a quantity of the design from its
-            limit; negative if violated, NaN of a design that was not run.
+            Distance of the fraction of the runs that satisfy a constraint from the required one, or of a quantity of
+            the design from its limit; negative if violated, NaN of a design that was not run.
         """
         x = finite_array("designs", designs, 2)
         if x.shape[1] != len(self.bounds):

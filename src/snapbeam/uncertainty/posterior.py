@@ -75,7 +75,7 @@ _BESIDE = {"damping_ratio": "model.damping_ratio", "contact_stiffness": "contact
 
 @dataclass(frozen=True, eq=False)
 class Forward:
-    """From a beam to every measured frequency, in the order in which they are listed.
+    """Function from a beam to every measured frequency, in the order in which they are listed.
 
     Raises
     ------
@@ -162,9 +162,9 @@ class Waveform:
     displacement : array_like of shape (samples,)
         m, from the straight beam; NaN where nothing was found.
     standard_error : float
-        Of a sample, m.  Errors are taken as independent: thin samples that are not.
+        Standard error of a sample, m.  Errors are taken as independent: thin samples that are not.
     at : {"striker", "midspan"}
-        Where it was measured.
+        Place of the measurement.
     drive_error : float
         Relative standard error of the amplitude of the drive.
 
@@ -299,7 +299,7 @@ class Posterior:
     Attributes
     ----------
     parameters : tuple of str
-        By dotted name.
+        Dotted names of the parameters.
     values : array of shape (samples, parameters)
         SI.
     weights : array of shape (samples,)
@@ -454,7 +454,7 @@ def estimate_posterior(
     waveforms : Waveform or sequence of them
         Tracked motions of the beam under a striker; each counts up to its predictability horizon.
     modes : int
-        For the frequencies; a waveform has those of its system.
+        Number of modes for the frequencies; a waveform has those of its system.
     samples : int
         Samples, at least 200.
     rng : int, numpy.random.Generator or None
@@ -677,9 +677,9 @@ def class_likelihood(
         Uncertainty from test to test, such as ``ParameterUncertainty(displacement=3.5e-6)``, without parameters
         of the posterior.
     runs : int
-        Of each measured point and sample, the same random samples for all.
+        Number of runs of each measured point and sample, the same random samples for all.
     integration, checkpoint, progress
-        As in :func:`snapbeam.uncertainty.probability_map`.
+        Settings of the runs, folder and report of progress, as in :func:`snapbeam.uncertainty.probability_map`.
 
     Returns
     -------

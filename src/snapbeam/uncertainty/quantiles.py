@@ -48,7 +48,7 @@ _TABLE = {
 """Quantiles of the limiting distribution (Banerjee and Wellner 2001, Table 1)."""
 _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Array, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
-"""Given columns, values and numbers of samples: which runs hit, and which failed."""
+"""Function of columns, values and numbers of samples; returns masks of the runs that hit and that failed."""
 _WIDER = 0.5
 """Fraction of an interval by which the next round extends it on either side."""
 _SURE = 0.99
@@ -112,11 +112,11 @@ def crossing(values: ArrayLike, hits: ArrayLike, probability: float, confidence:
     Parameters
     ----------
     values, hits : array_like of shape (runs,)
-        Where each run was made, in any order, and whether it hit.
+        Value of the parameter of each run, in any order, and True if it hit.
     probability : float
-        In (0, 1).
+        Probability that is crossed, in (0, 1).
     confidence : float
-        In [0.5, 0.99].
+        Confidence level of the interval, in [0.5, 0.99].
     """
     q = within("probability", probability, 0.0, 1.0)
     limit = critical(confidence)
@@ -171,7 +171,7 @@ def rises(values: ArrayLike, hits: ArrayLike, *, bins: int = 12, samples: int = 
 def spans(
     values: ArrayLike, hits: ArrayLike, probability: float, confidence: float = 0.95, bins: int = 12
 ) -> tuple[float, float]:
-    """From the first value where the probability may be so great to the last where it may be so small.
+    """Range from the first value where the probability may be so great to the last where it may be so small.
 
     Nothing is assumed of how it rises or falls: the runs are put into bins, whose intervals hold all at once.
     """
@@ -258,7 +258,7 @@ class QuantileSearchSettings:
     rounds : int
         Rounds they are made in: the first over the whole range, each later one about the intervals found so far.
     confidence : float
-        Of the intervals, in [0.5, 0.99].
+        Confidence level of the intervals, in [0.5, 0.99].
     seed : int
         Chooses the values at which runs are made.
     outcome : str

@@ -81,7 +81,7 @@ def sobol_indices_from_samples(
     output : array_like of shape (runs,)
     confidence : float
     bins : int, optional
-        By default one for forty runs, 5 to 100; the index does not contain the variation within a bin.
+        Number of bins; one for forty runs by default, 5 to 100.  The index does not contain the variation within a bin.
     rng : int, numpy.random.Generator or None
         A seed; a generator, which gives one; None takes one from the system.
         Chooses the groups.
@@ -89,7 +89,8 @@ def sobol_indices_from_samples(
     Returns
     -------
     Indices
-        Of inputs that matter little, the estimate may be less than 0 by chance.
+        Estimate and limits for each input, shape (inputs,).  The estimate of an input that matters little may be less
+        than 0 by chance.
 
     Examples
     --------
@@ -183,12 +184,12 @@ def sobol_indices(
     Parameters
     ----------
     function : callable
-        From ranks in (0, 1) of shape (inputs, points) to numbers of shape (points,); called once.
+        Function of ranks in (0, 1) of shape (inputs, points) that returns numbers of shape (points,); called once.
     inputs : int
     samples : int
         Points of a sequence, a power of 2; *replicates* times *samples* times (*inputs* + 2) points in all.
     replicates : int
-        At least 4; use more points rather than more replicates.
+        Number of sequences, at least 4; use more points rather than more replicates.
     confidence : float
     rng : int, numpy.random.Generator or None
         A seed; a generator, which gives one; None takes one from the system.
@@ -277,8 +278,8 @@ class StatisticQoI:
     Parameters
     ----------
     name : str
-        Of :data:`snapbeam.STATISTICS`, of one of several strikers, such as ``"peak_force_contact_2"``, or an outcome
-        such as ``"snap"``: 1 where it happens, else 0.
+        Name of a statistic of :data:`snapbeam.STATISTICS`, of one of several strikers, such as
+        ``"peak_force_contact_2"``, or an outcome such as ``"snap"``: 1 where it happens, else 0.
 
     Examples
     --------
@@ -333,7 +334,7 @@ class ThresholdQoI:
     values : int
         Values tried first, evenly spaced: a window of snapping narrower than their spacing may be missed.
     halvings : int
-        Of the step below the lowest that snaps.
+        Number of times that the step below the lowest value that snaps is halved.
     at : mapping of str to float, optional
         Other parameters, at nominal values.
 
@@ -563,7 +564,7 @@ def sensitivity(
     quantity : str or ThresholdQoI or NotchQoI or LifetimeQoI
         A statistic by its name, such as ``"peak_force"``, an outcome, or one of these.
     uncertainty : ParameterUncertainty
-        At least one uncertain parameter.
+        Uncertainty of at least one parameter.
     method : {"local", "sobol", "given_data"}
         ``"local"``: half the difference of the quantities with a parameter one standard normal score up and down, the
         others and the start as in *samples* samples (common random numbers).  ``"sobol"``: indices of the first order and
@@ -581,9 +582,9 @@ def sensitivity(
     Returns
     -------
     xarray.Dataset
-        Over ``parameter``, with ``unit``: locally ``effect`` (of +1 standard score), ``derivative`` (per unit of the
-        parameter) and ``quantity_minus`` and ``quantity_plus``, the first two with limits; else ``first_order``, and
-        ``total_order`` of Sobol's, with limits.  Mean and standard deviation of the quantity are attributes.
+        Variables over ``parameter``, with ``unit``: locally ``effect`` (of +1 standard score), ``derivative`` (per unit
+        of the parameter) and ``quantity_minus`` and ``quantity_plus``, the first two with limits; else ``first_order``,
+        and ``total_order`` of Sobol's, with limits.  Mean and standard deviation of the quantity are attributes.
 
     Raises
     ------

@@ -105,7 +105,7 @@ class ContactLaw:
     )  # fmt: skip
     """Names that are read of a law of one's own."""
     name: ClassVar[str] = ""
-    """In parameter files and attributes."""
+    """Name in parameter files and attributes."""
     properties: ClassVar[LawProperties] = LawProperties()
     impulsive: ClassVar[bool] = False
     """True if an impact has zero duration: a jump of the velocity instead of a force."""

@@ -72,7 +72,7 @@ class Drive:
     required: ClassVar[tuple[str, ...]] = ("numbers", "cycle", "bounds")
     """Hooks without which a drive cannot move."""
     name: ClassVar[str] = ""
-    """In parameter files and attributes."""
+    """Name in parameter files and attributes."""
     harmonic: ClassVar[bool] = False
     """True for a sine, whose tone has the numbers ``omega`` and ``amplitude``."""
     is_periodic: ClassVar[bool] = True

@@ -26,7 +26,7 @@ class ConstantVelocity(Timed):
     Parameters
     ----------
     speed : float
-        Over b omega_1.
+        Velocity over b omega_1, at least 0.
 
     Examples
     --------

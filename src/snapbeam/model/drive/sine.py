@@ -39,7 +39,7 @@ class Sine(Drive):
     velocity_amplitude : float
         Velocity amplitude over b omega_1, V; 0 is a striker at rest.
     phase : float
-        At the start, rad.
+        Phase at the start, rad.
 
     Examples
     --------
@@ -152,7 +152,7 @@ class DisplacementSine(_OwnAmplitude):
     displacement_amplitude : float
         A over the buckling level b.
     phase : float
-        At the start, rad.
+        Phase at the start, rad.
 
     Examples
     --------
@@ -184,7 +184,7 @@ class AccelerationSine(_OwnAmplitude):
     acceleration_amplitude : float
         a over b omega_1^2.
     phase : float
-        At the start, rad.
+        Phase at the start, rad.
 
     Examples
     --------
