@@ -141,6 +141,10 @@ def cloud_of(points: _Array) -> Cloud:
 class Attractor:
     """One attractor: a periodic orbit or a chaotic set, with its states and its verification.
 
+    See Also
+    --------
+    snapbeam.dynamics.find_attractors, snapbeam.dynamics.Attractors
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -156,7 +160,7 @@ class Attractor:
     kind: str
     """One of :data:`KINDS`."""
     points: _Array
-    """Once a period: all of a periodic orbit, some of a chaotic attractor, shape (points, d)."""
+    """States once a period: all of a periodic orbit, some of a chaotic attractor, shape (points, d)."""
     orbit: PeriodicOrbit | None
     exponent: float
     """Largest Lyapunov exponent, 1/s (per period of a map)."""
@@ -183,6 +187,10 @@ class Attractor:
 @dataclass(frozen=True, eq=False)
 class Attractors:
     """The verified attractors, and the attractor that each state goes to.
+
+    See Also
+    --------
+    snapbeam.dynamics.find_attractors, snapbeam.dynamics.basins_of_attraction
 
     Examples
     --------
@@ -314,6 +322,7 @@ def find_attractors(
     Parameters
     ----------
     system : System, or a Flow
+        System, or any other flow.
     states : array_like of shape (states, d), or int
         Initial states, or their number in the region above.
     transient : int, optional
@@ -328,6 +337,7 @@ def find_attractors(
     tolerance : float
         Tolerance of the orbits, as in :func:`periodic_orbit`.
     integration : Integration, optional
+        Solver settings.
     progress : callable, optional
         Called as ``progress(done, total)`` with parts of the work; True writes a line to standard error.
 
@@ -336,6 +346,10 @@ def find_attractors(
     Attractors
         ``attractors.unseen_share()`` bounds the share of initial states that go to attractors that were not
         found; ``attractors.termination_reason`` gives the reason why states are undecided.
+
+    See Also
+    --------
+    snapbeam.dynamics.basins_of_attraction, snapbeam.dynamics.periodic_orbit
 
     Examples
     --------

@@ -112,6 +112,10 @@ def backbone_curve(
     OrbitNotFoundError
         If no motion is found where the curve begins.
 
+    See Also
+    --------
+    snapbeam.dynamics.continuation, snapbeam.plot.plot_backbone
+
     Notes
     -----
     With one mode the frequencies are those of elliptic integrals: for U = -k x^2/2 + g x^4/4 and the mass m the period

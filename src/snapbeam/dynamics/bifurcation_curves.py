@@ -374,6 +374,10 @@ def bifurcation_curve(
     OrbitNotFoundError
         If not even the first point is found with both parameters.
 
+    See Also
+    --------
+    snapbeam.dynamics.continuation, snapbeam.plot.plot_bifurcation_curve
+
     Examples
     --------
     >>> import snapbeam as sb

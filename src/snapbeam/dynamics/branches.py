@@ -47,6 +47,10 @@ _TOLERANCE = 1e-10
 class SpecialPoint:
     """A special point of a branch: a bifurcation or a grazing orbit.
 
+    See Also
+    --------
+    snapbeam.dynamics.switch_branch, snapbeam.dynamics.bifurcation_curve
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -79,6 +83,10 @@ class SpecialPoint:
 class Branch:
     """Orbits that follow each other along a parameter.
 
+    See Also
+    --------
+    snapbeam.dynamics.continuation, snapbeam.dynamics.SpecialPoint
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -93,7 +101,7 @@ class Branch:
     """
 
     name: str
-    """The parameter."""
+    """Name of the parameter."""
     orbits: list[PeriodicOrbit]
     special_points: list[SpecialPoint]
     termination_reason: str
@@ -439,6 +447,10 @@ def continuation(
     -------
     Branch
 
+    See Also
+    --------
+    snapbeam.dynamics.switch_branch, snapbeam.dynamics.bifurcation_curve, snapbeam.dynamics.bifurcation_diagram
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -502,6 +514,7 @@ def switch_branch(
     Parameters
     ----------
     special_point : SpecialPoint
+        Flip or branch point of a branch (:func:`continuation`).
     name, bounds
         Parameter and its limits, as in :func:`continuation`.
     size : float
@@ -518,6 +531,10 @@ def switch_branch(
         For a special point at which no other branch begins.
     OrbitNotFoundError
         If there is none at that distance; try another.
+
+    See Also
+    --------
+    snapbeam.dynamics.continuation
 
     Examples
     --------

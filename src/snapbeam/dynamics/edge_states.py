@@ -39,6 +39,10 @@ _FARTHEST = 0.1
 class EdgeState:
     """A motion on the border between two outcomes.
 
+    See Also
+    --------
+    snapbeam.dynamics.edge_tracking
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -114,6 +118,7 @@ def edge_tracking(
     Parameters
     ----------
     system : System, or a Flow
+        System, or any other flow.
     u1, u2 : State or array_like of shape (d,)
         A state from which the beam does not leave its well within *horizon* periods, and one from which it does.
     periods : int
@@ -126,6 +131,7 @@ def edge_tracking(
     outcome : callable, optional
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
     integration : Integration, optional
+        Solver settings.
     progress : callable, optional
         Called as ``progress(done, total)`` with periods; True writes a line to standard error.
 
@@ -134,6 +140,10 @@ def edge_tracking(
     EdgeState
         Edge state, with the unstable periodic orbit that the motion settles on, if it does; ``termination_reason``
         gives the reason why it stopped.
+
+    See Also
+    --------
+    snapbeam.dynamics.EdgeState, snapbeam.dynamics.basins_of_attraction
 
     Examples
     --------

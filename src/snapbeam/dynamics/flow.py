@@ -47,6 +47,10 @@ class InitialConditions:
     seed : int
         Seed of the initial conditions: number s comes from Philox with the key (seed, s).
 
+    See Also
+    --------
+    snapbeam.dynamics.lifetime_map, snapbeam.dynamics.bifurcation_diagram
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -69,6 +69,10 @@ class LifetimeSettings:
     confidence : float
         Confidence level of the intervals, in (0, 1).
 
+    See Also
+    --------
+    snapbeam.dynamics.lifetime_map
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -360,6 +364,7 @@ def lifetime_map(
     Parameters
     ----------
     system : System
+        System whose lifetimes are computed.
     axes : optional
         Parameters and their values, as in :func:`snapbeam.sweep`; by default one point, the system itself.
     integration : Integration, optional
@@ -388,6 +393,10 @@ def lifetime_map(
     ------
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
+
+    See Also
+    --------
+    snapbeam.dynamics.LifetimeSettings, snapbeam.plot.plot_lifetimes, snapbeam.plot.plot_survival
 
     Examples
     --------

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _Array = NDArray[np.float64]
 _BLOCKS = 20
-"""Means of as many stretches tell the standard error."""
+"""Number of blocks from whose means the standard error follows."""
 _TOGETHER = 64
 """Runs times periods of one call.  Few runs go on for many periods; then the derivatives of all these periods follow together."""
 _DISTANCES = (1e-12, 1e-3)
@@ -64,6 +64,7 @@ def lyapunov_spectrum(
     Parameters
     ----------
     system : System, or a Flow
+        System, or any other flow.
     k : int
         Number of exponents, largest first; at most the dimension of the state.
     periods : int
@@ -76,6 +77,7 @@ def lyapunov_spectrum(
         Parameters that may differ between the runs of an ensemble, each with its values: a map of exponents, every
         point from the first state.
     integration : Integration, optional
+        Solver settings.
     progress : callable, optional
         Called as ``progress(done, total)`` with periods; True writes a line to standard error.
 
@@ -92,6 +94,10 @@ def lyapunov_spectrum(
     ------
     InputError
         If a number is out of range.
+
+    See Also
+    --------
+    snapbeam.dynamics.largest_lyapunov, snapbeam.plot.plot_exponents
 
     Examples
     --------
@@ -313,6 +319,10 @@ def largest_lyapunov(
     xarray.Dataset
         ``exponent`` (1/s) and ``exponent_error`` over ``run``.  An exponent is NaN, with a warning, if the two
         trajectories become equal to rounding within a period; the attribute ``merged`` counts such runs.
+
+    See Also
+    --------
+    snapbeam.dynamics.lyapunov_spectrum
 
     Examples
     --------

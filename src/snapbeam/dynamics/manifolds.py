@@ -243,6 +243,7 @@ def invariant_manifold(
         Saddle orbit, with one multiplier outside the unit circle for the unstable manifold, with one inside for the
         stable one.
     stability : {"unstable", "stable"}
+        Manifold to compute.
     max_arclength : float
         Length of each of the two branches, in units of the well's amplitude (velocities over omega_1 times it).
     max_distance : float
@@ -271,6 +272,10 @@ def invariant_manifold(
     InputError
         If the manifold does not have one dimension, and for a stable one under Newton's law, whose map has no inverse where the beam
         sticks to the tip.
+
+    See Also
+    --------
+    snapbeam.dynamics.homoclinic_points, snapbeam.dynamics.homoclinic_tangency, snapbeam.plot.plot_manifold
 
     Examples
     --------
@@ -364,6 +369,10 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         Variables over ``point``, along the unstable manifold: ``state``, known to the attribute ``chord_error``, and
         the ``arclength`` of both.
+
+    See Also
+    --------
+    snapbeam.dynamics.invariant_manifold, snapbeam.dynamics.homoclinic_tangency
 
     Examples
     --------
@@ -476,6 +485,10 @@ def homoclinic_tangency(
         If the orbit is no saddle of the plane.
     OrbitNotFoundError
         If the saddle is not found at the lower bound.
+
+    See Also
+    --------
+    snapbeam.dynamics.invariant_manifold, snapbeam.dynamics.homoclinic_points
 
     Examples
     --------

@@ -40,6 +40,10 @@ class HarmonicLoad(LoadMotion):
     phase : float
         Phase at the start, rad.
 
+    See Also
+    --------
+    snapbeam.AxialLoadModulation, snapbeam.LoadRamp
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -95,6 +99,10 @@ class LoadRamp(LoadMotion, Timed):
     hold_periods : float
         Periods of the first mode for which the load stays at P + change, from the end of the change on; then it goes back
         as it came, in *duration*.  By default 1e9: no run sees it go back.
+
+    See Also
+    --------
+    snapbeam.AxialLoadModulation, snapbeam.HarmonicLoad
 
     Examples
     --------
@@ -163,6 +171,10 @@ class AxialLoadModulation:
     ----------
     motion : LoadMotion
         :class:`~snapbeam.HarmonicLoad` or :class:`~snapbeam.LoadRamp`.
+
+    See Also
+    --------
+    snapbeam.HarmonicLoad, snapbeam.LoadRamp
 
     Examples
     --------

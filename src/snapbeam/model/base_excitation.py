@@ -45,6 +45,10 @@ class BaseExcitation:
     InputError
         For a motion without an acceleration, such as a record or a free flight.
 
+    See Also
+    --------
+    snapbeam.Shock, snapbeam.AccelerationSine, snapbeam.RecordedAcceleration
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -59,6 +59,10 @@ class Beam:
         If a value is not finite or not positive where it must be, or if both or neither of
         ``buckling_level`` and ``axial_load`` are given.
 
+    See Also
+    --------
+    snapbeam.BoundaryConditions, snapbeam.Imperfection, snapbeam.ReducedModel
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -46,6 +46,7 @@ def equilibrium_branches(
     Parameters
     ----------
     system : System
+        System at rest.
     parameter : str
         Dotted name or name in datasets of a number, such as ``"force.voltage"`` or ``"beam.buckling_level"``.
     values : (float, float)
@@ -66,6 +67,10 @@ def equilibrium_branches(
         Over ``stable_part`` and ``stable_end`` (first, last): ``stable_value`` and ``stable_displacement`` (m) where
         each stable part of a branch begins and ends, and ``stable_end_kind``, "limit", "bifurcation", or "none" where
         it ends at the end of the range, at the end of the range of a law or at another branch.
+
+    See Also
+    --------
+    snapbeam.force_displacement, snapbeam.plot.plot_equilibrium_branches
 
     Examples
     --------

@@ -61,6 +61,10 @@ class HarmonicForce(ForceHistory):
     phase : float
         Phase at the start, rad; pi/2 gives a cosine.
 
+    See Also
+    --------
+    snapbeam.ExternalForce, snapbeam.ConstantForce
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -129,6 +133,10 @@ class ConstantForce(ForceHistory, Timed):
     force : float
         N.
 
+    See Also
+    --------
+    snapbeam.ExternalForce, snapbeam.HarmonicForce
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -177,6 +185,10 @@ class RecordedForce(FileKeys, ForceHistory, Sampled):
         N, the first sample at the start of the run; :meth:`from_file` reads a file.
     sampling_frequency : float
         Samples per second, Hz.
+
+    See Also
+    --------
+    snapbeam.ExternalForce
 
     Examples
     --------
@@ -232,6 +244,10 @@ class ExternalForce:
         default.
     label : str, optional
         Name in parameter names, in place of the number of the force.
+
+    See Also
+    --------
+    snapbeam.ConstantForce, snapbeam.HarmonicForce, snapbeam.RecordedForce
 
     Examples
     --------

@@ -70,7 +70,7 @@ def force_displacement(
     Returns
     -------
     xarray.Dataset
-        Variables over ``point``:  ``displacement`` (m), ``force`` (N), ``energy`` (J, potential energy without the work
+        Variables over ``point``: ``displacement`` (m), ``force`` (N), ``energy`` (J, potential energy without the work
         of the force), ``branch``, ``unstable_directions`` under a given force (0: stable),
         ``unstable_directions_at_fixed_displacement``, and ``amplitude`` (alpha, over ``mode``).  Over
         ``branch_number``: ``branch_kind``, "primary" or "secondary".  Over ``critical_point``: ``critical_kind``
@@ -87,6 +87,10 @@ def force_displacement(
     InputError
         For a location at a node of all modes, a linear system, whose curve is a straight line, or a well that does not
         exist.
+
+    See Also
+    --------
+    snapbeam.model.equilibrium_branches, snapbeam.plot.plot_force_displacement
 
     Examples
     --------

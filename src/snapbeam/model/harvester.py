@@ -148,6 +148,10 @@ class PiezoelectricHarvester(Harvester):
     patch_start, patch_end : float
         x_1 and x_2 over the length.  A patch from clamp to clamp couples to nothing: the slopes at its ends are 0.
 
+    See Also
+    --------
+    snapbeam.ElectromagneticHarvester
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -313,6 +317,10 @@ class ElectromagneticHarvester(Harvester):
         R_c (ohm) and L_c (H) of the coil; without an inductance the current follows the velocity at once.
     location : float
         x_c over the length.
+
+    See Also
+    --------
+    snapbeam.PiezoelectricHarvester
 
     Examples
     --------

@@ -100,6 +100,10 @@ class Imperfection:
     gravity : float
         Acceleration of gravity, m/s^2, that pulls towards the lower well: 9.81 for a beam that lies.
 
+    See Also
+    --------
+    snapbeam.ReducedModel, snapbeam.model.identify_imperfection
+
     Examples
     --------
     >>> import snapbeam as sb

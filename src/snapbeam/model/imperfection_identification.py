@@ -41,6 +41,7 @@ def identify_imperfection(
     kind : {"midspan_amplitude", "point_load", "uniform_load"}
         Type of the imperfection.
     modes : int
+        Number of modes of the model.
     imperfection : Imperfection, optional
         Other known parameters of the beam.
 
@@ -53,6 +54,10 @@ def identify_imperfection(
     ------
     InputError
         If no load and imperfection give these frequencies.
+
+    See Also
+    --------
+    snapbeam.Imperfection, snapbeam.lab.calibrate
     """
     instance("beam", beam, Beam, "a Beam")
     wanted = np.array(

@@ -58,6 +58,10 @@ class LocalForce:
     label : str, optional
         Name in parameter names, in place of the number of the force: ``"magnet"`` in ``force.magnet.gap``.
 
+    See Also
+    --------
+    snapbeam.LocalSpring, snapbeam.ExternalForce, snapbeam.quantity
+
     Notes
     -----
     In modal coordinates about a well, p' = ... + r F(u, v) with r = V^T shape, u = u_well + r . q and v = r . p.  The wells of
@@ -277,6 +281,10 @@ class LocalSpring(LocalForce):
         k_3, N/m^3, or N m/rad^3.  A softening spring, k_3 < 0, is valid up to u^2 = -k/k_3, where its force falls to zero
         and its potential energy has a maximum; with k = 0 it has no such limit.
 
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.MagneticForce
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -343,6 +351,10 @@ class ElectrostaticForce(_TowardsGap):
     gap : float
         g, m: where the electrode is, from the straight beam; negative below it.
 
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.MagneticForce
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -378,6 +390,10 @@ class MagneticForce(_TowardsGap):
     gap : float
         g, m: where the magnet is, from the straight beam; negative below it.
 
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.ElectrostaticForce
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -407,6 +423,10 @@ class QuadraticDamping(LocalForce):
     ----------
     coefficient : float
         c, N s^2/m^2.
+
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.CoulombFriction
 
     Examples
     --------
@@ -442,6 +462,10 @@ class CoulombFriction(LocalForce):
         F_c, N.
     smoothing_velocity : float
         v_0, m/s.
+
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.QuadraticDamping
 
     Examples
     --------

@@ -159,7 +159,7 @@ def eigenpairs(stiffness: Any, mass: Any, magnitude: Any = None, count: int | No
     Parameters
     ----------
     stiffness, mass : array or sparse matrix of shape (N, N)
-        Symmetric; the mass positive definite.
+        Symmetric matrices; the mass is positive definite.
     magnitude : array of shape (N, N), optional
         Sum of the moduli of the terms that the stiffness is the sum of; |K| by default.
     count : int, optional

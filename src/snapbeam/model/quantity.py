@@ -103,6 +103,10 @@ class ParameterField:
 def quantity(unit: str, words: str, *, default: Any = dataclasses.MISSING, **more: Any) -> Any:
     """A dataclass field that is a :class:`ParameterField`.
 
+    See Also
+    --------
+    snapbeam.ContactLaw, snapbeam.Drive, snapbeam.LocalForce
+
     Examples
     --------
     >>> from dataclasses import dataclass

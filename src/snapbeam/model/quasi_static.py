@@ -45,6 +45,10 @@ def quasi_static_threshold(
     Returns
     -------
     array of the broadcast shape
+
+    See Also
+    --------
+    snapbeam.threshold, snapbeam.sweep
     """
     x = finite_array("location", location)
     ratio = finite_array("frequency_ratio", frequency_ratio)

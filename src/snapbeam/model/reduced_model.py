@@ -40,7 +40,7 @@ from snapbeam.util.validation import (
 
 
 _HALVINGS = 2200
-"""More than halve any interval of two numbers until no number lies between."""
+"""Number of halvings after which no number lies between the ends of any interval."""
 
 
 def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
@@ -62,7 +62,7 @@ def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
     Returns
     -------
     eigenvalues : array of shape (n,)
-        Ascending.
+        Eigenvalues, ascending.
     vectors : array of shape (n, n)
         Columns with Y^T (Id + c 1 1^T) Y = Id.
     """
@@ -539,6 +539,10 @@ class ReducedModel(Wells):
     imperfection : Imperfection or None
         Imperfection from which *transverse_force* follows.
 
+    See Also
+    --------
+    snapbeam.Beam, snapbeam.System, snapbeam.model.converged_modes
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -596,6 +600,7 @@ class ReducedModel(Wells):
         Parameters
         ----------
         beam : Beam
+            Beam to reduce.
         modes : int
             Number of modes N, 1 to 256.
         damping_ratio : float or array of shape (N,)

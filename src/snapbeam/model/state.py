@@ -72,6 +72,10 @@ class State:
     modal : ModalState, optional
         The same in an engine's coordinates.
 
+    See Also
+    --------
+    snapbeam.advance, snapbeam.System
+
     Examples
     --------
     >>> import numpy as np

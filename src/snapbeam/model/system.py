@@ -71,6 +71,7 @@ class System:
     Parameters
     ----------
     model : ReducedModel
+        Reduced model of the structure.
     contacts : sequence of Contact, optional
         Strikers, each with the law of its contact.  Without any the structure vibrates freely from *initial_state*.
     forces : sequence of LocalForce or ExternalForce, optional
@@ -87,6 +88,10 @@ class System:
     initial_well : {"lower", "upper"} or int, optional
         Well in which runs begin at rest, by name or by its index in ``unloaded_potential.wells``.  By default the one that the
         first striker or stop pushes away from, touched by it; :attr:`initial_well_text` names it.
+
+    See Also
+    --------
+    snapbeam.simulate, snapbeam.State
 
     Notes
     -----
@@ -301,11 +306,11 @@ class System:
 
     @cached_property
     def rest_state(self) -> State:
-        """State at rest in the well that the first striker pushes away from, touched by it; without one, in the well of
-        the start.
+        """State at rest in the well that the first striker pushes away from, touched by it.
 
-        With local forces it is the well of the system that a beam comes to, without inertia, from that well of the
-        structure.  An external force begins with the run, its constant part too.
+        Without a striker it is the well of the start.  With local forces it is the well of the system that a beam comes
+        to, without inertia, from that well of the structure.  An external force begins with the run, its constant part
+        too.
 
         Raises
         ------

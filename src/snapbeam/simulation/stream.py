@@ -61,6 +61,7 @@ def simulate_to_file(
     Parameters
     ----------
     system : System
+        System to simulate.
     integration : Integration, optional
         Solver settings, as for :func:`snapbeam.simulate`.
     path : path
@@ -82,6 +83,10 @@ def simulate_to_file(
     NoRoomError
         If the disk is full.  The run ends before the part for which there is no room; the file has the samples up to
         there, the status ``INTERRUPTED`` and the state to continue from.
+
+    See Also
+    --------
+    snapbeam.simulate, snapbeam.load
 
     Examples
     --------

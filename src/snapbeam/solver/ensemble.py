@@ -57,7 +57,7 @@ class CircuitCoupling(NamedTuple):
     share: _Array
     """Fraction of the loss that is dissipated in the load."""
     volts: _Array
-    """Across the load, V, per unit of the circuit's coordinate."""
+    """Voltage across the load, V, per unit of the circuit's coordinate."""
     unit: float
     """Volts or amperes of the circuit's state per unit of its coordinate."""
 

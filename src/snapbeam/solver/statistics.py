@@ -116,9 +116,11 @@ class Statistic:
     name : str
         Variable of a map, and attribute of an :class:`~snapbeam.RunSummary`.
     dtype : str
+        Data type of the variable.
     unit : str
         Unit as UDUNITS knows it; ``"1"`` for displacements over b and velocities over b omega_1.
     long_name : str
+        Meaning in words.
     value : callable
         Function of a :class:`~snapbeam.solver.statistics.Reading` of many runs that returns an array of shape (runs,).
         With *update* also of the array of results of *update*.
@@ -129,6 +131,10 @@ class Statistic:
         Initial value of *update*.
     comment : str
         Relative error of the integral or of the maximum over time, in addition to the error of the run.
+
+    See Also
+    --------
+    snapbeam.register_statistic
 
     Examples
     --------
@@ -421,6 +427,10 @@ def updated() -> tuple[Statistic, ...]:
 def register_statistic(statistic: Statistic) -> None:
     """Add a statistic to the table; every run and map from now on has it.
 
+    See Also
+    --------
+    snapbeam.Statistic, snapbeam.unregister_statistic
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -451,6 +461,10 @@ def register_statistic(statistic: Statistic) -> None:
 
 def unregister_statistic(name: str) -> None:
     """Take a registered statistic out of the table again.
+
+    See Also
+    --------
+    snapbeam.register_statistic
 
     Examples
     --------

@@ -33,6 +33,10 @@ class Replicates:
     seed : int
         Seed of the random perturbations.
 
+    See Also
+    --------
+    snapbeam.sweep, snapbeam.perturbation_growth
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -102,6 +102,10 @@ def threshold(
         If the parameter belongs to the model and cannot differ between the runs of an ensemble, or there are fewer
         than two values.
 
+    See Also
+    --------
+    snapbeam.sweep, snapbeam.uncertainty.quantile_threshold, snapbeam.plot.plot_threshold
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -23,6 +23,7 @@ class DifferentialEvolution:
     Parameters
     ----------
     bounds : array_like of shape (variables, 2)
+        Minimum and maximum of every variable.
     population : int
         Number of designs of a generation, at least 6.
     rng : int, numpy.random.Generator or None
@@ -30,6 +31,10 @@ class DifferentialEvolution:
         seed alone.
     weight, crossover : float
         F in (0, 2) and CR in [0, 1].
+
+    See Also
+    --------
+    snapbeam.uncertainty.optimize_design, snapbeam.uncertainty.design_problem
 
     Examples
     --------
@@ -80,7 +85,7 @@ class DifferentialEvolution:
         Parameters
         ----------
         objectives : array_like of shape (population, objectives)
-            Minimised; infinite if unknown.
+            Values to minimise; infinite if unknown.
         violation : array_like of shape (population,)
             0 where all constraints are satisfied.
         """

@@ -60,6 +60,10 @@ class Normal(Distribution):
     relative : bool
         True if *standard_deviation* is a share of the nominal value.
 
+    See Also
+    --------
+    snapbeam.uncertainty.LogNormal, snapbeam.uncertainty.UniformTolerance
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -95,6 +99,10 @@ class UniformTolerance(Distribution):
     relative : bool
         True if *half_width* is a share of the nominal value.
 
+    See Also
+    --------
+    snapbeam.uncertainty.UniformRange, snapbeam.uncertainty.Normal
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -126,6 +134,10 @@ class LogNormal(Distribution):
     sigma : float
         Standard deviation of the logarithm.
 
+    See Also
+    --------
+    snapbeam.uncertainty.Normal
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -153,6 +165,10 @@ class UniformRange(Distribution):
     ----------
     low, high : float
         Minimum and maximum in the unit of the parameter.
+
+    See Also
+    --------
+    snapbeam.uncertainty.UniformTolerance
 
     Examples
     --------
@@ -237,6 +253,11 @@ class ParameterUncertainty:
         velocity in m/s and location in m, so that Omega, V and x_s change with the beam's own frequency, buckling level
         and length.  ``"normalised"``: the same Omega, V and x_s.
     seed : int
+        Seed of the samples.
+
+    See Also
+    --------
+    snapbeam.uncertainty.probability_map, snapbeam.uncertainty.sample_systems
 
     Notes
     -----

@@ -47,6 +47,7 @@ def gradient(
     Parameters
     ----------
     system : System
+        System at which derivatives are taken.
     quantity : str or callable
         A statistic of a run by its name, such as ``"peak_force"`` or ``"energy_harvested"``, or a function of a system that returns a
         number, such as a natural frequency or the amplitude of an orbit.
@@ -67,6 +68,10 @@ def gradient(
     ------
     InputError
         For a parameter that is zero or not a number, a quantity without a derivative (a class, a count), or a quantity that is not finite.
+
+    See Also
+    --------
+    snapbeam.uncertainty.sensitivity
 
     Examples
     --------

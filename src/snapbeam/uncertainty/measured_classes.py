@@ -66,11 +66,15 @@ def score_measurements(
     Returns
     -------
     xarray.Dataset
-        Along ``measurement``: ``response_class``, ``probability`` of that class with its 95 % limits, ``most_likely`` class and its
-        probability ``best``.  In the attributes: ``log_likelihood`` of all measurements; ``log_likelihood_low``,
-        ``log_likelihood_mean`` and ``log_likelihood_high`` (the 95 % range) of responses sampled from the map itself;
-        ``p_value``, the share of those that are no likelier than the measured ones; ``agree``, measurements of the most
-        likely class, with ``agree_expected``, as many as a right map lets expect.
+        Variables over ``measurement``:  ``response_class``, ``probability`` of that class with its 95 % limits,
+        ``most_likely`` class and its probability ``best``.  In the attributes: ``log_likelihood`` of all measurements;
+        ``log_likelihood_low``, ``log_likelihood_mean`` and ``log_likelihood_high`` (the 95 % range) of responses
+        sampled from the map itself; ``p_value``, the share of those that are no likelier than the measured ones;
+        ``agree``, measurements of the most likely class, with ``agree_expected``, as many as a right map lets expect.
+
+    See Also
+    --------
+    snapbeam.uncertainty.probability_map, snapbeam.read_measured_points
 
     Examples
     --------

@@ -357,6 +357,7 @@ def sample_systems(system: System, uncertainty: ParameterUncertainty, count: int
     system : System
         The nominal system.
     uncertainty : ParameterUncertainty
+        Uncertain parameters and initial state.
     count : int
         Number of systems.
 
@@ -369,6 +370,10 @@ def sample_systems(system: System, uncertainty: ParameterUncertainty, count: int
     ------
     InputError
         If a sampled value is out of range, or a parameter has no single value in the system.
+
+    See Also
+    --------
+    snapbeam.uncertainty.ParameterUncertainty, snapbeam.simulate
 
     Examples
     --------

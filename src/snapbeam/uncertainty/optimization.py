@@ -161,6 +161,10 @@ class Objective:
     maximize : bool
         True if the quantity is to be large.
 
+    See Also
+    --------
+    snapbeam.uncertainty.Constraint, snapbeam.uncertainty.optimize_design
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -247,6 +251,10 @@ class Constraint:
         One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
         Required fraction of all systems that satisfy a constraint of a statistic of runs, in (0, 1).
+
+    See Also
+    --------
+    snapbeam.uncertainty.Objective, snapbeam.uncertainty.optimize_design
 
     Examples
     --------
@@ -640,7 +648,7 @@ class OptimizerSettings:
     Parameters
     ----------
     generations : int
-        Including the first.
+        Number of generations, the first included.
     population : int
         Designs of a generation, at least 6.
     samples : int
@@ -654,7 +662,13 @@ class OptimizerSettings:
         Maximum number of further designs to validate, between the feasible one and better infeasible ones; they
         bring the design to its constraints.
     confidence : float
+        Confidence level of the intervals, in (0, 1).
     seed : int
+        Seed of the search.
+
+    See Also
+    --------
+    snapbeam.uncertainty.optimize_design
 
     Examples
     --------
@@ -713,6 +727,10 @@ def design_problem(
         Its ``evaluate(designs)`` gives objectives and violations of rows of designs, on the same samples each time; its
         ``estimate(design, numbers)`` intervals on samples of any numbers.
 
+    See Also
+    --------
+    snapbeam.uncertainty.optimize_design, snapbeam.uncertainty.DifferentialEvolution
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -765,16 +783,19 @@ def optimize_design(
     Parameters
     ----------
     system : System
-        The nominal one.
+        The nominal system.
     variables : mapping of str to (low, high)
         Real parameters that may be chosen.
     objectives : Objective or str, or a list of up to three
         Quantities to minimise; of several the result is the Pareto front.
     constraints : Constraint, or a list of them
+        Conditions that a design must satisfy.
     uncertainty : ParameterUncertainty
         Uncertain parameters and initial state of the system.
     settings : OptimizerSettings, optional
+        Settings of the optimiser.
     integration : Integration, optional
+        Settings of the runs.
     checkpoint : path or CheckpointOptions, optional
         Checkpoint folder; an existing one is resumed.
     progress : callable, optional
@@ -783,15 +804,19 @@ def optimize_design(
     Returns
     -------
     xarray.Dataset
-        Along ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...`` with
-        ``_low`` and ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of
-        systems that satisfy a constraint, with ``_low`` and ``_high``, and ``required_...``;
-        ``constraints_satisfied``: whether every lower limit is at least the required fraction, some upper limit
-        is less, or neither is known; ``distance_...``: that of the fraction from the required one, or of a
-        quantity of the design from its limit.  Along ``tried``: every design that was evaluated, its objectives
-        ``tried_distance_...`` and ``violation``.  If no design satisfies the constraints, the one that violates them least is
-        reported, with a :class:`~snapbeam.DiagnosticWarning`.  The attribute ``termination_reason`` gives the reason why the search and the
-        refinement stopped.
+        Variables over ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...``
+        with ``_low`` and ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of systems
+        that satisfy a constraint, with ``_low`` and ``_high``, and ``required_...``; ``constraints_satisfied``: whether
+        every lower limit is at least the required fraction, some upper limit is less, or neither is known;
+        ``distance_...``: that of the fraction from the required one, or of a quantity of the design from its limit.
+        Along ``tried``: every design that was evaluated, its objectives ``tried_distance_...`` and ``violation``.  If
+        no design satisfies the constraints, the one that violates them least is reported, with a
+        :class:`~snapbeam.DiagnosticWarning`.  The attribute ``termination_reason`` gives the reason why the search and
+        the refinement stopped.
+
+    See Also
+    --------
+    snapbeam.uncertainty.Objective, snapbeam.uncertainty.Constraint, snapbeam.uncertainty.OptimizerSettings
 
     Examples
     --------

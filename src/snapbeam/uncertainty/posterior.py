@@ -168,6 +168,10 @@ class Waveform:
     drive_error : float
         Relative standard error of the amplitude of the drive.
 
+    See Also
+    --------
+    snapbeam.uncertainty.estimate_posterior, snapbeam.lab.compare_waveforms
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -301,13 +305,17 @@ class Posterior:
     parameters : tuple of str
         Dotted names of the parameters.
     values : array of shape (samples, parameters)
-        SI.
+        Values of the parameters of every sample, SI units.
     weights : array of shape (samples,)
-        Add up to 1.
+        Weights of the samples, which add up to 1.
     termination_reason : str
         Reason why the search for the most likely beam stopped, and the effective sample size.
     converged : bool
         False if the search reached its maximum number of evaluations: the samples are about the best beam that it found.
+
+    See Also
+    --------
+    snapbeam.uncertainty.estimate_posterior, snapbeam.uncertainty.class_likelihood
 
     Examples
     --------
@@ -367,6 +375,7 @@ class Posterior:
         Parameters
         ----------
         log_likelihood : array_like of shape (samples,)
+            Logarithm of the likelihood of the measurement under every sample.
         """
         more = np.asarray(log_likelihood, dtype=np.float64)
         if more.shape != self.weights.shape or np.isnan(more).any():
@@ -467,6 +476,10 @@ def estimate_posterior(
     Posterior
         ``posterior.effective_sample_size`` is the number of independent samples that the weighted ones are worth.  If the search
         for the most likely beam does not converge, ``posterior.converged`` is False, with a :class:`~snapbeam.DiagnosticWarning`.
+
+    See Also
+    --------
+    snapbeam.uncertainty.Posterior, snapbeam.uncertainty.Waveform, snapbeam.lab.calibrate
 
     Notes
     -----
@@ -670,7 +683,7 @@ def class_likelihood(
     posterior : Posterior
         Few samples: :meth:`Posterior.resampled` first.
     system : System
-        The nominal one, by which Omega and V of the measurements are normalised.
+        The nominal system, by which Omega and V of the measurements are normalised.
     measurements : MeasuredPoints
         Excitation in Hz and m/s, the same for every sample; points of unknown class are omitted.
     uncertainty : ParameterUncertainty
@@ -684,6 +697,10 @@ def class_likelihood(
     Returns
     -------
     array of shape (samples,)
+
+    See Also
+    --------
+    snapbeam.uncertainty.estimate_posterior, snapbeam.uncertainty.score_measurements
 
     Examples
     --------

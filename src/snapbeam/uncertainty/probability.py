@@ -56,6 +56,11 @@ class SamplingPlan:
     confidence : float
         Confidence level of the intervals, in (0, 1).
     interval : {"wilson", "jeffreys"}
+        Interval of a binomial proportion: Wilson's or Jeffreys'.
+
+    See Also
+    --------
+    snapbeam.uncertainty.probability_map
 
     Examples
     --------
@@ -203,7 +208,7 @@ def probability_map(
     Parameters
     ----------
     system : System
-        The nominal one.
+        The nominal system.
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
         Points of the map, as in :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is sampled too
         is sampled around the value of the point.
@@ -230,6 +235,10 @@ def probability_map(
     ------
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
+
+    See Also
+    --------
+    snapbeam.uncertainty.SamplingPlan, snapbeam.uncertainty.quantile_threshold, snapbeam.sweep
 
     Notes
     -----

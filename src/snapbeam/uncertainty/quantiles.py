@@ -74,7 +74,7 @@ class Crossing(NamedTuple):
     """Value at which a probability curve crosses a given probability."""
 
     value: float
-    """Midway where the isotonic regression is less and where it is more; infinite where it never is."""
+    """Midpoint between where the isotonic regression is less and where it is more; infinite where it never is."""
     low: float
     """-inf if no run bounds it from below."""
     high: float
@@ -252,7 +252,7 @@ class QuantileSearchSettings:
     Parameters
     ----------
     probabilities : tuple of float
-        Increasing, each in (0, 1).
+        Probabilities of the quantiles, increasing, each in (0, 1).
     runs : int
         Runs of every column, at least 40 a probability.
     rounds : int
@@ -260,9 +260,13 @@ class QuantileSearchSettings:
     confidence : float
         Confidence level of the intervals, in [0.5, 0.99].
     seed : int
-        Chooses the values at which runs are made.
+        Seed of the values at which runs are made.
     outcome : str
         Outcome of the probability, as in :class:`SamplingPlan`.
+
+    See Also
+    --------
+    snapbeam.uncertainty.quantile_threshold
 
     Examples
     --------
@@ -389,7 +393,7 @@ def quantile_threshold(
     Parameters
     ----------
     system : System
-        The nominal one.
+        The nominal system.
     parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``: a number that may differ between the runs of an ensemble.
     bounds : tuple of two floats
@@ -414,6 +418,10 @@ def quantile_threshold(
         limits where no run bounds it, NaN if ``outcome_of_search`` gives a reason. ``is_fitted``: true if the
         threshold is that of the fitted curve, and not of the isotonic regression alone.  ``is_monotonic``, with
         the probability ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
+
+    See Also
+    --------
+    snapbeam.uncertainty.QuantileSearchSettings, snapbeam.threshold
 
     Examples
     --------

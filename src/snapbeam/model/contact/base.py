@@ -58,7 +58,7 @@ class LawProperties:
     mirror: bool = True
     """The mirror image of a run is a run."""
     energy_bound: bool = True
-    """Untouched, the beam's energy only falls: which early termination needs."""
+    """The energy of the untouched beam only falls, which early termination needs."""
     smooth: bool = True
     """The force is continuous where contact begins and ends, so that tangents do not jump."""
     tangent: bool = True
@@ -88,6 +88,10 @@ class ContactLaw:
 
     They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.  A name that none of these
     hooks has is refused when the class is defined; names of your own begin with an underscore.
+
+    See Also
+    --------
+    snapbeam.HertzContact, snapbeam.Contact, snapbeam.quantity
 
     Examples
     --------

@@ -57,6 +57,10 @@ class Drive:
     are times at which the motion or one of its derivatives jumps.  A name that none of the hooks has is refused when the class
     is defined; names of your own begin with an underscore.
 
+    See Also
+    --------
+    snapbeam.Striker, snapbeam.SumDrive, snapbeam.quantity
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -28,6 +28,10 @@ class ConstantVelocity(Timed):
     speed : float
         Velocity over b omega_1, at least 0.
 
+    See Also
+    --------
+    snapbeam.FixedStop, snapbeam.Striker
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -46,6 +46,10 @@ class Shock(Timed):
     rise_fraction : float
         Rise time, and fall time, of a trapezoid over the duration; 0.1 by default.
 
+    See Also
+    --------
+    snapbeam.HalfSine, snapbeam.BaseExcitation
+
     Examples
     --------
     >>> import snapbeam as sb

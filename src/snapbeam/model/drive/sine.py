@@ -41,6 +41,10 @@ class Sine(Drive):
     phase : float
         Phase at the start, rad.
 
+    See Also
+    --------
+    snapbeam.DisplacementSine, snapbeam.AccelerationSine, snapbeam.Shaker
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -154,6 +158,10 @@ class DisplacementSine(_OwnAmplitude):
     phase : float
         Phase at the start, rad.
 
+    See Also
+    --------
+    snapbeam.Sine, snapbeam.AccelerationSine
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -185,6 +193,10 @@ class AccelerationSine(_OwnAmplitude):
         a over b omega_1^2.
     phase : float
         Phase at the start, rad.
+
+    See Also
+    --------
+    snapbeam.Sine, snapbeam.DisplacementSine, snapbeam.RecordedAcceleration
 
     Examples
     --------

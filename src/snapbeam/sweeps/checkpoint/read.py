@@ -49,6 +49,10 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     CheckpointError
         If the description is damaged.
 
+    See Also
+    --------
+    snapbeam.sweep, snapbeam.CheckpointOptions
+
     Examples
     --------
     >>> import snapbeam as sb
