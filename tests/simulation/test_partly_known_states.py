@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2, damping_ratio=0.005)
 SHAKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1, location=0.4)
 MOVED = sb.Striker(
     drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2), mass=0.01, suspension_stiffness=1e3
@@ -17,8 +17,8 @@ PLASTIC = sb.ElasticPlasticContact(1e5, 2e5)
 @pytest.mark.parametrize(
     "contacts",
     [
-        [sb.Contact(paper.CONTACT, MOVED), sb.Contact(paper.CONTACT, SHAKER)],
-        [sb.Contact(PLASTIC, MOVED), sb.Contact(paper.CONTACT, SHAKER)],
+        [sb.Contact(default_values.CONTACT, MOVED), sb.Contact(default_values.CONTACT, SHAKER)],
+        [sb.Contact(PLASTIC, MOVED), sb.Contact(default_values.CONTACT, SHAKER)],
     ],
     ids=["one with a mass", "one with an indentation"],
 )

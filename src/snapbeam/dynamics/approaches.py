@@ -19,7 +19,7 @@ _Array = NDArray[np.float64]
 _NEAR_CONTACT = 0.25
 """Distance of a contact from the instant of observation that is small, over that of the instant farthest from contacts."""
 _SAMPLES = 400
-"""A period."""
+"""Number of samples a period."""
 
 
 class Passage(NamedTuple):

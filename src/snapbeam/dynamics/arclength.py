@@ -44,7 +44,7 @@ class Equations:
     """Equations that have a curve of solutions, one fewer than unknowns."""
 
     iterations: int = 14
-    """Of Newton's method, at most."""
+    """Maximum number of iterations of Newton's method."""
     easy, hard = 4, 9
     """Iterations up to which the step grows, and from which on it shrinks."""
     easier: tuple[float, ...] = (1.0,)
@@ -233,7 +233,7 @@ def follow(
     equations : Equations
     first : Point
     limits : array of shape (k, 2)
-        Of the last k unknowns.
+        Minimum and maximum of each of the last k unknowns.
     max_points : int
     step, max_step : float
         First and maximum distance between points.

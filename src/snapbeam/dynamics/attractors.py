@@ -74,7 +74,7 @@ class Ball:
     radius: float
 
     def holds(self, rows: _Array) -> NDArray[np.bool_]:
-        """Which states of shape (runs, d) are within, each by itself."""
+        """Mask of the states of shape (runs, d) that are within, each by itself."""
         away = rows - self.center
         total = np.zeros(len(rows))
         for column in self.factor.T:
@@ -123,7 +123,7 @@ class Cloud:
     reach: float
 
     def holds(self, rows: _Array) -> NDArray[np.bool_]:
-        """Which states lie among the points."""
+        """Mask of the states that lie among the points."""
         known = np.asarray(np.isfinite(rows).all(axis=1))
         away, _ = self.tree.query(np.where(known[:, None], rows, 0.0))
         found: NDArray[np.bool_] = known & (away <= self.reach)
@@ -141,6 +141,10 @@ def cloud_of(points: _Array) -> Cloud:
 class Attractor:
     """One attractor: a periodic orbit or a chaotic set, with its states and its verification.
 
+    See Also
+    --------
+    snapbeam.dynamics.find_attractors, snapbeam.dynamics.Attractors
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -156,7 +160,7 @@ class Attractor:
     kind: str
     """One of :data:`KINDS`."""
     points: _Array
-    """Once a period: all of a periodic orbit, some of a chaotic attractor, shape (points, d)."""
+    """States once a period: all of a periodic orbit, some of a chaotic attractor, shape (points, d)."""
     orbit: PeriodicOrbit | None
     exponent: float
     """Largest Lyapunov exponent, 1/s (per period of a map)."""
@@ -184,6 +188,10 @@ class Attractor:
 class Attractors:
     """The verified attractors, and the attractor that each state goes to.
 
+    See Also
+    --------
+    snapbeam.dynamics.find_attractors, snapbeam.dynamics.basins_of_attraction
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -204,7 +212,7 @@ class Attractors:
     check_periods: int
     """Periods over which a chaotic attractor was seen not to end."""
     termination_reason: str
-    """After how many periods the search stopped, by which rule, and why states are undecided."""
+    """Periods after which the search stopped, the rule that stopped it, and the reason why states are undecided."""
 
     @property
     def shares(self) -> _Array:
@@ -314,6 +322,7 @@ def find_attractors(
     Parameters
     ----------
     system : System, or a Flow
+        System, or any other flow.
     states : array_like of shape (states, d), or int
         Initial states, or their number in the region above.
     transient : int, optional
@@ -324,10 +333,11 @@ def find_attractors(
     check_periods : int
         Periods over which a chaotic attractor must not end.
     rng : int, numpy.random.Generator or None
-        Of the initial states: a seed; a generator, which gives one; None takes one from the system.
+        Seed of the initial states; a generator, which gives one; None takes one from the system.
     tolerance : float
-        Of the orbits, as in :func:`periodic_orbit`.
+        Tolerance of the orbits, as in :func:`periodic_orbit`.
     integration : Integration, optional
+        Solver settings.
     progress : callable, optional
         Called as ``progress(done, total)`` with parts of the work; True writes a line to standard error.
 
@@ -336,6 +346,10 @@ def find_attractors(
     Attractors
         ``attractors.unseen_share()`` bounds the share of initial states that go to attractors that were not
         found; ``attractors.termination_reason`` gives the reason why states are undecided.
+
+    See Also
+    --------
+    snapbeam.dynamics.basins_of_attraction, snapbeam.dynamics.periodic_orbit
 
     Examples
     --------

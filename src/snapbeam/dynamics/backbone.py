@@ -97,13 +97,13 @@ def backbone_curve(
     Returns
     -------
     xarray.Dataset
-        Over ``point``: ``frequency`` (Hz), ``frequency_ratio``, ``energy`` (J, above the well), ``min_midspan``
-        and ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``; over ``point`` and
-        ``mode`` ``participation``, the share of each linear mode in the mean kinetic energy; where the motion turns back,
-        ``initial_amplitude`` over ``point`` and ``buckling_mode``, and ``initial_shift`` of strikers with mass over ``striker``;
-        over ``point`` and ``multiplier`` their size and angle.  The attribute ``end`` gives the reason why the curve ends:
-        among others at an equilibrium or where the two turning points meet, since from there on the same motions would
-        follow again.
+        Variables over ``point``: ``frequency`` (Hz), ``frequency_ratio``, ``energy`` (J, above the well),
+        ``min_midspan`` and ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``; over
+        ``point`` and ``mode`` ``participation``, the share of each linear mode in the mean kinetic energy; where the
+        motion turns back, ``initial_amplitude`` over ``point`` and ``buckling_mode``, and ``initial_shift`` of strikers
+        with mass over ``striker``; over ``point`` and ``multiplier`` their size and angle.  The attribute ``end`` gives
+        the reason why the curve ends: among others at an equilibrium or where the two turning points meet, since from
+        there on the same motions would follow again.
 
     Raises
     ------
@@ -111,6 +111,10 @@ def backbone_curve(
         For a system with an excitation, a lossy contact, a striker that nothing holds, or without two wells if both are requested.
     OrbitNotFoundError
         If no motion is found where the curve begins.
+
+    See Also
+    --------
+    snapbeam.dynamics.continuation, snapbeam.plot.plot_backbone
 
     Notes
     -----

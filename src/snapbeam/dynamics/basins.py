@@ -84,6 +84,10 @@ def basins_of_attraction(
         has no step.  The attribute ``undecided`` is the share of undecided states, ``termination_reason`` the number of
         periods and its rule; ``sensitive_share``, ``sensitive_share_low`` and ``sensitive_share_high``.
 
+    See Also
+    --------
+    snapbeam.dynamics.find_attractors, snapbeam.dynamics.basin_entropy, snapbeam.plot.plot_basins
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -349,6 +353,10 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     box : int
         Points along a side; incomplete boxes are ignored.
 
+    See Also
+    --------
+    snapbeam.dynamics.uncertainty_exponent, snapbeam.dynamics.dynamical_integrity
+
     Examples
     --------
     >>> import numpy as np
@@ -468,6 +476,10 @@ def uncertainty_exponent(labels: ArrayLike, sizes: ArrayLike | None = None) -> U
     sizes : array_like of int, optional
         epsilon in cells; powers of two up to an eighth of the shortest side by default.
 
+    See Also
+    --------
+    snapbeam.dynamics.basins_of_attraction, snapbeam.dynamics.basin_entropy
+
     Examples
     --------
     >>> import numpy as np
@@ -550,12 +562,17 @@ def dynamical_integrity(
     Parameters
     ----------
     labels : array_like of int
+        Number of the basin of every point of a grid of any dimension; negative: undecided.
     label : int
-        The basin.
+        Label of the basin.
     attractor : tuple of int, optional
         Indices of the grid point nearest to its attractor.
     spacing : array_like, optional
         Distance between points along each axis; 1 by default.
+
+    See Also
+    --------
+    snapbeam.dynamics.basins_of_attraction, snapbeam.dynamics.basin_entropy
 
     Examples
     --------

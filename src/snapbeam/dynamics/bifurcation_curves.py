@@ -343,7 +343,7 @@ def bifurcation_curve(
     Parameters
     ----------
     special_point : SpecialPoint
-        Of a branch (:func:`continuation`).
+        Special point of a branch (:func:`continuation`), where the curve begins.
     names : (str, str)
         Two parameters that can differ between runs, by dotted name or the name in datasets.
     bounds : pair of pairs of float
@@ -354,18 +354,18 @@ def bifurcation_curve(
         First and maximum distance between points, in units of the well's amplitude for the state and of the range
         for each parameter; between 1e-6 and 1.
     tolerance : float
-        Of orbit and condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light impacts make the
-        multipliers rough, which the errors then contain.
+        Tolerance of the orbit and of the condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light
+        impacts make the multipliers rough, which the errors then contain.
     progress : callable, optional
         Called as ``progress(done, total)`` with points; True writes a line to standard error.
 
     Returns
     -------
     xarray.Dataset
-        Over ``point``: both parameters, their errors at these steps, the state, the multipliers, impacts, residual.  Over
-        ``special_point``: kind and parameters of points of codimension two.  On a grazing curve the attribute ``kept_gap`` is the gap
-        of its orbits over b, and ``contact_force`` tells whether they have one; without it the multipliers are those of the
-        motion without contact.
+        Variables over ``point``: both parameters, their errors at these steps, the state, the multipliers, impacts,
+        residual.  Over ``special_point``: kind and parameters of points of codimension two.  On a grazing curve the
+        attribute ``kept_gap`` is the gap of its orbits over b, and ``contact_force`` tells whether they have one;
+        without it the multipliers are those of the motion without contact.
 
     Raises
     ------
@@ -373,6 +373,10 @@ def bifurcation_curve(
         If the type of the point is not supported, or a parameter, its bounds or a step is out of range.
     OrbitNotFoundError
         If not even the first point is found with both parameters.
+
+    See Also
+    --------
+    snapbeam.dynamics.continuation, snapbeam.plot.plot_bifurcation_curve
 
     Examples
     --------

@@ -47,6 +47,10 @@ _TOLERANCE = 1e-10
 class SpecialPoint:
     """A special point of a branch: a bifurcation or a grazing orbit.
 
+    See Also
+    --------
+    snapbeam.dynamics.switch_branch, snapbeam.dynamics.bifurcation_curve
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -79,6 +83,10 @@ class SpecialPoint:
 class Branch:
     """Orbits that follow each other along a parameter.
 
+    See Also
+    --------
+    snapbeam.dynamics.continuation, snapbeam.dynamics.SpecialPoint
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -93,7 +101,7 @@ class Branch:
     """
 
     name: str
-    """The parameter."""
+    """Name of the parameter."""
     orbits: list[PeriodicOrbit]
     special_points: list[SpecialPoint]
     termination_reason: str
@@ -417,20 +425,20 @@ def continuation(
     Parameters
     ----------
     orbit : PeriodicOrbit
-        Of :func:`periodic_orbit`, or of a branch.
+        Orbit to begin with, of :func:`periodic_orbit` or of a branch.
     name : str
         Parameter, by dotted name or the name in datasets.
     bounds : pair of float
         Minimum and maximum value.
     direction : {"up", "down"}
-        Which way the parameter goes at first.
+        Direction of the parameter at first.
     max_points : int
         Orbits at most.
     step, max_step : float
         First and maximum distance between orbits, in units of the well's amplitude for the state and of the range
         for the parameter; between 1e-8 and 1.
     tolerance : float
-        Of the orbits, as in :func:`periodic_orbit`.
+        Tolerance of the orbits, as in :func:`periodic_orbit`.
     progress : callable, optional
         Called as ``progress(done, total)`` with orbits, of which there are at most *max_points*; True writes a line to
         standard error.
@@ -438,6 +446,10 @@ def continuation(
     Returns
     -------
     Branch
+
+    See Also
+    --------
+    snapbeam.dynamics.switch_branch, snapbeam.dynamics.bifurcation_curve, snapbeam.dynamics.bifurcation_diagram
 
     Examples
     --------
@@ -502,6 +514,7 @@ def switch_branch(
     Parameters
     ----------
     special_point : SpecialPoint
+        Flip or branch point of a branch (:func:`continuation`).
     name, bounds
         Parameter and its limits, as in :func:`continuation`.
     size : float
@@ -518,6 +531,10 @@ def switch_branch(
         For a special point at which no other branch begins.
     OrbitNotFoundError
         If there is none at that distance; try another.
+
+    See Also
+    --------
+    snapbeam.dynamics.continuation
 
     Examples
     --------

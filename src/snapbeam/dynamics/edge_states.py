@@ -39,6 +39,10 @@ _FARTHEST = 0.1
 class EdgeState:
     """A motion on the border between two outcomes.
 
+    See Also
+    --------
+    snapbeam.dynamics.edge_tracking
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -53,9 +57,9 @@ class EdgeState:
 
     flow: Flow
     states: _Array
-    """Once a period, shape (periods, d)."""
+    """States once a period, shape (periods, d)."""
     distance: _Array
-    """Between the two states that hold it, at each."""
+    """Distance between the two states that enclose it, once a period, shape (periods,)."""
     orbit: PeriodicOrbit | None
     """The unstable orbit that it comes to, if it comes to one."""
     termination_reason: str
@@ -114,26 +118,32 @@ def edge_tracking(
     Parameters
     ----------
     system : System, or a Flow
+        System, or any other flow.
     u1, u2 : State or array_like of shape (d,)
         A state from which the beam does not leave its well within *horizon* periods, and one from which it does.
     periods : int
-        To follow the border for.
+        Number of periods for which the border is followed.
     horizon : int
         Periods after which the outcome is evaluated.
     bisect_threshold, diverge_threshold : float
-        In units of the well's amplitude.  The bisection also stops where rounding leaves no state between the two.
-        *diverge_threshold* must be at most a tenth of the distance between *u1* and *u2*.
+        Distances in units of the well's amplitude.  The bisection also stops where rounding leaves no state between the
+        two. *diverge_threshold* must be at most a tenth of the distance between *u1* and *u2*.
     outcome : callable, optional
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
     integration : Integration, optional
+        Solver settings.
     progress : callable, optional
         Called as ``progress(done, total)`` with periods; True writes a line to standard error.
 
     Returns
     -------
     EdgeState
-        With the unstable periodic orbit that it settles on, if it does; ``termination_reason`` gives the reason
-        why it stopped.
+        Edge state, with the unstable periodic orbit that the motion settles on, if it does; ``termination_reason``
+        gives the reason why it stopped.
+
+    See Also
+    --------
+    snapbeam.dynamics.EdgeState, snapbeam.dynamics.basins_of_attraction
 
     Examples
     --------

@@ -42,10 +42,14 @@ class InitialConditions:
         by default the error of reading a position to a pixel of the paper's camera.  An initial condition that would
         press the beam into the tip is mirrored about the beam at rest, because the overlap would add contact energy.
     phase : bool
-        Whether to sample the phase of the drive in the half of its cycle in which the tip moves away, so that it does
+        Sample the phase of the drive in the half of its cycle in which the tip moves away, so that it does
         not press the beam at rest.  For a single striker with a sinusoidal motion.
     seed : int
         Seed of the initial conditions: number s comes from Philox with the key (seed, s).
+
+    See Also
+    --------
+    snapbeam.dynamics.lifetime_map, snapbeam.dynamics.bifurcation_diagram
 
     Examples
     --------
@@ -184,9 +188,9 @@ class AdvancedStates:
     """States after a number of periods."""
 
     states: _Array
-    """After the last period, shape (runs, d); NaN where a run failed."""
+    """States after the last period, shape (runs, d); NaN where a run failed."""
     every: _Array | None
-    """After each period, shape (runs, periods, d), if requested."""
+    """States after each period, shape (runs, periods, d), if requested."""
     tangents: _Array | None
     """Small changes that were carried along, shape (runs, k, d)."""
     statistics: Mapping[str, NDArray[Any]] = field(default_factory=dict)
@@ -282,7 +286,7 @@ class Flow(Protocol):
 
 
 def minimal_period(rows: _Array, tolerance: float = 1e-4) -> NDArray[np.int64]:
-    """After how many periods states of shape (..., periods, d) repeat, at most half of them; 0 if they do not."""
+    """Number of periods after which states of shape (..., periods, d) repeat, at most half of them, else 0."""
     keep = rows.shape[-2]
     found = np.zeros(rows.shape[:-2], dtype=np.int64)
     for m in range(keep // 2, 0, -1):

@@ -67,7 +67,11 @@ class LifetimeSettings:
         Cycles without a zero crossing after which snap-through counts as ended, greater than 0.  A run with a crossing
         in its last *settling_cycles* cycles is censored: its lifetime is known only to be longer.
     confidence : float
-        Of the intervals, in (0, 1).
+        Confidence level of the intervals, in (0, 1).
+
+    See Also
+    --------
+    snapbeam.dynamics.lifetime_map
 
     Examples
     --------
@@ -125,7 +129,7 @@ def fit_lifetime(
     time : array_like of shape (..., runs)
         Lifetimes, or for how long a run was seen to last; NaN: no run.
     ended : array_like of bool of the same shape
-        Whether it ended then.
+        True if the run ended at that time; False if it was only seen to last so long.
     delay : float, optional
         t0; times before it are left out.
     confidence : float
@@ -360,8 +364,9 @@ def lifetime_map(
     Parameters
     ----------
     system : System
+        System whose lifetimes are computed.
     axes : optional
-        As in :func:`snapbeam.sweep`; by default one point, the system itself.
+        Parameters and their values, as in :func:`snapbeam.sweep`; by default one point, the system itself.
     integration : Integration, optional
         1000 cycles by default. Early termination is always used, also if ``integration.early_termination`` is
         False.
@@ -373,12 +378,12 @@ def lifetime_map(
         Cycles n for the probability that a run still snaps then; an eighth, a quarter and a half of the cycles, and
         all of them less ``settling_cycles``, by default.
     checkpoint, cluster, progress
-        As in :func:`snapbeam.sweep`.
+        Folder, cluster and report of progress, as in :func:`snapbeam.sweep`.
 
     Returns
     -------
     xarray.Dataset
-        Over the axes, in cycles: ``lifetime`` with ``lifetime_low`` and ``lifetime_high``, ``delay``,
+        Variables over the axes, times in cycles: ``lifetime`` with ``lifetime_low`` and ``lifetime_high``, ``delay``,
         ``goodness`` (the probability of so great a distance from an exponential), ``runs_ended``, ``runs_snapping``,
         ``runs_never`` (never crossed) and ``runs_failed``; ``end_probability`` over ``well`` and
         ``snapping_probability`` over ``after``, each with ``_low`` and ``_high``; and for every ``start``:
@@ -388,6 +393,10 @@ def lifetime_map(
     ------
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
+
+    See Also
+    --------
+    snapbeam.dynamics.LifetimeSettings, snapbeam.plot.plot_lifetimes, snapbeam.plot.plot_survival
 
     Examples
     --------
@@ -516,10 +525,10 @@ def refit(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`lifetime_map`.
+        Result of :func:`lifetime_map`.
     settings : LifetimeSettings, optional
     after : array_like of int, optional
-        As in :func:`lifetime_map`; those of the dataset by default.
+        Numbers of cycles, as in :func:`lifetime_map`; those of the dataset by default.
 
     Returns
     -------

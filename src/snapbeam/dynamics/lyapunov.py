@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _Array = NDArray[np.float64]
 _BLOCKS = 20
-"""Means of as many stretches tell the standard error."""
+"""Number of blocks from whose means the standard error follows."""
 _TOGETHER = 64
 """Runs times periods of one call.  Few runs go on for many periods; then the derivatives of all these periods follow together."""
 _DISTANCES = (1e-12, 1e-3)
@@ -64,6 +64,7 @@ def lyapunov_spectrum(
     Parameters
     ----------
     system : System, or a Flow
+        System, or any other flow.
     k : int
         Number of exponents, largest first; at most the dimension of the state.
     periods : int
@@ -71,11 +72,12 @@ def lyapunov_spectrum(
     transient : int, optional
         Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
     states : State or array_like of shape (runs, d), optional
-        Where to begin; the system's start by default.
+        States where the runs begin; the system's start by default.
     axes : mapping, optional
         Parameters that may differ between the runs of an ensemble, each with its values: a map of exponents, every
         point from the first state.
     integration : Integration, optional
+        Solver settings.
     progress : callable, optional
         Called as ``progress(done, total)`` with periods; True writes a line to standard error.
 
@@ -92,6 +94,10 @@ def lyapunov_spectrum(
     ------
     InputError
         If a number is out of range.
+
+    See Also
+    --------
+    snapbeam.dynamics.largest_lyapunov, snapbeam.plot.plot_exponents
 
     Examples
     --------
@@ -260,7 +266,7 @@ def _unit(flow: Flow) -> str:
 
 
 def _sums(values: _Array) -> _Array:
-    """Over the first axis, each run by itself: numpy's order of adding depends on the shape of the whole."""
+    """Sums over the first axis, each run by itself: numpy's order of adding depends on the shape of the whole."""
     return np.ascontiguousarray(np.moveaxis(values, 0, -1)).sum(axis=-1)
 
 
@@ -304,15 +310,19 @@ def largest_lyapunov(
     Parameters
     ----------
     system, periods, transient, states, integration, progress
-        As in :func:`lyapunov_spectrum`.
+        System, run lengths, start and settings, as in :func:`lyapunov_spectrum`.
     distance : float
-        To which they are brought back, in units of the well's amplitude; in [1e-12, 1e-3].
+        Distance to which the trajectories are brought back, in units of the well's amplitude; in [1e-12, 1e-3].
 
     Returns
     -------
     xarray.Dataset
         ``exponent`` (1/s) and ``exponent_error`` over ``run``.  An exponent is NaN, with a warning, if the two
         trajectories become equal to rounding within a period; the attribute ``merged`` counts such runs.
+
+    See Also
+    --------
+    snapbeam.dynamics.lyapunov_spectrum
 
     Examples
     --------

@@ -61,7 +61,7 @@ class _Clock(NamedTuple):
     """Time limit and progress of one branch, a part of a longer computation."""
 
     end: float
-    """As of ``time.monotonic``."""
+    """Time of the end, s, as of ``time.monotonic``."""
     report: Callable[[float], object] | None
     begun: float
     """Share of the computation that was done before the branch."""
@@ -240,8 +240,10 @@ def invariant_manifold(
     Parameters
     ----------
     orbit : PeriodicOrbit
-        With one multiplier outside the unit circle for the unstable manifold, with one inside for the stable one.
+        Saddle orbit, with one multiplier outside the unit circle for the unstable manifold, with one inside for the
+        stable one.
     stability : {"unstable", "stable"}
+        Manifold to compute.
     max_arclength : float
         Length of each of the two branches, in units of the well's amplitude (velocities over omega_1 times it).
     max_distance : float
@@ -249,7 +251,7 @@ def invariant_manifold(
     max_turn : float
         Angle between successive chords, rad; between 0.001 and 1.
     max_points : int
-        Of each branch.
+        Maximum number of points of each branch.
     max_seconds : float, optional
         Time after which both branches end as they are, s; no limit by default.  A stable manifold takes minutes, since each of its
         points is sought by Newton's method.
@@ -259,16 +261,21 @@ def invariant_manifold(
     Returns
     -------
     xarray.Dataset
-        Over ``point``: ``state`` over ``coordinate``, ``side`` (-1 or 1: the branch), ``arclength`` along the branch and ``age``
-        (applications of the return map of the orbit, or its inverse, since the fundamental segment; of the map of twice its period for
-        a negative multiplier).  The attributes have the multiplier, the estimated distance from the chord, ``chord_error``, and for each
-        branch the reason for its end: ``max_arclength`` if it is complete, ``max_seconds`` if the time was over.
+        Variables over ``point``: ``state`` over ``coordinate``, ``side`` (-1 or 1: the branch), ``arclength`` along the
+        branch and ``age`` (applications of the return map of the orbit, or its inverse, since the fundamental segment;
+        of the map of twice its period for a negative multiplier).  The attributes have the multiplier, the estimated
+        distance from the chord, ``chord_error``, and for each branch the reason for its end: ``max_arclength`` if it is
+        complete, ``max_seconds`` if the time was over.
 
     Raises
     ------
     InputError
         If the manifold does not have one dimension, and for a stable one under Newton's law, whose map has no inverse where the beam
         sticks to the tip.
+
+    See Also
+    --------
+    snapbeam.dynamics.homoclinic_points, snapbeam.dynamics.homoclinic_tangency, snapbeam.plot.plot_manifold
 
     Examples
     --------
@@ -355,12 +362,17 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
     Parameters
     ----------
     unstable, stable : xarray.Dataset
-        Of :func:`invariant_manifold`, with two coordinates; of two saddles the points are heteroclinic.
+        Manifolds of :func:`invariant_manifold`, with two coordinates; of two saddles the points are heteroclinic.
 
     Returns
     -------
     xarray.Dataset
-        Over ``point``, along the unstable manifold: ``state``, known to the attribute ``chord_error``, and the ``arclength`` of both.
+        Variables over ``point``, along the unstable manifold: ``state``, known to the attribute ``chord_error``, and
+        the ``arclength`` of both.
+
+    See Also
+    --------
+    snapbeam.dynamics.invariant_manifold, snapbeam.dynamics.homoclinic_tangency
 
     Examples
     --------
@@ -449,9 +461,9 @@ def homoclinic_tangency(
     bounds : pair of float
         Values with and without crossing, in either order of size.
     max_arclength, max_distance, max_turn : float
-        As in :func:`invariant_manifold`.
+        Length and resolution of the manifolds, as in :func:`invariant_manifold`.
     tolerance : float
-        Between 1e-9 and 0.5.
+        Width of the bracket over that of *bounds*, between 1e-9 and 0.5.
     max_seconds : float, optional
         Time after which the search ends with the bracket that it has, s; no limit by default.  Each value takes the time of two
         manifolds, minutes for a beam.
@@ -461,11 +473,11 @@ def homoclinic_tangency(
     Returns
     -------
     xarray.Dataset
-        Along ``value``: each value that was tried, and ``crosses``.  ``bracket`` over ``manifolds`` ("apart", "crossing"): the nearest
-        values without and with crossing, NaN where none was found.  The attribute ``termination_reason`` is ``tolerance``;
-        otherwise the bracket is wider than asked for, with a :class:`~snapbeam.DiagnosticWarning`: ``max_seconds``, manifolds that
-        cross at both *bounds* or at neither, a manifold that ended before *max_arclength* without a crossing, or a value, not the
-        first, without the saddle.
+        Variables over ``value``, each value that was tried: ``crosses``.  ``bracket`` over ``manifolds`` ("apart",
+        "crossing"): the nearest values without and with crossing, NaN where none was found.  The attribute
+        ``termination_reason`` is ``tolerance``; otherwise the bracket is wider than asked for, with a
+        :class:`~snapbeam.DiagnosticWarning`: ``max_seconds``, manifolds that cross at both *bounds* or at neither, a
+        manifold that ended before *max_arclength* without a crossing, or a value, not the first, without the saddle.
 
     Raises
     ------
@@ -473,6 +485,10 @@ def homoclinic_tangency(
         If the orbit is no saddle of the plane.
     OrbitNotFoundError
         If the saddle is not found at the lower bound.
+
+    See Also
+    --------
+    snapbeam.dynamics.invariant_manifold, snapbeam.dynamics.homoclinic_points
 
     Examples
     --------

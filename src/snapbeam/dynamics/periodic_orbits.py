@@ -42,6 +42,10 @@ _SAME = 1e-7
 class PeriodicOrbit:
     """A state that comes back after some periods of the drive.
 
+    See Also
+    --------
+    snapbeam.dynamics.periodic_orbit, snapbeam.dynamics.continuation
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -131,7 +135,9 @@ class PeriodicOrbit:
         Parameters
         ----------
         kind : {"phase_portrait", "multipliers"}
+            Picture to draw.
         ax : matplotlib.axes.Axes, optional
+            Axes to draw in; new ones by default.
         **options
             Options of :func:`snapbeam.plot.plot_phase_portrait` or :func:`snapbeam.plot.plot_multipliers`.
 
@@ -196,6 +202,7 @@ def periodic_orbit(
     Parameters
     ----------
     system : System, or a Flow
+        System, or any other flow.
     guess : State, array_like of shape (d,) or PeriodicOrbit, optional
         A state near the orbit, at the phase; the system's start by default.
     period : int
@@ -203,7 +210,7 @@ def periodic_orbit(
     integration : Integration, optional
         ``accuracy="reference"`` by default: an orbit is only as accurate as the steps.
     phase : float, optional
-        Of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that
+        Phase of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that
         is not smooth, where a contact is near that, the phase farthest from all contacts.  ``orbit.flow.phase``
         contains it.
     transient : int
@@ -225,6 +232,10 @@ def periodic_orbit(
         If the system has no excitation, or a number is out of range.
     OrbitNotFoundError
         If no orbit is found; the message states the cause and a remedy.
+
+    See Also
+    --------
+    snapbeam.dynamics.continuation, snapbeam.dynamics.find_attractors
 
     Examples
     --------

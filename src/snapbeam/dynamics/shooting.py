@@ -29,6 +29,10 @@ _Array = NDArray[np.float64]
 class OrbitNotFoundError(RuntimeError):
     """Error if no orbit was found; the message states the cause and a remedy.
 
+    See Also
+    --------
+    snapbeam.dynamics.periodic_orbit
+
     Examples
     --------
     >>> import snapbeam as sb

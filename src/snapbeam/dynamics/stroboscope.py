@@ -323,7 +323,8 @@ def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tup
     Parameters
     ----------
     flow : Flow
-        Without modes, as a map has, *rates* alone count; without both the number is *least*.
+        Flow whose slowest mode is taken.  Of a map, which has no modes, *rates* alone count; without both the number is
+        *least*.
     rates : array_like
         Further decay rates, 1/s (per period of a map), such as those towards known attractors.
     """

@@ -89,12 +89,15 @@ def bifurcation_diagram(
     Parameters
     ----------
     system : System
+        System whose parameter is swept.
     name : str
         Parameter, by dotted name or the name in datasets.
     values : array_like
-        Strictly increasing.
+        Values of the parameter, strictly increasing, in its unit.
     integration : Integration, optional
+        Solver settings.
     sweeps : sequence of {"up", "down"}
+        Directions of the sweeps, one after the other.
     initial_conditions : InitialConditions or int
         Initial conditions at every value, in addition to the sweeps; none by default.
     periods : pair of int
@@ -108,10 +111,14 @@ def bifurcation_diagram(
     Returns
     -------
     xarray.Dataset
-        Over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of the
-        centre and of the contact point at the phase of the start; over ``sweep`` and the parameter:
-        ``impacts_per_period``, ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that
-        failed are NaN, as are all that follow them in their sweep; ``failed`` marks them.
+        Variables over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of
+        the centre and of the contact point at the phase of the start; over ``sweep`` and the parameter:
+        ``impacts_per_period``, ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that failed are
+        NaN, as are all that follow them in their sweep; ``failed`` marks them.
+
+    See Also
+    --------
+    snapbeam.dynamics.hysteresis, snapbeam.dynamics.continuation, snapbeam.plot.plot_diagram
 
     Examples
     --------
@@ -265,11 +272,11 @@ def hysteresis(
     name : str
         Parameter, by dotted name or the name in datasets.
     values : array_like
-        Strictly increasing, in the unit of the parameter.
+        Values of the parameter, strictly increasing, in its unit.
     integration : Integration, optional
         Solver settings; ``cycles`` is the length of the run at each value.
     sweeps : sequence of {"up", "down"}
-        One after the other; the second begins with the last state of the first.
+        Directions, one after the other; the second begins with the last state of the first.
     progress : callable, optional
         Called as ``progress(done, total)`` with values; True writes a line to standard error.
 
@@ -284,6 +291,10 @@ def hysteresis(
     InputError
         Before the first run: if *name* is not a numeric parameter, a value is out of range or exceeds the recorded
         motion, or a tip moves under an excitation that does not repeat, because the restart would shift the tip by a jump.
+
+    See Also
+    --------
+    snapbeam.dynamics.bifurcation_diagram, snapbeam.sweep
 
     Examples
     --------

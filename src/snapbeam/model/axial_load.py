@@ -38,7 +38,11 @@ class HarmonicLoad(LoadMotion):
     amplitude : float
         P_1, N.
     phase : float
-        At the start, rad.
+        Phase at the start, rad.
+
+    See Also
+    --------
+    snapbeam.AxialLoadModulation, snapbeam.LoadRamp
 
     Examples
     --------
@@ -95,6 +99,10 @@ class LoadRamp(LoadMotion, Timed):
     hold_periods : float
         Periods of the first mode for which the load stays at P + change, from the end of the change on; then it goes back
         as it came, in *duration*.  By default 1e9: no run sees it go back.
+
+    See Also
+    --------
+    snapbeam.AxialLoadModulation, snapbeam.HarmonicLoad
 
     Examples
     --------
@@ -164,6 +172,10 @@ class AxialLoadModulation:
     motion : LoadMotion
         :class:`~snapbeam.HarmonicLoad` or :class:`~snapbeam.LoadRamp`.
 
+    See Also
+    --------
+    snapbeam.HarmonicLoad, snapbeam.LoadRamp
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -175,7 +187,7 @@ class AxialLoadModulation:
     motion: Drive
 
     noun: ClassVar[str] = "a changing axial load"
-    """In messages."""
+    """Name in messages."""
     rate_dependent: ClassVar[bool] = False
     """True if the force depends on the velocity of the structure."""
 

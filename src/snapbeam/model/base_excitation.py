@@ -35,7 +35,7 @@ class BaseExcitation:
         y(t), such as an :class:`~snapbeam.AccelerationSine`, a :class:`~snapbeam.BandLimitedNoise` or a
         :class:`~snapbeam.Burst`; any drive that has an acceleration.
     direction : {"up", "down"}
-        Whether y counts positive towards the upper well or towards the lower one.
+        Well towards which y counts positive: the upper or the lower one.
     striker_on_base : bool
         True if the mount of the striker moves with the base, like a stop in the same frame. Otherwise it stays
         in space, and the tip moves by -y(t) in the frame of the ends.
@@ -44,6 +44,10 @@ class BaseExcitation:
     ------
     InputError
         For a motion without an acceleration, such as a record or a free flight.
+
+    See Also
+    --------
+    snapbeam.Shock, snapbeam.AccelerationSine, snapbeam.RecordedAcceleration
 
     Examples
     --------
@@ -65,7 +69,7 @@ class BaseExcitation:
     )
 
     noun: ClassVar[str] = "a moving base"
-    """In messages."""
+    """Name in messages."""
     rate_dependent: ClassVar[bool] = False
     """True if the force depends on the velocity of the structure."""
 

@@ -59,6 +59,10 @@ class Beam:
         If a value is not finite or not positive where it must be, or if both or neither of
         ``buckling_level`` and ``axial_load`` are given.
 
+    See Also
+    --------
+    snapbeam.BoundaryConditions, snapbeam.Imperfection, snapbeam.ReducedModel
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -158,7 +162,7 @@ class Beam:
 
     @property
     def given(self) -> str:
-        """Which of ``buckling_level`` and ``axial_load`` the beam was made with."""
+        """Name of the one of ``buckling_level`` and ``axial_load`` with which the beam was made."""
         return self._given
 
     def replace(self, **changes: float) -> Beam:

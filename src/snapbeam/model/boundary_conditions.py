@@ -31,6 +31,10 @@ class BoundaryConditions:
     axial_support_stiffness : float, optional
         K, N/m; rigid by default.
 
+    See Also
+    --------
+    snapbeam.Beam
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -70,7 +74,7 @@ class BoundaryConditions:
 
 
 CLAMPED = BoundaryConditions()
-"""The paper's."""
+"""Boundary conditions of the paper: rigid clamps."""
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[tuple[
     stiffness : array of shape (N,) or (N, N)
         K0.
     gamma : float
-        At least 0.
+        Coefficient of the tension term, at least 0.
     force : array of shape (N,)
         B.
 

@@ -46,6 +46,7 @@ def equilibrium_branches(
     Parameters
     ----------
     system : System
+        System at rest.
     parameter : str
         Dotted name or name in datasets of a number, such as ``"force.voltage"`` or ``"beam.buckling_level"``.
     values : (float, float)
@@ -57,15 +58,19 @@ def equilibrium_branches(
     Returns
     -------
     xarray.Dataset
-        Over ``point``: the parameter under its name in datasets, ``midspan_displacement`` (m), ``energy`` (J),
-        ``unstable_directions`` (0: stable), ``branch``, ``amplitude`` (alpha, over ``mode``) and
+        Variables over ``point``: the parameter under its name in datasets, ``midspan_displacement`` (m), ``energy``
+        (J), ``unstable_directions`` (0: stable), ``branch``, ``amplitude`` (alpha, over ``mode``) and
         ``natural_frequency`` (Hz, over ``mode``; NaN where unstable).  Over ``critical_point``: ``critical_kind``
         ("limit" or "bifurcation"), ``critical_value``, ``critical_displacement`` (m), ``critical_branch``,
-        ``critical_unstable_directions``, 0 where a stable part of the branch ends, and ``critical_outcome``: "unstable" on an
-        unstable branch, else "pull-in" if the beam leaves the range of a law beyond the point, or "another well".  Over
-        ``stable_part`` and ``stable_end`` (first, last): ``stable_value`` and ``stable_displacement`` (m) where each
-        stable part of a branch begins and ends, and ``stable_end_kind``, "limit", "bifurcation", or "none" where it ends
-        at the end of the range, at the end of the range of a law or at another branch.
+        ``critical_unstable_directions``, 0 where a stable part of the branch ends, and ``critical_outcome``: "unstable"
+        on an unstable branch, else "pull-in" if the beam leaves the range of a law beyond the point, or "another well".
+        Over ``stable_part`` and ``stable_end`` (first, last): ``stable_value`` and ``stable_displacement`` (m) where
+        each stable part of a branch begins and ends, and ``stable_end_kind``, "limit", "bifurcation", or "none" where
+        it ends at the end of the range, at the end of the range of a law or at another branch.
+
+    See Also
+    --------
+    snapbeam.force_displacement, snapbeam.plot.plot_equilibrium_branches
 
     Examples
     --------

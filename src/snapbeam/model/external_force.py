@@ -59,7 +59,11 @@ class HarmonicForce(ForceHistory):
     mean : float
         F_0, N.
     phase : float
-        At the start, rad; pi/2 gives a cosine.
+        Phase at the start, rad; pi/2 gives a cosine.
+
+    See Also
+    --------
+    snapbeam.ExternalForce, snapbeam.ConstantForce
 
     Examples
     --------
@@ -129,6 +133,10 @@ class ConstantForce(ForceHistory, Timed):
     force : float
         N.
 
+    See Also
+    --------
+    snapbeam.ExternalForce, snapbeam.HarmonicForce
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -178,6 +186,10 @@ class RecordedForce(FileKeys, ForceHistory, Sampled):
     sampling_frequency : float
         Samples per second, Hz.
 
+    See Also
+    --------
+    snapbeam.ExternalForce
+
     Examples
     --------
     >>> import numpy as np
@@ -226,11 +238,16 @@ class ExternalForce:
         F(t): a :class:`~snapbeam.HarmonicForce`, a :class:`~snapbeam.ConstantForce` or, for any other history, a
         :class:`~snapbeam.RecordedForce`.
     location : float, optional
-        Of a beam: where the force acts, over the length.
+        Location of the force on a beam, over the length.
     shape : array_like of shape (N,), optional
-        Of a structure given by matrices: h, the force on each coordinate per unit of F; its contact point by default.
+        Row h of a structure given by matrices: the force on each coordinate per unit of F; its contact point by
+        default.
     label : str, optional
         Name in parameter names, in place of the number of the force.
+
+    See Also
+    --------
+    snapbeam.ConstantForce, snapbeam.HarmonicForce, snapbeam.RecordedForce
 
     Examples
     --------
@@ -260,7 +277,7 @@ class ExternalForce:
     label: str = field(default="", repr=False)
 
     noun: ClassVar[str] = "an external force"
-    """In messages."""
+    """Name in messages."""
     rate_dependent: ClassVar[bool] = False
     """True if the force depends on the velocity of the structure."""
 

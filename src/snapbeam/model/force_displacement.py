@@ -70,24 +70,27 @@ def force_displacement(
     Returns
     -------
     xarray.Dataset
-        Over ``point``: ``displacement`` (m), ``force`` (N), ``energy`` (J, potential energy without the work of
-        the force), ``branch``, ``unstable_directions`` under a given force (0: stable),
+        Variables over ``point``: ``displacement`` (m), ``force`` (N), ``energy`` (J, potential energy without the work
+        of the force), ``branch``, ``unstable_directions`` under a given force (0: stable),
         ``unstable_directions_at_fixed_displacement``, and ``amplitude`` (alpha, over ``mode``).  Over
-        ``branch_number``: ``branch_kind``, "primary" or "secondary".  Over ``critical_point``:
-        ``critical_kind`` ("limit" or "bifurcation"), ``critical_displacement`` (m), ``critical_force`` (N),
-        ``critical_branch``.  ``snap_through_force`` (N) is where the stable path from the well ends under a
-        force towards the other side.  ``snap_back_force`` is where the stable path of the other well ends on
-        the way back; with one well, where the path that comes from a large force does.
-        ``snap_through_displacement`` and ``snap_back_displacement`` (m) belong to them.  They are NaN if the
-        beam does not snap.  ``energy_barrier`` (J) is that from the well to the lowest adjacent saddle without
-        a force, ``energy_barrier_back`` that from the other well; NaN with one well.  The attributes name the
-        well, how it was chosen, and the kind of the critical points.
+        ``branch_number``: ``branch_kind``, "primary" or "secondary".  Over ``critical_point``: ``critical_kind``
+        ("limit" or "bifurcation"), ``critical_displacement`` (m), ``critical_force`` (N), ``critical_branch``.
+        ``snap_through_force`` (N) is where the stable path from the well ends under a force towards the other side.
+        ``snap_back_force`` is where the stable path of the other well ends on the way back; with one well, where the
+        path that comes from a large force does. ``snap_through_displacement`` and ``snap_back_displacement`` (m) belong
+        to them.  They are NaN if the beam does not snap.  ``energy_barrier`` (J) is that from the well to the lowest
+        adjacent saddle without a force, ``energy_barrier_back`` that from the other well; NaN with one well.  The
+        attributes name the well, how it was chosen, and the kind of the critical points.
 
     Raises
     ------
     InputError
         For a location at a node of all modes, a linear system, whose curve is a straight line, or a well that does not
         exist.
+
+    See Also
+    --------
+    snapbeam.model.equilibrium_branches, snapbeam.plot.plot_force_displacement
 
     Examples
     --------

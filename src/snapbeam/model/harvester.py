@@ -79,7 +79,7 @@ class Harvester:
     """Names that are read of a harvester of one's own; it has no others, but for those that begin with an underscore."""
     name: ClassVar[str] = ""
     noun: ClassVar[str] = "a harvester"
-    """In messages."""
+    """Name in messages."""
     rate_dependent: ClassVar[bool] = True
     """True if the force depends on the velocity of the structure."""
     resistance: float
@@ -148,6 +148,10 @@ class PiezoelectricHarvester(Harvester):
     patch_start, patch_end : float
         x_1 and x_2 over the length.  A patch from clamp to clamp couples to nothing: the slopes at its ends are 0.
 
+    See Also
+    --------
+    snapbeam.ElectromagneticHarvester
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -207,17 +211,17 @@ class PiezoelectricHarvester(Harvester):
         stress_constant : float
             The effective e_31, C/m^2; its sign turns the sign of the voltage.
         permittivity : float
-            At constant strain, F/m.
+            Permittivity at constant strain, F/m.
         layer_thickness, layer_width : float
-            Of each layer, m.
+            Thickness and width of each layer, m.
         beam : Beam
-            Between them.
+            Beam between the two layers.
         resistance : float
-            Of the load, ohm.
+            Resistance of the load, ohm.
         patch_start, patch_end : float
-            Over the length.
+            Ends of the patch, locations over the length in [0, 1].
         wiring : {"parallel", "series"}
-            Of the two layers: in parallel twice the moment per volt and twice the
+            Wiring of the two layers: in parallel twice the moment per volt and twice the
             capacitance of one, in series the moment of one and half its capacitance.
         """
         thick = positive("layer_thickness", layer_thickness, "m")
@@ -313,6 +317,10 @@ class ElectromagneticHarvester(Harvester):
         R_c (ohm) and L_c (H) of the coil; without an inductance the current follows the velocity at once.
     location : float
         x_c over the length.
+
+    See Also
+    --------
+    snapbeam.PiezoelectricHarvester
 
     Examples
     --------

@@ -36,7 +36,7 @@ def projected(modes: Modes, profile: _Array, symmetric: bool = False) -> _Array:
     profile : array of shape (2, points)
         Places over the length from 0 to 1, and heights, m, zero at the ends.
     symmetric : bool
-        Whether the shape is known to be symmetric, so that the antisymmetric modes have no part in it.
+        True if the shape is known to be symmetric, so that the antisymmetric modes have no part in it.
 
     Returns
     -------
@@ -84,7 +84,8 @@ class Imperfection:
     midspan_amplitude : float
         Height at the centre, m, of an initial shape of the given *shape*.
     shape : {"mode", "sine"}
-        Of *midspan_amplitude*: the first buckling mode, or a single half sine, of which the modes take the part that they hold.
+        Shape of height *midspan_amplitude*: the first buckling mode, or a single half sine, of which the modes take the
+        part that they hold.
     antisymmetric_amplitude : float
         Maximum height, m, of an initial shape of the form of the second buckling mode, on the left half.
     profile : array_like of shape (2, points), optional
@@ -93,11 +94,15 @@ class Imperfection:
     point_load : float
         Constant force, N, at *point_location*.
     point_location : float
-        Over the length, in (0, 1).
+        Location of *point_load* over the length, in (0, 1).
     uniform_load : float
         Constant force per length, N/m.
     gravity : float
         Acceleration of gravity, m/s^2, that pulls towards the lower well: 9.81 for a beam that lies.
+
+    See Also
+    --------
+    snapbeam.ReducedModel, snapbeam.model.identify_imperfection
 
     Examples
     --------

@@ -41,18 +41,23 @@ def identify_imperfection(
     kind : {"midspan_amplitude", "point_load", "uniform_load"}
         Type of the imperfection.
     modes : int
+        Number of modes of the model.
     imperfection : Imperfection, optional
         Other known parameters of the beam.
 
     Returns
     -------
     ReducedModel
-        With ``beam``, ``imperfection`` and ``well_frequencies``.
+        Model of the identified ``beam`` and ``imperfection``; its ``well_frequencies`` are those that were given.
 
     Raises
     ------
     InputError
         If no load and imperfection give these frequencies.
+
+    See Also
+    --------
+    snapbeam.Imperfection, snapbeam.lab.calibrate
     """
     instance("beam", beam, Beam, "a Beam")
     wanted = np.array(

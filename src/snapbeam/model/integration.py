@@ -50,6 +50,10 @@ class Integration:
     InputError
         If a value is out of range, or a tolerance is combined with a step or an accuracy.
 
+    See Also
+    --------
+    snapbeam.simulate, snapbeam.sweep
+
     Examples
     --------
     >>> import snapbeam as sb

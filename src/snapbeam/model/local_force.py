@@ -50,13 +50,17 @@ class LocalForce:
     Parameters
     ----------
     location : float, optional
-        Of a beam: where the force acts, over the length.
+        Location of the force on a beam, over the length.
     coordinate : {"displacement", "rotation"}
-        Of a beam: the coordinate u, in m or rad.
+        Coordinate u of a beam at the location: its displacement, m, or its rotation, rad.
     shape : array_like of shape (N,), optional
-        Of a structure given by matrices: u = shape . alpha; its contact point by default.
+        Row of a structure given by matrices: u = shape . alpha; its contact point by default.
     label : str, optional
         Name in parameter names, in place of the number of the force: ``"magnet"`` in ``force.magnet.gap``.
+
+    See Also
+    --------
+    snapbeam.LocalSpring, snapbeam.ExternalForce, snapbeam.quantity
 
     Notes
     -----
@@ -99,9 +103,9 @@ class LocalForce:
     )  # fmt: skip
     """Names that are read of a law of one's own; a law has no others, but for those that begin with an underscore."""
     name: ClassVar[str] = ""
-    """In parameter files and attributes."""
+    """Name in parameter files and attributes."""
     noun: ClassVar[str] = "a local force"
-    """In messages."""
+    """Name in messages."""
     constant_part: ClassVar[float] = 0.0
     """Part of the force that does not depend on the motion, N."""
     dissipative: ClassVar[bool] = False
@@ -277,6 +281,10 @@ class LocalSpring(LocalForce):
         k_3, N/m^3, or N m/rad^3.  A softening spring, k_3 < 0, is valid up to u^2 = -k/k_3, where its force falls to zero
         and its potential energy has a maximum; with k = 0 it has no such limit.
 
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.MagneticForce
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -343,6 +351,10 @@ class ElectrostaticForce(_TowardsGap):
     gap : float
         g, m: where the electrode is, from the straight beam; negative below it.
 
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.MagneticForce
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -378,6 +390,10 @@ class MagneticForce(_TowardsGap):
     gap : float
         g, m: where the magnet is, from the straight beam; negative below it.
 
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.ElectrostaticForce
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -407,6 +423,10 @@ class QuadraticDamping(LocalForce):
     ----------
     coefficient : float
         c, N s^2/m^2.
+
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.CoulombFriction
 
     Examples
     --------
@@ -442,6 +462,10 @@ class CoulombFriction(LocalForce):
         F_c, N.
     smoothing_velocity : float
         v_0, m/s.
+
+    See Also
+    --------
+    snapbeam.LocalForce, snapbeam.QuadraticDamping
 
     Examples
     --------

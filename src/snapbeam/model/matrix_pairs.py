@@ -124,7 +124,8 @@ def _diagonal(stiffness: Any) -> _Array:
 
 
 _DOUBT = 1e6 * _EPS
-"""Over the largest eigenvalue: below it, rounding takes more than six digits of an eigenvalue of the whole matrix."""
+"""Size of an eigenvalue over the largest: below it, rounding takes more than six digits of an eigenvalue of the whole
+matrix."""
 _SPREAD = 32.0 * _EPS
 """Error of a Rayleigh quotient, over the root of the sum of the squares of its terms: they round independently."""
 _APART = 100.0
@@ -158,7 +159,7 @@ def eigenpairs(stiffness: Any, mass: Any, magnitude: Any = None, count: int | No
     Parameters
     ----------
     stiffness, mass : array or sparse matrix of shape (N, N)
-        Symmetric; the mass positive definite.
+        Symmetric matrices; the mass is positive definite.
     magnitude : array of shape (N, N), optional
         Sum of the moduli of the terms that the stiffness is the sum of; |K| by default.
     count : int, optional

@@ -59,6 +59,10 @@ def modal_error(system: System, quantity: Callable[[System], ArrayLike] = well_f
         NaN for a structure given by matrices, whose modes are given, if the numbers of components differ, and above 64
         modes.
 
+    See Also
+    --------
+    snapbeam.model.converged_modes
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -134,6 +138,10 @@ def converged_modes(system: System, error: float = AUTO_ERROR) -> int:
     ------
     InputError
         If 64 modes do not suffice, or the structure is given by matrices.
+
+    See Also
+    --------
+    snapbeam.model.modal_error, snapbeam.ReducedModel
 
     Examples
     --------

@@ -177,6 +177,10 @@ def exact_natural_frequencies(beam: Beam, count: int = 10) -> _Array:
     Returns
     -------
     array of shape (count,)
+
+    See Also
+    --------
+    snapbeam.Beam, snapbeam.ReducedModel
     """
     if not isinstance(beam, Beam):
         raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")

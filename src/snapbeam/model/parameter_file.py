@@ -451,7 +451,7 @@ class Config:
     given : mapping of str to mapping
         Checked values by section and name.
     extends_paper : bool
-        Whether the paper's values complete what is not given.  If not, a missing value is refused.
+        True if the paper's values complete what is not given.  If False, a missing value is refused.
     as_given : mapping of str
         Texts with units, and numbers in physical units, by dotted name.
     """
@@ -815,7 +815,7 @@ class Config:
         return found
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
-        """Given values as a nested dictionary, in the layout of a file."""
+        """The given values as a nested dictionary, in the layout of a file."""
         return {section: dict(values) for section, values in self.given.items() if values}
 
 
@@ -855,7 +855,7 @@ def config_from_mapping(
     source : str
         Source of the values, the prefix of each error message.
     complete : bool
-        Whether they must describe a system.  If not, each value is checked, but others may complete them.
+        True if the values must describe a system.  If False, each value is checked, but others may complete them.
     folder : path
         Folder of the files of records that are named.
 

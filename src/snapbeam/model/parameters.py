@@ -65,7 +65,7 @@ class Parameter:
     quantity : ParameterField
         Unit, limits, words, symbol and scope.
     default : object
-        What it is if nothing is given; None if it follows from others, is needed or has none.
+        Value if nothing is given; None if it follows from others, is needed or has none.
     kinds : tuple of str
         Laws of contact, or drives, that have it; empty for the other sections.
     """

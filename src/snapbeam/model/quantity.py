@@ -42,7 +42,7 @@ class ParameterField:
     unit : str
         SI unit, ``"1"`` if it has none.
     long_name : str
-        What it is.
+        Meaning in words.
     kind : type
         float, int, bool, str, or object for anything that checks itself.
     low, high, closed
@@ -57,9 +57,9 @@ class ParameterField:
     plausible : triple, optional
         The sizes that numbers of real structures have, and the unit that is probably meant outside.
     optional : bool
-        Whether it may be None.
+        True if the field may be None.
     parse : callable, optional
-        Of kind object: takes name and value, returns what the field holds, or refuses.
+        ``parse(name, value)`` of a field of kind object: returns what the field holds, or refuses.
     """
 
     unit: str
@@ -102,6 +102,10 @@ class ParameterField:
 
 def quantity(unit: str, words: str, *, default: Any = dataclasses.MISSING, **more: Any) -> Any:
     """A dataclass field that is a :class:`ParameterField`.
+
+    See Also
+    --------
+    snapbeam.ContactLaw, snapbeam.Drive, snapbeam.LocalForce
 
     Examples
     --------

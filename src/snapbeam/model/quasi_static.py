@@ -39,12 +39,16 @@ def quasi_static_threshold(
     frequency_ratio : array_like
         Omega, each greater than 0.  The two broadcast against each other.
     beam : Beam, optional
-        Whose first buckling mode it is, where its ends turn; between clamps it is the same for every beam.  It must be
-        buckled.
+        Buckled beam whose first buckling mode is used if its ends turn; between clamps that mode is the same for every
+        beam.
 
     Returns
     -------
     array of the broadcast shape
+
+    See Also
+    --------
+    snapbeam.threshold, snapbeam.sweep
     """
     x = finite_array("location", location)
     ratio = finite_array("frequency_ratio", frequency_ratio)

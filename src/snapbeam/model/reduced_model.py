@@ -40,7 +40,7 @@ from snapbeam.util.validation import (
 
 
 _HALVINGS = 2200
-"""More than halve any interval of two numbers until no number lies between."""
+"""Number of halvings after which no number lies between the ends of any interval."""
 
 
 def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
@@ -62,7 +62,7 @@ def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
     Returns
     -------
     eigenvalues : array of shape (n,)
-        Ascending.
+        Eigenvalues, ascending.
     vectors : array of shape (n, n)
         Columns with Y^T (Id + c 1 1^T) Y = Id.
     """
@@ -373,7 +373,7 @@ class Wells:
 
     @cached_property
     def two_well_limits(self) -> str:
-        """In words, the nearest imperfection and the minimum axial load with two wells, of a beam with one; computed.
+        """Words for the nearest imperfection and the minimum axial load with two wells, of a beam with one; computed.
 
         Raises
         ------
@@ -457,7 +457,7 @@ class Wells:
 _FURTHEST_IMPERFECTION = 100.0
 """Maximum and, inverted, minimum factor of the imperfection at which two wells are looked for."""
 _FURTHEST_LOAD = 40.0
-"""Over the critical load."""
+"""Maximum axial load over the critical load at which two wells are looked for."""
 _HINT_STEPS = 81
 
 
@@ -539,6 +539,10 @@ class ReducedModel(Wells):
     imperfection : Imperfection or None
         Imperfection from which *transverse_force* follows.
 
+    See Also
+    --------
+    snapbeam.Beam, snapbeam.System, snapbeam.model.converged_modes
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -596,6 +600,7 @@ class ReducedModel(Wells):
         Parameters
         ----------
         beam : Beam
+            Beam to reduce.
         modes : int
             Number of modes N, 1 to 256.
         damping_ratio : float or array of shape (N,)
@@ -937,7 +942,7 @@ class ReducedModel(Wells):
 
     @property
     def reference_text(self) -> str:
-        """In words, the frequency that normalises, its well, and the well where a run without a striker begins."""
+        """Words for the frequency that normalises, its well, and the well where a run without a striker begins."""
         names = {
             "given": "as given",
             "only": "the first frequency about the equilibrium",

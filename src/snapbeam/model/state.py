@@ -51,19 +51,19 @@ class State:
     phase : array_like of shape (...), optional
         Phase of the drive, rad; NaN, or nothing given: the one that the drive has at the start.
     striker_position : array_like of shape (...), optional
-        Where the mid-position of the tip is in space, m; NaN, or nothing given: the tip touches the beam.
+        Mid-position of the tip in space, m; NaN, or nothing given: the tip touches the beam.
     contact_time : array_like of shape (..., strikers), optional
         Seconds since the present contact of each striker began, in the order of the strikers; negative where tip and
         beam are apart.  NaN, or nothing given: the penetration decides.
     striker_shift, striker_rate : array_like of shape (...) or (..., strikers)
-        Of strikers with mass: displacement (m) and velocity (m/s) of the tip beyond the motion of its drive, positive
-        towards the upper well; NaN of strikers without.  Of several strikers one number for each.
+        Displacement (m) and velocity (m/s) of the tip of a striker with mass beyond the motion of its drive, positive
+        towards the upper well; NaN of strikers without.  One number for each of several strikers.
     indentation : array_like of shape (...) or (..., strikers)
-        Of contacts under a law with plastic deformation: residual indentation, m; NaN of others, and where there is none
-        yet.  Of several strikers one number for each.
+        Residual indentation of contacts under a law with plastic deformation, m; NaN of others, and where there is none
+        yet.  One number for each of several strikers.
     circuit : array_like of shape (...) or (..., harvesters)
-        Of the circuits of harvesters: voltage (V) of piezoelectric layers, current (A) of a coil with an inductance; NaN
-        where there is none, or where it is at rest.
+        State of the circuits of harvesters: voltage (V) of piezoelectric layers, current (A) of a coil with an
+        inductance; NaN where there is none, or where it is at rest.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitude and velocity that were carried along, k of them.
     statistics : mapping, optional
@@ -71,6 +71,10 @@ class State:
         integration failed, ``statistics["status"]`` gives the reason and the state is NaN.
     modal : ModalState, optional
         The same in an engine's coordinates.
+
+    See Also
+    --------
+    snapbeam.advance, snapbeam.System
 
     Examples
     --------
@@ -311,7 +315,7 @@ def amplitude_scale(model: ReducedModel) -> float:
 
 
 def rest_state(model: ReducedModel, striker: Striker | None = None) -> State:
-    """At rest in the well that the striker pushes away from, and touched by it.
+    """State at rest in the well that the striker pushes away from, and touched by it.
 
     Without a striker: in the as-fabricated well, on the side of the initial shape; in the lower one of a beam without.
     """

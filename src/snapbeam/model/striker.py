@@ -39,6 +39,10 @@ class Striker:
     suspension_damping : float
         Damper c_s of its suspension, N s/m, below critical; a coil of force factor K on a resistance R adds K^2/R.
 
+    See Also
+    --------
+    snapbeam.Shaker, snapbeam.Contact
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -131,6 +135,10 @@ class Shaker:
         Side of the beam the shaker pushes from.  ``"below"``: it pushes upward on the beam at rest in
         its lower well.  ``"above"`` is the mirror image, downward on the upper well.
 
+    See Also
+    --------
+    snapbeam.Striker, snapbeam.Sine
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -166,11 +174,16 @@ class Contact:
     Parameters
     ----------
     law : ContactLaw
+        Law of the force between tip and structure.
     striker : Striker or Shaker
-        Of several, each has its own location, side, gap and drive.  Without a gap its tip touches the beam at rest in the
+        Striker with its own location, side, gap and drive.  Without a gap its tip touches the beam at rest in the
         well that the first striker pushes away from.
     label : str, optional
         Name in parameter names, in place of the number of the contact: ``"stop"`` in ``contact.stop.gap``.
+
+    See Also
+    --------
+    snapbeam.ContactLaw, snapbeam.Striker
 
     Examples
     --------

@@ -71,6 +71,7 @@ class System:
     Parameters
     ----------
     model : ReducedModel
+        Reduced model of the structure.
     contacts : sequence of Contact, optional
         Strikers, each with the law of its contact.  Without any the structure vibrates freely from *initial_state*.
     forces : sequence of LocalForce or ExternalForce, optional
@@ -83,10 +84,14 @@ class System:
     harvesters : sequence of PiezoelectricHarvester or ElectromagneticHarvester, optional
         Circuits that turn motion into power in a resistor.
     initial_state : State, optional
-        Where runs begin, one state; by default at rest in *initial_well*.
+        State in which runs begin, one and not a batch; at rest in *initial_well* by default.
     initial_well : {"lower", "upper"} or int, optional
         Well in which runs begin at rest, by name or by its index in ``unloaded_potential.wells``.  By default the one that the
         first striker or stop pushes away from, touched by it; :attr:`initial_well_text` names it.
+
+    See Also
+    --------
+    snapbeam.simulate, snapbeam.State
 
     Notes
     -----
@@ -301,10 +306,11 @@ class System:
 
     @cached_property
     def rest_state(self) -> State:
-        """At rest in the well that the first striker pushes away from, touched by it; without one, in the well of the start.
+        """State at rest in the well that the first striker pushes away from, touched by it.
 
-        With local forces it is the well of the system that a beam comes to, without inertia, from that well of the
-        structure.  An external force begins with the run, its constant part too.
+        Without a striker it is the well of the start.  With local forces it is the well of the system that a beam comes
+        to, without inertia, from that well of the structure.  An external force begins with the run, its constant part
+        too.
 
         Raises
         ------
@@ -388,7 +394,7 @@ class System:
 
     @property
     def _start_at_rest(self) -> State:
-        """At rest in the initial well."""
+        """State at rest in the initial well."""
         if self.initial_well is None:
             return self.rest_state
         try:

@@ -52,6 +52,7 @@ def advance(
     Parameters
     ----------
     system : System
+        System whose states are advanced.
     state : State, optional
         One state, or a batch, which all cores integrate in parallel; by default the initial state of the system.
     periods : float
@@ -65,7 +66,7 @@ def advance(
     integration : Integration, optional
         Solver settings.  The states are advanced for *periods*, without early termination.
     save_every_period : bool
-        Whether to return the state after each period, along a new first dimension, instead of the last one.  The
+        Return the state after each period, along a new first dimension, instead of the last one.  The
         ``statistics`` are those of all periods, except the status, which is that of each state.
     progress : callable, optional
         Function that receives ``(done, total)``, numbers of states; True writes a line to standard error.
@@ -76,6 +77,10 @@ def advance(
         The advanced state, with its ``statistics``, in the shape of the batch, and its ``tangent`` if *tangent* was
         given.  A contact that has not ended does not count as an impact.  If a state could not be reached,
         ``statistics["status"]`` gives the reason, and its numbers are NaN.
+
+    See Also
+    --------
+    snapbeam.simulate, snapbeam.State
 
     Examples
     --------

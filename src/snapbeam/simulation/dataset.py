@@ -118,7 +118,7 @@ def trajectory_dataset(
     Returns
     -------
     xarray.Dataset
-        With dimensions ``time`` and, if there are modal amplitudes, ``mode`` counted from 1; every variable
+        Dataset with the dimensions ``time`` and, if there are modal amplitudes, ``mode`` counted from 1; every variable
         carries ``units`` and ``long_name``.
     """
     from snapbeam.util.datasets import xr

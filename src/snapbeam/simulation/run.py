@@ -41,13 +41,17 @@ class Run:
     impacts : xarray.Dataset
         Onset, duration, peak force and impulse of each impact.
     system : System
-        The model.
+        The system that was simulated.
     integration : Integration
         Solver settings.
     accuracy : ErrorEstimate or None
         Error estimate, if a tolerance was given.
     final_state : State or None
         State at the end of the run; None if the run failed.
+
+    See Also
+    --------
+    snapbeam.simulate, snapbeam.RunSummary, snapbeam.load
 
     Examples
     --------

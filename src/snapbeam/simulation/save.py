@@ -61,6 +61,10 @@ def description(
 def load(path: str | os.PathLike[str]) -> Run:
     """Read a run that :meth:`snapbeam.Run.save` wrote.
 
+    See Also
+    --------
+    snapbeam.Run, snapbeam.simulate_to_file
+
     Examples
     --------
     >>> import snapbeam as sb

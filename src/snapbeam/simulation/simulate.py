@@ -406,6 +406,10 @@ def simulate(
         If the sample times are not increasing within the run, or the samples need more than 4 GiB.  A run that fails
         numerically does not raise: ``run.summary.status`` gives the reason.
 
+    See Also
+    --------
+    snapbeam.simulate_to_file, snapbeam.advance, snapbeam.sweep
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -61,12 +61,13 @@ def simulate_to_file(
     Parameters
     ----------
     system : System
+        System to simulate.
     integration : Integration, optional
-        As for :func:`snapbeam.simulate`.
+        Solver settings, as for :func:`snapbeam.simulate`.
     path : path
         NetCDF file, ending in ``.nc``.  It appears when the run has ended, complete or not at all.
     sample_times : array_like, optional
-        As for :func:`snapbeam.simulate`.  Times that the run did not reach are omitted.
+        Times of the samples, s, as for :func:`snapbeam.simulate`.  Times that the run did not reach are omitted.
     progress : callable, optional
         Function that receives the finished fraction of the run, several times per second; True writes a line to standard
         error.
@@ -82,6 +83,10 @@ def simulate_to_file(
     NoRoomError
         If the disk is full.  The run ends before the part for which there is no room; the file has the samples up to
         there, the status ``INTERRUPTED`` and the state to continue from.
+
+    See Also
+    --------
+    snapbeam.simulate, snapbeam.load
 
     Examples
     --------

@@ -25,6 +25,10 @@ class RunSummary(Mapping[str, Any]):
     the way from the border of the wells to the other well (with one well, to the mirror image of its rest); with unequal wells, one
     well or without a striker, only such a run is interwell.
 
+    See Also
+    --------
+    snapbeam.Run, snapbeam.Statistic
+
     Examples
     --------
     >>> import snapbeam as sb

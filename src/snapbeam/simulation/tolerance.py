@@ -50,6 +50,10 @@ _BETWEEN = 2.0
 class ErrorEstimate:
     """Error estimate of a run of :func:`~snapbeam.simulate` with a tolerance.
 
+    See Also
+    --------
+    snapbeam.perturbation_growth, snapbeam.Integration
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -101,6 +105,7 @@ def perturbation_growth(
     Parameters
     ----------
     system : System
+        System whose runs are compared.
     integration : Integration, optional
         The number of cycles and the solver settings.  ``accuracy`` takes the place of its accuracy and tolerance.
     accuracy : {"standard", "reference"}
@@ -111,8 +116,12 @@ def perturbation_growth(
     Returns
     -------
     xarray.Dataset
-        Over ``time`` (s) and ``cycle``: ``separation``, the maximum change up to that time of the displacement
+        Variable ``separation`` over ``time`` (s) and ``cycle``: the maximum change up to that time of the displacement
         at the striker and at mid-span, in units of b.
+
+    See Also
+    --------
+    snapbeam.simulate, snapbeam.ErrorEstimate
 
     Examples
     --------

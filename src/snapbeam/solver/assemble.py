@@ -1,4 +1,4 @@
-"""From a system and its runs to an ensemble: everything turned into modal numbers and ticks."""
+"""Assembly of an ensemble from a system and its runs: everything turned into modal numbers and ticks."""
 
 from __future__ import annotations
 

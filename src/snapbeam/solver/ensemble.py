@@ -57,7 +57,7 @@ class CircuitCoupling(NamedTuple):
     share: _Array
     """Fraction of the loss that is dissipated in the load."""
     volts: _Array
-    """Across the load, V, per unit of the circuit's coordinate."""
+    """Voltage across the load, V, per unit of the circuit's coordinate."""
     unit: float
     """Volts or amperes of the circuit's state per unit of its coordinate."""
 
@@ -76,7 +76,7 @@ class FurtherContactTable:
     since: _Array
     """s since the contact began; negative: apart; NaN: the penetration decides; shape (runs, strikers)."""
     places: _Integers
-    """Which row each has, shape (runs, strikers)."""
+    """Row of each contact, shape (runs, strikers)."""
     rows: _Array
     """Contact rows, each with the sign of its own side, shape (rows, N)."""
 

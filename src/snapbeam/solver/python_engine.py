@@ -227,7 +227,7 @@ class Simulation(Records):
         size = 0.1 * self.rtol * ensemble.scale.length / max(float(np.linalg.norm(self.places[1])), 1e-300)
         sizes = (np.full(eq.n, size), np.full(eq.n, size * ensemble.scale.omega), np.full(sums.size, np.inf))
         self.atol = np.concatenate(sizes)
-        """Of a step; integrals do not choose it."""
+        """Absolute tolerance of a step; integrals do not choose it."""
         self.limited = [each for each, law in eq.local if law.is_limited()]
 
     def events(self) -> list[tuple[int, str, _Event]]:

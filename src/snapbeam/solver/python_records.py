@@ -43,9 +43,9 @@ class Records:
         wells = ensemble.structure.unequal_wells
         self.second_well = ensemble.structure.shift + (0.0 if wells is None else wells.second)
         self.onset, self.begun = [0.0] * count, [0.0] * count
-        """Of each contact: onset of the present impact, and its impulse until then."""
+        """Onset of the present impact of each contact, and its impulse until then."""
         self.loads = [False] * count
-        """Of each contact with a memory: its law is on the way that changes the memory, not below it."""
+        """True for each contact with a memory whose law is on the way that changes the memory, not below it."""
         self.peaks, self.largest, self.hits = [0.0] * count, [0.0] * count, [0] * count
         for j, since in enumerate(eq.since):
             d, rate, numbers = eq.contact(j, 0.0, s)

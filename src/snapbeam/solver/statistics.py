@@ -47,7 +47,7 @@ class CompletedStep(NamedTuple):
     """A step, as statistics see it; SI units, displacements positive away from the striker."""
 
     time: float
-    """At its beginning, s."""
+    """Time at its beginning, s."""
     length: float
     displacement: tuple[float, float]
     """Displacement of the beam at the striker's location, at the two ends of the step."""
@@ -55,7 +55,7 @@ class CompletedStep(NamedTuple):
     midspan_displacement: tuple[float, float]
     midspan_velocity: tuple[float, float]
     penetration: tuple[float, float]
-    """Of the first contact; -1e30 without a striker."""
+    """Penetration of the first contact at the two ends of the step, m; -1e30 without a striker."""
     touching: bool
 
 
@@ -116,12 +116,14 @@ class Statistic:
     name : str
         Variable of a map, and attribute of an :class:`~snapbeam.RunSummary`.
     dtype : str
+        Data type of the variable.
     unit : str
-        As UDUNITS knows it; ``"1"`` for displacements over b and velocities over b omega_1.
+        Unit as UDUNITS knows it; ``"1"`` for displacements over b and velocities over b omega_1.
     long_name : str
+        Meaning in words.
     value : callable
-        From a :class:`~snapbeam.solver.statistics.Reading` of many runs to an array of shape (runs,).  With
-        *update*: from the reading and the array of results of *update*.
+        Function of a :class:`~snapbeam.solver.statistics.Reading` of many runs that returns an array of shape (runs,).
+        With *update* also of the array of results of *update*.
     update : callable, optional
         ``update(held, step) -> held``, a scalar function of numbers; *step* is a
         :class:`CompletedStep`.
@@ -129,6 +131,10 @@ class Statistic:
         Initial value of *update*.
     comment : str
         Relative error of the integral or of the maximum over time, in addition to the error of the run.
+
+    See Also
+    --------
+    snapbeam.register_statistic
 
     Examples
     --------
@@ -421,6 +427,10 @@ def updated() -> tuple[Statistic, ...]:
 def register_statistic(statistic: Statistic) -> None:
     """Add a statistic to the table; every run and map from now on has it.
 
+    See Also
+    --------
+    snapbeam.Statistic, snapbeam.unregister_statistic
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -451,6 +461,10 @@ def register_statistic(statistic: Statistic) -> None:
 
 def unregister_statistic(name: str) -> None:
     """Take a registered statistic out of the table again.
+
+    See Also
+    --------
+    snapbeam.register_statistic
 
     Examples
     --------

@@ -31,14 +31,14 @@ _FEWEST = 30.0
 _MOST = 2.0**17
 _PER_OCTAVE = 20
 _IN_A_ROW = 3
-"""So many of the numbers that are tried must serve, the one that is taken and those above it: steps are made shorter to
-fit the cycle, and modes that come in step with the kicks spoil single lengths."""
+"""Successive numbers of those that are tried that must serve, the one that is taken and those above it: steps are made
+shorter to fit the cycle, and modes that come in step with the kicks spoil single lengths."""
 _FINER = 2.0
 """Steps of sixth order that all others are compared with, over the shortest of them."""
 CALM = 3.0
 """Energy of a motion over the barrier's beyond which flight steps are halved."""
 _STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (10.0, 1.0 / 160.0, 1.0, 1.0))
-"""Of each impulse its energy over the barrier's, how long it lasts at most in periods of the first mode, the length of the
+"""Energy of each impulse over the barrier's, its maximum duration in periods of the first mode, the length of the
 steps that are tried over the flight step, and the error allowed over the limit: a beam that rings in its well, and one
 after a strong impulse.  The first may ring for many cycles, so that steps of twice the length must serve."""
 _SHORT_IMPACT = 1.0 / 150.0
@@ -105,7 +105,7 @@ def flight_step(
     ----------
     model : ReducedModel
     order : int
-        Of the composition.
+        Order of the composition.
     limit : float
         Maximum error of a displacement, over the buckling level, after two periods of the first mode; where the
         start is sensitive, that many times the displacement's relative slope along the velocity at the start.
@@ -403,7 +403,7 @@ def choose_base_step(
     Parameters
     ----------
     model, contact
-        What is struck, and how.  Where does not matter: the steps suit the lightest point of the beam, so
+        Structure and contact law.  The location does not matter: the steps suit the lightest point of the beam, so
         that every run of a map is stepped alike.
     step : float, optional
         Flight step in seconds, instead of the default; contact steps scale with it.

@@ -93,7 +93,7 @@ class Structure:
     omega: _Array
     """Natural frequencies, rad/s."""
     damping_ratio: _Array
-    """Of the modes by themselves; what a damping matrix has beyond it is sum_k c_k u_k u_k^T."""
+    """Damping ratios of the modes by themselves; what a damping matrix has beyond it is sum_k c_k u_k u_k^T."""
     damping_rows: _Array
     """u_k, shape (K, N)."""
     damping_coefficients: _Array
@@ -107,7 +107,7 @@ class Structure:
     center: _Array
     """V^T phi(1/2)."""
     shift: _Array
-    """From this well to its mirror image, as q: the other well, where the two are equal."""
+    """Vector from this well to its mirror image, as q: the other well, where the two are equal."""
     stretch: float
     """Squared slopes in the well, alpha_eq . alpha_eq; 0 if there is one well only."""
     center_rest: float
@@ -173,7 +173,7 @@ class Structure:
         return -self.well, self.unequal_wells.second, self.unequal_wells.force
 
     def high_modes(self, omega: float) -> NDArray[np.bool_]:
-        """Which modes are vibration modes of the beam above an angular frequency, rad/s; shape (N,)."""
+        """Mask of the modes that are vibration modes of the beam above an angular frequency, rad/s; shape (N,)."""
         return (self.omega > omega) & (np.arange(self.omega.size) < self.equilibrium.size)
 
     def bodies_of(self, values: _Array) -> _Array:

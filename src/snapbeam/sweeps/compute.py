@@ -51,6 +51,10 @@ class _Incomplete(Exception):
 class SweepReport:
     """Counts of computed, resumed, damaged and failed tasks of a sweep.
 
+    See Also
+    --------
+    snapbeam.sweep, snapbeam.CheckpointOptions
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -93,6 +97,10 @@ class CheckpointOptions:
         Function that receives a message about the computation, as ``note(text)``.
     report : SweepReport, optional
         Object that receives the counts of computed, resumed, damaged and failed tasks.
+
+    See Also
+    --------
+    snapbeam.sweep, snapbeam.read_checkpoint
 
     Examples
     --------

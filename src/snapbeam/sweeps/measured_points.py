@@ -44,6 +44,10 @@ class MeasuredPoints:
     response_class : int8 array of shape (points,)
         :class:`~snapbeam.ResponseClass` of each.
 
+    See Also
+    --------
+    snapbeam.read_measured_points, snapbeam.uncertainty.score_measurements
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -104,6 +108,10 @@ def read_measured_points(
         First natural frequency, Hz, wanted for ``frequency_hz`` and ``velocity_m_s``.
     buckling_level : float, optional
         Buckling level b, m, wanted for ``velocity_m_s``: V = velocity / (2 pi b f_1).
+
+    See Also
+    --------
+    snapbeam.MeasuredPoints, snapbeam.lab.compare_measured_points
 
     Examples
     --------

@@ -29,9 +29,13 @@ class Replicates:
     perturbation_rms : float
         Root mean square of the perturbation of the mid-span displacement, m.
     check_half_step : bool
-        Whether to add a run with the unperturbed initial condition and half the step.
+        Add a run with the unperturbed initial condition and half the step.
     seed : int
         Seed of the random perturbations.
+
+    See Also
+    --------
+    snapbeam.sweep, snapbeam.perturbation_growth
 
     Examples
     --------

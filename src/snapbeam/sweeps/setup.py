@@ -150,7 +150,7 @@ class SweepSetup:
         columns : dict of str to array of shape (runs,)
             The points.
         threads, progress
-            As for an engine.
+            Number of threads and report of progress, as for an engine.
         start : callable, optional
             ``start(system, state) -> State`` returns other initial conditions; *state* is that of the points, or
             None if they do not determine it.

@@ -78,6 +78,10 @@ def sweep(
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 
+    See Also
+    --------
+    snapbeam.threshold, snapbeam.CheckpointOptions, snapbeam.plot.plot_response_map
+
     Examples
     --------
     >>> import snapbeam as sb

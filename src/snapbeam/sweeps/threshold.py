@@ -78,7 +78,7 @@ def threshold(
     Returns
     -------
     xarray.Dataset
-        Over the axes:
+        Variables over the axes:
 
         - ``lower_threshold``: lowest value with an interwell run; NaN if no run is interwell.
         - ``upper_threshold``: lowest value from which every run with a response class is interwell; NaN if the
@@ -101,6 +101,10 @@ def threshold(
     InputError
         If the parameter belongs to the model and cannot differ between the runs of an ensemble, or there are fewer
         than two values.
+
+    See Also
+    --------
+    snapbeam.sweep, snapbeam.uncertainty.quantile_threshold, snapbeam.plot.plot_threshold
 
     Examples
     --------

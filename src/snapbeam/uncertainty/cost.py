@@ -47,6 +47,10 @@ class CostEstimate:
     trial_runs : int
         Runs of the trial.
 
+    See Also
+    --------
+    snapbeam.uncertainty.estimate_cost
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -102,6 +106,10 @@ def estimate_cost(
         Its arguments; nothing is written to a checkpoint.
     trial : float
         Seconds that the trial may take after its first batch; at most 600.  The trial also stops at 100,000 runs.
+
+    See Also
+    --------
+    snapbeam.uncertainty.CostEstimate
 
     Examples
     --------

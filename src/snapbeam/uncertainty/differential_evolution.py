@@ -23,13 +23,18 @@ class DifferentialEvolution:
     Parameters
     ----------
     bounds : array_like of shape (variables, 2)
+        Minimum and maximum of every variable.
     population : int
-        At least 6.
+        Number of designs of a generation, at least 6.
     rng : int, numpy.random.Generator or None
         A seed; a generator, which gives one; None takes one from the system.  Generation g samples from its number and the
         seed alone.
     weight, crossover : float
         F in (0, 2) and CR in [0, 1].
+
+    See Also
+    --------
+    snapbeam.uncertainty.optimize_design, snapbeam.uncertainty.design_problem
 
     Examples
     --------
@@ -80,7 +85,7 @@ class DifferentialEvolution:
         Parameters
         ----------
         objectives : array_like of shape (population, objectives)
-            Minimised; infinite if unknown.
+            Values to minimise; infinite if unknown.
         violation : array_like of shape (population,)
             0 where all constraints are satisfied.
         """
@@ -151,7 +156,7 @@ def _beats(objectives: _Array, broken: float, others: _Array, others_broken: flo
 
 
 def front_of(objectives: _Array) -> NDArray[np.bool_]:
-    """Which of some designs no other one dominates."""
+    """Mask of the designs that no other one dominates, shape (designs,)."""
     return np.array(
         [not any(dominates(other, own) for other in objectives) for own in objectives], dtype=bool
     )

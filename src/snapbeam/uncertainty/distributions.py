@@ -56,9 +56,13 @@ class Normal(Distribution):
     Parameters
     ----------
     standard_deviation : float
-        In the unit of the parameter, or as a share of the nominal value.
+        Standard deviation in the unit of the parameter, or as a share of the nominal value.
     relative : bool
-        Whether it is a share.
+        True if *standard_deviation* is a share of the nominal value.
+
+    See Also
+    --------
+    snapbeam.uncertainty.LogNormal, snapbeam.uncertainty.UniformTolerance
 
     Examples
     --------
@@ -91,9 +95,13 @@ class UniformTolerance(Distribution):
     Parameters
     ----------
     half_width : float
-        In the unit of the parameter, or as a share of the nominal value.
+        Half width in the unit of the parameter, or as a share of the nominal value.
     relative : bool
-        Whether it is a share.
+        True if *half_width* is a share of the nominal value.
+
+    See Also
+    --------
+    snapbeam.uncertainty.UniformRange, snapbeam.uncertainty.Normal
 
     Examples
     --------
@@ -126,6 +134,10 @@ class LogNormal(Distribution):
     sigma : float
         Standard deviation of the logarithm.
 
+    See Also
+    --------
+    snapbeam.uncertainty.Normal
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -152,7 +164,11 @@ class UniformRange(Distribution):
     Parameters
     ----------
     low, high : float
-        In the unit of the parameter.
+        Minimum and maximum in the unit of the parameter.
+
+    See Also
+    --------
+    snapbeam.uncertainty.UniformTolerance
 
     Examples
     --------
@@ -172,7 +188,7 @@ class UniformRange(Distribution):
             raise InputError(f"low = {self.low:g}, high = {self.high:g}: low must be less than high")
 
     def at(self, nominal: _Array, normal: _Array) -> _Array:
-        """Between the two by the rank."""
+        """Value between the two by the rank."""
         return np.asarray(self.low + (self.high - self.low) * ndtr(normal) + 0.0 * nominal)
 
 
@@ -183,7 +199,7 @@ class Empirical(Distribution):
     Parameters
     ----------
     quantiles : tuple of float
-        At evenly spaced ranks from 0 to 1, at least two, not falling.
+        Quantiles at evenly spaced ranks from 0 to 1, at least two, not falling, in the unit of the parameter.
     """
 
     quantiles: tuple[float, ...]
@@ -196,7 +212,7 @@ class Empirical(Distribution):
         object.__setattr__(self, "quantiles", tuple(table.tolist()))
 
     def at(self, nominal: _Array, normal: _Array) -> _Array:
-        """Between the quantiles by the rank."""
+        """Value between the quantiles by the rank."""
         ranks = np.linspace(0.0, 1.0, len(self.quantiles))
         return np.asarray(np.interp(ndtr(normal), ranks, self.quantiles) + 0.0 * nominal)
 
@@ -231,12 +247,17 @@ class ParameterUncertainty:
         Root mean square of a faint ringing at the start, of all modes with equal mean energy, at the centre, m; a beam
         that would be pressed by the tip at rest begins on the other side of its rest instead.
     phase : bool
-        Whether the drive begins at any phase of the half of its cycle in which the tip is drawn back.
+        True if the drive begins at any phase of the half of its cycle in which the tip is drawn back.
     hold_fixed : {"physical", "normalised"}
-        Which excitation stays fixed if the beam differs from the nominal one.  ``"physical"``: the same frequency in Hz,
+        Excitation that stays fixed if the beam differs from the nominal one.  ``"physical"``: the same frequency in Hz,
         velocity in m/s and location in m, so that Omega, V and x_s change with the beam's own frequency, buckling level
         and length.  ``"normalised"``: the same Omega, V and x_s.
     seed : int
+        Seed of the samples.
+
+    See Also
+    --------
+    snapbeam.uncertainty.probability_map, snapbeam.uncertainty.sample_systems
 
     Notes
     -----

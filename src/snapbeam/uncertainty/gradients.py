@@ -47,25 +47,31 @@ def gradient(
     Parameters
     ----------
     system : System
+        System at which derivatives are taken.
     quantity : str or callable
         A statistic of a run by its name, such as ``"peak_force"`` or ``"energy_harvested"``, or a function of a system that returns a
         number, such as a natural frequency or the amplitude of an orbit.
     parameters : str or sequence of str
         Numbers of the system that are not zero, by dotted or short name.
     integration : Integration, optional
-        Of the runs; early termination is off.
+        Settings of the runs; early termination is off.
 
     Returns
     -------
     xarray.Dataset
-        Over ``parameter``: ``derivative`` (per unit of the parameter), ``elasticity`` (relative change of the quantity per relative
-        change of the parameter) and ``relative_error``, infinite where neighbouring runs have other numbers of impacts at any
-        distance.  The elasticity is NaN where the quantity is zero.  The attributes have the ``quantity``, its ``value`` and its ``units``.
+        Variables over ``parameter``: ``derivative`` (per unit of the parameter), ``elasticity`` (relative change of the
+        quantity per relative change of the parameter) and ``relative_error``, infinite where neighbouring runs have
+        other numbers of impacts at any distance.  The elasticity is NaN where the quantity is zero.  The attributes
+        have the ``quantity``, its ``value`` and its ``units``.
 
     Raises
     ------
     InputError
         For a parameter that is zero or not a number, a quantity without a derivative (a class, a count), or a quantity that is not finite.
+
+    See Also
+    --------
+    snapbeam.uncertainty.sensitivity
 
     Examples
     --------

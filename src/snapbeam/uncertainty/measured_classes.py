@@ -53,10 +53,11 @@ def score_measurements(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`snapbeam.uncertainty.probability_map` over frequency ratio, velocity amplitude and location, or some of them, as
-        a grid; a measured point belongs to the nearest point of the grid, and must lie within half a spacing of the grid.
+        Probability map of :func:`snapbeam.uncertainty.probability_map` over frequency ratio, velocity amplitude and
+        location, or some of them, as a grid; a measured point belongs to the nearest point of the grid, and must lie
+        within half a spacing of the grid.
     measurements : MeasuredPoints
-        As :func:`snapbeam.sweeps.measured_points.read_measured_points` reads them; points of unknown class are left out.
+        Measured points, as :func:`snapbeam.read_measured_points` reads them; points of unknown class are left out.
     samples : int
         Sets of responses sampled from the map, with which the measured ones are compared.
     rng : int, numpy.random.Generator or None
@@ -65,11 +66,15 @@ def score_measurements(
     Returns
     -------
     xarray.Dataset
-        Along ``measurement``: ``response_class``, ``probability`` of that class with its 95 % limits, ``most_likely`` class and its
-        probability ``best``.  In the attributes: ``log_likelihood`` of all measurements; ``log_likelihood_low``,
-        ``log_likelihood_mean`` and ``log_likelihood_high`` (the 95 % range) of responses sampled from the map itself;
-        ``p_value``, the share of those that are no likelier than the measured ones; ``agree``, measurements of the most
-        likely class, with ``agree_expected``, as many as a right map lets expect.
+        Variables over ``measurement``:  ``response_class``, ``probability`` of that class with its 95 % limits,
+        ``most_likely`` class and its probability ``best``.  In the attributes: ``log_likelihood`` of all measurements;
+        ``log_likelihood_low``, ``log_likelihood_mean`` and ``log_likelihood_high`` (the 95 % range) of responses
+        sampled from the map itself; ``p_value``, the share of those that are no likelier than the measured ones;
+        ``agree``, measurements of the most likely class, with ``agree_expected``, as many as a right map lets expect.
+
+    See Also
+    --------
+    snapbeam.uncertainty.probability_map, snapbeam.read_measured_points
 
     Examples
     --------

@@ -98,10 +98,10 @@ class Measurements:
         to the model's modes of that shape in their order; else to all modes in their order, which at a
         buckling level of about 6 radii of gyration changes.
     damping_ratio : sequence of float
-        From free decays.
+        Damping ratios from free decays.
     damping_ratio_se : float or sequence of float, optional
     thickness, buckling_level : float, optional
-        As measured with a gauge, m: compared with the result, not fitted to.
+        Values measured with a gauge, m: compared with the result, not fitted to.
     contact : sequence of ContactTest
 
     Examples

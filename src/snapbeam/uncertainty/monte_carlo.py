@@ -102,7 +102,7 @@ class Trials:
         points : dict of str to array of shape (runs,)
             Nominal values by dotted name.
         numbers : int array of shape (runs,)
-            Which sample each is.
+            Number of the sample of each run.
         scores : array of shape (runs, parameters), optional
             Standard normal scores of the parameters, in place of those of the samples; the start is that of the sample.
         """
@@ -357,18 +357,23 @@ def sample_systems(system: System, uncertainty: ParameterUncertainty, count: int
     system : System
         The nominal system.
     uncertainty : ParameterUncertainty
+        Uncertain parameters and initial state.
     count : int
         Number of systems.
 
     Returns
     -------
     list of System
-        For :func:`snapbeam.simulate`.
+        Systems for :func:`snapbeam.simulate`, one for each sample.
 
     Raises
     ------
     InputError
         If a sampled value is out of range, or a parameter has no single value in the system.
+
+    See Also
+    --------
+    snapbeam.uncertainty.ParameterUncertainty, snapbeam.simulate
 
     Examples
     --------
@@ -405,7 +410,7 @@ def _has_no_unit(name: str) -> bool:
 
 
 Ask = Callable[[_Numbers, _Numbers], dict[str, NDArray[Any]]]
-"""Given points and samples, by number, the statistics of their runs."""
+"""Function of points and samples, by number, that returns the statistics of their runs."""
 
 
 # What a run may come to, read from its class: outcomes that have a probability.

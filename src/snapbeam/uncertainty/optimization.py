@@ -66,7 +66,7 @@ class DesignQuantity(NamedTuple):
     kind: str
     """``"outcome"`` and ``"run"``: of a run; ``"design"``: of the nominal design alone."""
     of: Callable[[System, Values], NDArray[Any]]
-    """From the nominal system and columns, parameters of designs or statistics of runs, to numbers."""
+    """Function of the nominal system and columns, parameters of designs or statistics of runs; returns numbers."""
 
 
 def _own(name: str, values: Values, system: System) -> _Array:
@@ -159,7 +159,11 @@ class Objective:
     quantile : float, optional
         Quantile of a statistic, in (0, 1), to optimise; its mean by default.
     maximize : bool
-        Whether it is to be large.
+        True if the quantity is to be large.
+
+    See Also
+    --------
+    snapbeam.uncertainty.Constraint, snapbeam.uncertainty.optimize_design
 
     Examples
     --------
@@ -242,11 +246,15 @@ class Constraint:
     Parameters
     ----------
     quantity : str
-        As in :class:`Objective`.
+        Name of the quantity, as in :class:`Objective`.
     lower, upper : float, optional
         One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
-        Of a statistic of runs: required fraction of all systems that satisfy it, in (0, 1).
+        Required fraction of all systems that satisfy a constraint of a statistic of runs, in (0, 1).
+
+    See Also
+    --------
+    snapbeam.uncertainty.Objective, snapbeam.uncertainty.optimize_design
 
     Examples
     --------
@@ -391,7 +399,7 @@ class DesignProblem:
         Parameters
         ----------
         designs : array_like of shape (designs, variables)
-            In the order of :attr:`names`.
+            Values of the variables in the order of :attr:`names`.
         """
         return self.judge(designs)[0]
 
@@ -406,8 +414,8 @@ class DesignProblem:
         -------
         Worth
         distances : array of shape (designs, constraints)
-            Of the fraction of the runs that satisfy a constraint from the required one, or of a quantity of the design from its
-            limit; negative if violated, NaN of a design that was not run.
+            Distance of the fraction of the runs that satisfy a constraint from the required one, or of a quantity of
+            the design from its limit; negative if violated, NaN of a design that was not run.
         """
         x = finite_array("designs", designs, 2)
         if x.shape[1] != len(self.bounds):
@@ -640,7 +648,7 @@ class OptimizerSettings:
     Parameters
     ----------
     generations : int
-        Including the first.
+        Number of generations, the first included.
     population : int
         Designs of a generation, at least 6.
     samples : int
@@ -654,7 +662,13 @@ class OptimizerSettings:
         Maximum number of further designs to validate, between the feasible one and better infeasible ones; they
         bring the design to its constraints.
     confidence : float
+        Confidence level of the intervals, in (0, 1).
     seed : int
+        Seed of the search.
+
+    See Also
+    --------
+    snapbeam.uncertainty.optimize_design
 
     Examples
     --------
@@ -713,6 +727,10 @@ def design_problem(
         Its ``evaluate(designs)`` gives objectives and violations of rows of designs, on the same samples each time; its
         ``estimate(design, numbers)`` intervals on samples of any numbers.
 
+    See Also
+    --------
+    snapbeam.uncertainty.optimize_design, snapbeam.uncertainty.DifferentialEvolution
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -765,16 +783,19 @@ def optimize_design(
     Parameters
     ----------
     system : System
-        The nominal one.
+        The nominal system.
     variables : mapping of str to (low, high)
         Real parameters that may be chosen.
     objectives : Objective or str, or a list of up to three
         Quantities to minimise; of several the result is the Pareto front.
     constraints : Constraint, or a list of them
+        Conditions that a design must satisfy.
     uncertainty : ParameterUncertainty
         Uncertain parameters and initial state of the system.
     settings : OptimizerSettings, optional
+        Settings of the optimiser.
     integration : Integration, optional
+        Settings of the runs.
     checkpoint : path or CheckpointOptions, optional
         Checkpoint folder; an existing one is resumed.
     progress : callable, optional
@@ -783,15 +804,19 @@ def optimize_design(
     Returns
     -------
     xarray.Dataset
-        Along ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...`` with
-        ``_low`` and ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of
-        systems that satisfy a constraint, with ``_low`` and ``_high``, and ``required_...``;
-        ``constraints_satisfied``: whether every lower limit is at least the required fraction, some upper limit
-        is less, or neither is known; ``distance_...``: that of the fraction from the required one, or of a
-        quantity of the design from its limit.  Along ``tried``: every design that was evaluated, its objectives
-        ``tried_distance_...`` and ``violation``.  If no design satisfies the constraints, the one that violates them least is
-        reported, with a :class:`~snapbeam.DiagnosticWarning`.  The attribute ``termination_reason`` gives the reason why the search and the
-        refinement stopped.
+        Variables over ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...``
+        with ``_low`` and ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of systems
+        that satisfy a constraint, with ``_low`` and ``_high``, and ``required_...``; ``constraints_satisfied``: whether
+        every lower limit is at least the required fraction, some upper limit is less, or neither is known;
+        ``distance_...``: that of the fraction from the required one, or of a quantity of the design from its limit.
+        Along ``tried``: every design that was evaluated, its objectives ``tried_distance_...`` and ``violation``.  If
+        no design satisfies the constraints, the one that violates them least is reported, with a
+        :class:`~snapbeam.DiagnosticWarning`.  The attribute ``termination_reason`` gives the reason why the search and
+        the refinement stopped.
+
+    See Also
+    --------
+    snapbeam.uncertainty.Objective, snapbeam.uncertainty.Constraint, snapbeam.uncertainty.OptimizerSettings
 
     Examples
     --------

@@ -75,7 +75,7 @@ _BESIDE = {"damping_ratio": "model.damping_ratio", "contact_stiffness": "contact
 
 @dataclass(frozen=True, eq=False)
 class Forward:
-    """From a beam to every measured frequency, in the order in which they are listed.
+    """Function from a beam to every measured frequency, in the order in which they are listed.
 
     Raises
     ------
@@ -162,11 +162,15 @@ class Waveform:
     displacement : array_like of shape (samples,)
         m, from the straight beam; NaN where nothing was found.
     standard_error : float
-        Of a sample, m.  Errors are taken as independent: thin samples that are not.
+        Standard error of a sample, m.  Errors are taken as independent: thin samples that are not.
     at : {"striker", "midspan"}
-        Where it was measured.
+        Place of the measurement.
     drive_error : float
         Relative standard error of the amplitude of the drive.
+
+    See Also
+    --------
+    snapbeam.uncertainty.estimate_posterior, snapbeam.lab.compare_waveforms
 
     Examples
     --------
@@ -299,15 +303,19 @@ class Posterior:
     Attributes
     ----------
     parameters : tuple of str
-        By dotted name.
+        Dotted names of the parameters.
     values : array of shape (samples, parameters)
-        SI.
+        Values of the parameters of every sample, SI units.
     weights : array of shape (samples,)
-        Add up to 1.
+        Weights of the samples, which add up to 1.
     termination_reason : str
         Reason why the search for the most likely beam stopped, and the effective sample size.
     converged : bool
         False if the search reached its maximum number of evaluations: the samples are about the best beam that it found.
+
+    See Also
+    --------
+    snapbeam.uncertainty.estimate_posterior, snapbeam.uncertainty.class_likelihood
 
     Examples
     --------
@@ -367,6 +375,7 @@ class Posterior:
         Parameters
         ----------
         log_likelihood : array_like of shape (samples,)
+            Logarithm of the likelihood of the measurement under every sample.
         """
         more = np.asarray(log_likelihood, dtype=np.float64)
         if more.shape != self.weights.shape or np.isnan(more).any():
@@ -454,7 +463,7 @@ def estimate_posterior(
     waveforms : Waveform or sequence of them
         Tracked motions of the beam under a striker; each counts up to its predictability horizon.
     modes : int
-        For the frequencies; a waveform has those of its system.
+        Number of modes for the frequencies; a waveform has those of its system.
     samples : int
         Samples, at least 200.
     rng : int, numpy.random.Generator or None
@@ -467,6 +476,10 @@ def estimate_posterior(
     Posterior
         ``posterior.effective_sample_size`` is the number of independent samples that the weighted ones are worth.  If the search
         for the most likely beam does not converge, ``posterior.converged`` is False, with a :class:`~snapbeam.DiagnosticWarning`.
+
+    See Also
+    --------
+    snapbeam.uncertainty.Posterior, snapbeam.uncertainty.Waveform, snapbeam.lab.calibrate
 
     Notes
     -----
@@ -670,20 +683,24 @@ def class_likelihood(
     posterior : Posterior
         Few samples: :meth:`Posterior.resampled` first.
     system : System
-        The nominal one, by which Omega and V of the measurements are normalised.
+        The nominal system, by which Omega and V of the measurements are normalised.
     measurements : MeasuredPoints
         Excitation in Hz and m/s, the same for every sample; points of unknown class are omitted.
     uncertainty : ParameterUncertainty
         Uncertainty from test to test, such as ``ParameterUncertainty(displacement=3.5e-6)``, without parameters
         of the posterior.
     runs : int
-        Of each measured point and sample, the same random samples for all.
+        Number of runs of each measured point and sample, the same random samples for all.
     integration, checkpoint, progress
-        As in :func:`snapbeam.uncertainty.probability_map`.
+        Settings of the runs, folder and report of progress, as in :func:`snapbeam.uncertainty.probability_map`.
 
     Returns
     -------
     array of shape (samples,)
+
+    See Also
+    --------
+    snapbeam.uncertainty.estimate_posterior, snapbeam.uncertainty.score_measurements
 
     Examples
     --------

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
-"""Given points and numbers of samples, what happened, of shape (outcomes, runs), and which runs failed."""
+"""Function of points and numbers of samples; returns outcomes, shape (outcomes, runs), and a mask of failed runs."""
 TITLE = "probabilities of the response of a struck bistable beam"
 OUTCOME = "outcome"
 
@@ -54,8 +54,13 @@ class SamplingPlan:
     total_runs : int, optional
         Runs of all points together at most; those with the widest intervals come first.
     confidence : float
-        Of the intervals, in (0, 1).
+        Confidence level of the intervals, in (0, 1).
     interval : {"wilson", "jeffreys"}
+        Interval of a binomial proportion: Wilson's or Jeffreys'.
+
+    See Also
+    --------
+    snapbeam.uncertainty.probability_map
 
     Examples
     --------
@@ -203,10 +208,10 @@ def probability_map(
     Parameters
     ----------
     system : System
-        The nominal one.
+        The nominal system.
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
-        As in :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is sampled too is sampled around the
-        value of the point.
+        Points of the map, as in :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is sampled too
+        is sampled around the value of the point.
     uncertainty : ParameterUncertainty
         Uncertain parameters and initial state.
     runs : SamplingPlan or int, optional
@@ -217,7 +222,7 @@ def probability_map(
     checkpoint : path or CheckpointOptions, optional
         Checkpoint folder; an existing one is resumed.
     cluster, progress
-        As in :func:`snapbeam.sweep`; progress counts runs, of which the total grows.
+        Cluster and report of progress, as in :func:`snapbeam.sweep`; progress counts runs, of which the total grows.
 
     Returns
     -------
@@ -230,6 +235,10 @@ def probability_map(
     ------
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
+
+    See Also
+    --------
+    snapbeam.uncertainty.SamplingPlan, snapbeam.uncertainty.quantile_threshold, snapbeam.sweep
 
     Notes
     -----

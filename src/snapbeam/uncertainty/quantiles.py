@@ -48,7 +48,7 @@ _TABLE = {
 """Quantiles of the limiting distribution (Banerjee and Wellner 2001, Table 1)."""
 _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Array, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
-"""Given columns, values and numbers of samples: which runs hit, and which failed."""
+"""Function of columns, values and numbers of samples; returns masks of the runs that hit and that failed."""
 _WIDER = 0.5
 """Fraction of an interval by which the next round extends it on either side."""
 _SURE = 0.99
@@ -74,7 +74,7 @@ class Crossing(NamedTuple):
     """Value at which a probability curve crosses a given probability."""
 
     value: float
-    """Midway where the isotonic regression is less and where it is more; infinite where it never is."""
+    """Midpoint between where the isotonic regression is less and where it is more; infinite where it never is."""
     low: float
     """-inf if no run bounds it from below."""
     high: float
@@ -112,11 +112,11 @@ def crossing(values: ArrayLike, hits: ArrayLike, probability: float, confidence:
     Parameters
     ----------
     values, hits : array_like of shape (runs,)
-        Where each run was made, in any order, and whether it hit.
+        Value of the parameter of each run, in any order, and True if it hit.
     probability : float
-        In (0, 1).
+        Probability that is crossed, in (0, 1).
     confidence : float
-        In [0.5, 0.99].
+        Confidence level of the interval, in [0.5, 0.99].
     """
     q = within("probability", probability, 0.0, 1.0)
     limit = critical(confidence)
@@ -171,7 +171,7 @@ def rises(values: ArrayLike, hits: ArrayLike, *, bins: int = 12, samples: int = 
 def spans(
     values: ArrayLike, hits: ArrayLike, probability: float, confidence: float = 0.95, bins: int = 12
 ) -> tuple[float, float]:
-    """From the first value where the probability may be so great to the last where it may be so small.
+    """Range from the first value where the probability may be so great to the last where it may be so small.
 
     Nothing is assumed of how it rises or falls: the runs are put into bins, whose intervals hold all at once.
     """
@@ -252,17 +252,21 @@ class QuantileSearchSettings:
     Parameters
     ----------
     probabilities : tuple of float
-        Increasing, each in (0, 1).
+        Probabilities of the quantiles, increasing, each in (0, 1).
     runs : int
         Runs of every column, at least 40 a probability.
     rounds : int
         Rounds they are made in: the first over the whole range, each later one about the intervals found so far.
     confidence : float
-        Of the intervals, in [0.5, 0.99].
+        Confidence level of the intervals, in [0.5, 0.99].
     seed : int
-        Chooses the values at which runs are made.
+        Seed of the values at which runs are made.
     outcome : str
         Outcome of the probability, as in :class:`SamplingPlan`.
+
+    See Also
+    --------
+    snapbeam.uncertainty.quantile_threshold
 
     Examples
     --------
@@ -389,7 +393,7 @@ def quantile_threshold(
     Parameters
     ----------
     system : System
-        The nominal one.
+        The nominal system.
     parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``: a number that may differ between the runs of an ensemble.
     bounds : tuple of two floats
@@ -414,6 +418,10 @@ def quantile_threshold(
         limits where no run bounds it, NaN if ``outcome_of_search`` gives a reason. ``is_fitted``: true if the
         threshold is that of the fitted curve, and not of the isotonic regression alone.  ``is_monotonic``, with
         the probability ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
+
+    See Also
+    --------
+    snapbeam.uncertainty.QuantileSearchSettings, snapbeam.threshold
 
     Examples
     --------

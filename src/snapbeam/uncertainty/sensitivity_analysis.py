@@ -78,18 +78,25 @@ def sobol_indices_from_samples(
     Parameters
     ----------
     inputs : array_like of shape (runs, inputs)
+        Inputs of every run.
     output : array_like of shape (runs,)
+        Output of every run; at least 200 runs.
     confidence : float
+        Confidence level of the intervals, in (0, 1).
     bins : int, optional
-        By default one for forty runs, 5 to 100; the index does not contain the variation within a bin.
+        Number of bins; one for forty runs by default, 5 to 100.  The index does not contain the variation within a bin.
     rng : int, numpy.random.Generator or None
-        A seed; a generator, which gives one; None takes one from the system.
-        Chooses the groups.
+        Seed of the groups; a generator, which gives one; None takes one from the system.
 
     Returns
     -------
     Indices
-        Of inputs that matter little, the estimate may be less than 0 by chance.
+        Estimate and limits for each input, shape (inputs,).  The estimate of an input that matters little may be less
+        than 0 by chance.
+
+    See Also
+    --------
+    snapbeam.uncertainty.sobol_indices, snapbeam.uncertainty.sensitivity
 
     Examples
     --------
@@ -183,15 +190,21 @@ def sobol_indices(
     Parameters
     ----------
     function : callable
-        From ranks in (0, 1) of shape (inputs, points) to numbers of shape (points,); called once.
+        Function of ranks in (0, 1) of shape (inputs, points) that returns numbers of shape (points,); called once.
     inputs : int
+        Number of inputs.
     samples : int
         Points of a sequence, a power of 2; *replicates* times *samples* times (*inputs* + 2) points in all.
     replicates : int
-        At least 4; use more points rather than more replicates.
+        Number of sequences, at least 4; use more points rather than more replicates.
     confidence : float
+        Confidence level of the intervals, in (0, 1).
     rng : int, numpy.random.Generator or None
         A seed; a generator, which gives one; None takes one from the system.
+
+    See Also
+    --------
+    snapbeam.uncertainty.sobol_indices_from_samples, snapbeam.uncertainty.sensitivity
 
     Examples
     --------
@@ -277,8 +290,12 @@ class StatisticQoI:
     Parameters
     ----------
     name : str
-        Of :data:`snapbeam.STATISTICS`, of one of several strikers, such as ``"peak_force_contact_2"``, or an outcome
-        such as ``"snap"``: 1 where it happens, else 0.
+        Name of a statistic of :data:`snapbeam.STATISTICS`, of one of several strikers, such as
+        ``"peak_force_contact_2"``, or an outcome such as ``"snap"``: 1 where it happens, else 0.
+
+    See Also
+    --------
+    snapbeam.uncertainty.sensitivity, snapbeam.uncertainty.ThresholdQoI
 
     Examples
     --------
@@ -330,12 +347,17 @@ class ThresholdQoI:
     parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``.
     bounds : tuple of two floats
+        Minimum and maximum of the parameter, in its unit.
     values : int
         Values tried first, evenly spaced: a window of snapping narrower than their spacing may be missed.
     halvings : int
-        Of the step below the lowest that snaps.
+        Number of times that the step below the lowest value that snaps is halved.
     at : mapping of str to float, optional
         Other parameters, at nominal values.
+
+    See Also
+    --------
+    snapbeam.uncertainty.sensitivity, snapbeam.uncertainty.NotchQoI
 
     Examples
     --------
@@ -409,8 +431,13 @@ class NotchQoI:
     values : array_like
         Its values, strictly increasing, at least 3; the place is that of the parabola through the lowest three.
     threshold : ThresholdQoI
+        Threshold whose minimum is sought.
     depth : bool
         True for the threshold at the minimum, False for its position.
+
+    See Also
+    --------
+    snapbeam.uncertainty.sensitivity, snapbeam.uncertainty.ThresholdQoI
 
     Examples
     --------
@@ -480,8 +507,13 @@ class LifetimeQoI:
     Parameters
     ----------
     initial_conditions : InitialConditions
-        The same for every sample.
+        Initial conditions, the same for every sample.
     settings : LifetimeSettings, optional
+        Settings of the estimate of lifetimes.
+
+    See Also
+    --------
+    snapbeam.uncertainty.sensitivity, snapbeam.dynamics.lifetime_map
 
     Examples
     --------
@@ -559,20 +591,22 @@ def sensitivity(
     Parameters
     ----------
     system : System
-        The nominal one.
+        The nominal system.
     quantity : str or ThresholdQoI or NotchQoI or LifetimeQoI
         A statistic by its name, such as ``"peak_force"``, an outcome, or one of these.
     uncertainty : ParameterUncertainty
-        At least one uncertain parameter.
+        Uncertainty of at least one parameter.
     method : {"local", "sobol", "given_data"}
         ``"local"``: half the difference of the quantities with a parameter one standard normal score up and down, the
         others and the start as in *samples* samples (common random numbers).  ``"sobol"``: indices of the first order and
         in total over four scrambled sequences of *samples* points, all from one start.  ``"given_data"``: indices of
         the first order from *samples* plain samples, which may be correlated.
     samples : int, optional
-        16, 128 and 1000 by default.
+        Number of samples; 16, 128 and 1000 for the three methods by default.
     confidence : float
+        Confidence level of the intervals, in (0, 1).
     integration : Integration, optional
+        Settings of the runs.
     checkpoint : path or CheckpointOptions, optional
         Checkpoint folder of the runs of all quantities except lifetimes; an existing one is resumed.
     progress : callable, optional
@@ -581,15 +615,19 @@ def sensitivity(
     Returns
     -------
     xarray.Dataset
-        Over ``parameter``, with ``unit``: locally ``effect`` (of +1 standard score), ``derivative`` (per unit of the
-        parameter) and ``quantity_minus`` and ``quantity_plus``, the first two with limits; else ``first_order``, and
-        ``total_order`` of Sobol's, with limits.  Mean and standard deviation of the quantity are attributes.
+        Variables over ``parameter``, with ``unit``: locally ``effect`` (of +1 standard score), ``derivative`` (per unit
+        of the parameter) and ``quantity_minus`` and ``quantity_plus``, the first two with limits; else ``first_order``,
+        and ``total_order`` of Sobol's, with limits.  Mean and standard deviation of the quantity are attributes.
 
     Raises
     ------
     InputError
         If the quantity is missing for some samples, such as a threshold out of range, or does not vary, or if parameters
         are correlated with Sobol's indices.
+
+    See Also
+    --------
+    snapbeam.uncertainty.gradient, snapbeam.uncertainty.sobol_indices
 
     Examples
     --------

@@ -102,7 +102,7 @@ def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
 
 
 def _divisor(labels: Any, attrs: Any) -> str:
-    """What the values of a variable are over, in a unit of the SI, as the end of a column's name; empty if over nothing."""
+    """End of a column's name: the quantity in a unit of the SI that the values are over; empty if over nothing."""
     words = str(labels.get("long_name", ""))
     length, frequency = attrs.get("length_scale"), attrs.get("reference_frequency")
     if "over b omega_1^2" in words or "over b" not in words or length is None:

@@ -74,6 +74,10 @@ class ContactLaw:
     They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.  A name that none of these
     hooks has is refused when the class is defined; names of your own begin with an underscore.
 
+    See Also
+    --------
+    snapbeam.HertzContact, snapbeam.Contact, snapbeam.quantity
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -90,7 +94,7 @@ class ContactLaw:
     )  # fmt: skip
     """Names that are read of a law of one's own."""
     name: ClassVar[str] = ""
-    """In parameter files and attributes."""
+    """Name in parameter files and attributes."""
     impulsive: ClassVar[bool] = False
     """True if an impact has zero duration: a jump of the velocity instead of a force."""
     rate_dependent: ClassVar[bool] = False

@@ -31,6 +31,10 @@ class ElasticPlasticContact(ContactLaw):
     unloading_stiffness : float
         k_2 on unloading and reloading, N/m, at least k_1.
 
+    See Also
+    --------
+    snapbeam.HertzContact, snapbeam.HuntCrossley
+
     Examples
     --------
     >>> import snapbeam as sb

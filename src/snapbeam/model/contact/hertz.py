@@ -26,6 +26,10 @@ class HertzContact(ContactLaw):
     stiffness : float
         Contact stiffness k_c, N/m^1.5.
 
+    See Also
+    --------
+    snapbeam.HuntCrossley, snapbeam.LayeredHertz, snapbeam.model.hertz_stress
+
     Examples
     --------
     >>> import snapbeam as sb

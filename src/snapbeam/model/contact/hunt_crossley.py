@@ -30,6 +30,10 @@ class HuntCrossley(ContactLaw):
     damping_factor : float
         chi, s/m; 0 is Hertz's law.
 
+    See Also
+    --------
+    snapbeam.HertzContact, snapbeam.KelvinVoigt
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -29,6 +29,10 @@ class KelvinVoigt(ContactLaw):
     linear_damping : float
         c, N s/m; 0 is a spring alone.
 
+    See Also
+    --------
+    snapbeam.HuntCrossley, snapbeam.PowerLaw
+
     Examples
     --------
     >>> import snapbeam as sb

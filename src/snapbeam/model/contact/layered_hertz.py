@@ -35,6 +35,10 @@ class LayeredHertz(ContactLaw):
     layer_stiffness : float
         k_l, N/m^2.
 
+    See Also
+    --------
+    snapbeam.HertzContact
+
     Examples
     --------
     >>> import snapbeam as sb

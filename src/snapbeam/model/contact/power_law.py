@@ -27,6 +27,10 @@ class PowerLaw(ContactLaw):
     exponent : float
         p, in [1, 10].
 
+    See Also
+    --------
+    snapbeam.HertzContact, snapbeam.KelvinVoigt
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -29,6 +29,10 @@ class Restitution(ContactLaw):
     coefficient : float
         Coefficient of restitution e, in [0, 1].
 
+    See Also
+    --------
+    snapbeam.HuntCrossley
+
     Examples
     --------
     >>> import snapbeam as sb

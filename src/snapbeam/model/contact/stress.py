@@ -36,7 +36,7 @@ class HertzStress:
     pressure : float
         Maximum pressure p_0, in the middle of the contact, Pa.
     contact_radius : float
-        Of the circle of contact, m.
+        Radius of the circle of contact, m.
     yield_force : float or None
         Force at which the softer of the two begins to yield, N; None without a yield stress.
     """
@@ -87,9 +87,13 @@ def hertz_stress(
     stiffness : float
         k_c, N/m^1.5.
     radius : float
-        Of the sphere, m.
+        Radius of the sphere, m.
     yield_stress : float, optional
-        Of the softer of the two, Pa.
+        Yield stress of the softer of the two, Pa.
+
+    See Also
+    --------
+    snapbeam.model.bending_stress, snapbeam.HertzContact
     """
     force, radius = nonnegative("force", force, "N"), positive("radius", radius, "m")
     modulus = 0.75 * positive("stiffness", stiffness, "N/m^1.5") / math.sqrt(radius)
@@ -110,6 +114,10 @@ def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array
     """Maximum bending stress along the beam, E (h/2) max abs(w''), Pa, of amplitudes of shape (..., N), shape (...).
 
     Bending stress of a beam made straight; the axial stress is not included.
+
+    See Also
+    --------
+    snapbeam.model.hertz_stress
     """
     if not hasattr(model, "beam"):
         raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")

@@ -57,6 +57,10 @@ class Drive:
     are times at which the motion or one of its derivatives jumps.  A name that none of the hooks has is refused when the class
     is defined; names of your own begin with an underscore.
 
+    See Also
+    --------
+    snapbeam.Striker, snapbeam.SumDrive, snapbeam.quantity
+
     Examples
     --------
     >>> import snapbeam as sb
@@ -72,7 +76,7 @@ class Drive:
     required: ClassVar[tuple[str, ...]] = ("numbers", "cycle", "bounds")
     """Hooks without which a drive cannot move."""
     name: ClassVar[str] = ""
-    """In parameter files and attributes."""
+    """Name in parameter files and attributes."""
     harmonic: ClassVar[bool] = False
     """True for a sine, whose tone has the numbers ``omega`` and ``amplitude``."""
     is_periodic: ClassVar[bool] = True

@@ -40,6 +40,10 @@ class Burst(Timed):
     retraction : float
         Withdrawal of the tip in the cycle after the burst, over b; it releases the beam.
 
+    See Also
+    --------
+    snapbeam.Sine, snapbeam.HalfSine
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -36,6 +36,11 @@ class Chirp(Timed):
     sweep_cycles : float
         Duration over the first period 2 pi/(start_ratio omega_1): the cycles of the run are counted in these.
     sweep_type : {"linear", "log"}
+        Linear or logarithmic increase of the frequency in time.
+
+    See Also
+    --------
+    snapbeam.Sine, snapbeam.dynamics.hysteresis
 
     Examples
     --------

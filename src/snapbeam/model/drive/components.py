@@ -36,7 +36,7 @@ class Pieces(NamedTuple):
     begins: _Array
     """s, shape (runs or 1, pieces); the first holds before it too, the last for good."""
     coefficients: _Array
-    """Of powers of the time since the begin, shape (runs or 1, pieces, 6)."""
+    """Coefficients of the powers of the time since the begin, shape (runs or 1, pieces, 6)."""
     gain: _Array | float = 1.0
 
 

@@ -26,7 +26,11 @@ class ConstantVelocity(Timed):
     Parameters
     ----------
     speed : float
-        Over b omega_1.
+        Velocity over b omega_1, at least 0.
+
+    See Also
+    --------
+    snapbeam.FixedStop, snapbeam.Striker
 
     Examples
     --------

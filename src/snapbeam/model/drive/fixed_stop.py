@@ -18,6 +18,10 @@ _Array = NDArray[np.float64]
 class FixedStop(Drive):
     """Fixed stop, without motion.  A cycle is a period of the first mode.
 
+    See Also
+    --------
+    snapbeam.Striker, snapbeam.ConstantVelocity
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -33,6 +33,10 @@ class HalfSine(Timed):
     duration : float
         T over the period of the first mode.
 
+    See Also
+    --------
+    snapbeam.Shock, snapbeam.Burst
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -58,6 +58,10 @@ class BandLimitedNoise(Timed):
     ramp_up_cycles : float
         Cycles of the middle of the band in which the noise rises.
 
+    See Also
+    --------
+    snapbeam.RecordedAcceleration, snapbeam.RecordedMotion
+
     Examples
     --------
     >>> import snapbeam as sb

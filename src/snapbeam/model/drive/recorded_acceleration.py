@@ -38,6 +38,10 @@ class RecordedAcceleration(FileKeys, SampledAcceleration):
     sampling_frequency : float
         Samples per second, Hz.
 
+    See Also
+    --------
+    snapbeam.RecordedMotion, snapbeam.BaseExcitation
+
     Examples
     --------
     >>> import numpy as np

@@ -42,6 +42,10 @@ class RecordedMotion(FileKeys, Drive):
     frequency : float
         Nominal frequency of the excitation, Hz, which defines a cycle.
 
+    See Also
+    --------
+    snapbeam.RecordedAcceleration, snapbeam.lab.recorded_drive
+
     Examples
     --------
     >>> import numpy as np

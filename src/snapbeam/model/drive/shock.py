@@ -44,7 +44,11 @@ class Shock(Timed):
     shape : {"half_sine", "haversine", "trapezoid"}
         Half-sine by default.
     rise_fraction : float
-        Of a trapezoid: rise time and fall time over the duration, 0.1 by default.
+        Rise time, and fall time, of a trapezoid over the duration; 0.1 by default.
+
+    See Also
+    --------
+    snapbeam.HalfSine, snapbeam.BaseExcitation
 
     Examples
     --------

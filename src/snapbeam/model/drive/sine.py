@@ -39,7 +39,11 @@ class Sine(Drive):
     velocity_amplitude : float
         Velocity amplitude over b omega_1, V; 0 is a striker at rest.
     phase : float
-        At the start, rad.
+        Phase at the start, rad.
+
+    See Also
+    --------
+    snapbeam.DisplacementSine, snapbeam.AccelerationSine, snapbeam.Shaker
 
     Examples
     --------
@@ -152,7 +156,11 @@ class DisplacementSine(_OwnAmplitude):
     displacement_amplitude : float
         A over the buckling level b.
     phase : float
-        At the start, rad.
+        Phase at the start, rad.
+
+    See Also
+    --------
+    snapbeam.Sine, snapbeam.AccelerationSine
 
     Examples
     --------
@@ -184,7 +192,11 @@ class AccelerationSine(_OwnAmplitude):
     acceleration_amplitude : float
         a over b omega_1^2.
     phase : float
-        At the start, rad.
+        Phase at the start, rad.
+
+    See Also
+    --------
+    snapbeam.Sine, snapbeam.DisplacementSine, snapbeam.RecordedAcceleration
 
     Examples
     --------

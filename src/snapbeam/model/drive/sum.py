@@ -33,6 +33,10 @@ class SumDrive(Timed):
     with its number, counted from 1: ``frequency_ratio_1``, ``duration_cycles_2``.  A cycle is a cycle of the first
     term.
 
+    See Also
+    --------
+    snapbeam.Drive, snapbeam.TwoTone
+
     Examples
     --------
     >>> import snapbeam as sb

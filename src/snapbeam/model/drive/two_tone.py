@@ -35,6 +35,10 @@ class TwoTone(Timed):
     second_phase : float
         Its phase at the start, rad.
 
+    See Also
+    --------
+    snapbeam.Sine, snapbeam.SumDrive
+
     Examples
     --------
     >>> import snapbeam as sb

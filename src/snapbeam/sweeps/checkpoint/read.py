@@ -39,7 +39,7 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        As :func:`snapbeam.sweep` returns it, with the attributes ``points_done`` and ``points_total``.
+        Dataset as :func:`snapbeam.sweep` returns it, with the attributes ``points_done`` and ``points_total``.
 
     Raises
     ------
@@ -48,6 +48,10 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
         recorded motion, or other statistics.
     CheckpointError
         If the description is damaged.
+
+    See Also
+    --------
+    snapbeam.sweep, snapbeam.CheckpointOptions
 
     Examples
     --------

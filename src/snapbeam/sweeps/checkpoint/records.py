@@ -38,6 +38,10 @@ _LARGEST_LOG = 2**30
 class CheckpointError(OSError):
     """A checkpoint cannot be written or read, or its workers cannot compute; the message contains the remedy.
 
+    See Also
+    --------
+    snapbeam.CheckpointOptions, snapbeam.read_checkpoint
+
     Examples
     --------
     >>> import snapbeam as sb

@@ -383,7 +383,7 @@ class Checkpoint:
     config : dict, optional
         Parameter file of the sweep, stored so that the sweep can be resumed without the file.
     grow : bool
-        Whether the sweep of an existing checkpoint may get more values of its axes.
+        True if the sweep of an existing checkpoint may get more values of its axes.
 
     Raises
     ------
