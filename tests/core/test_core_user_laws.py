@@ -61,7 +61,6 @@ class OwnKelvinVoigt(ContactLaw):  # begins with a jump
     linear_damping: float = quantity("N s/m", "damping", low=0.0, scope=RUN)
     name = "own_kelvin_voigt"
     rate_dependent = True
-    properties = sb.KelvinVoigt.properties
     force = staticmethod(sb.KelvinVoigt.force)
     time_scale = sb.KelvinVoigt.time_scale
     damping_coefficient = staticmethod(sb.KelvinVoigt.damping_coefficient)
@@ -73,7 +72,6 @@ class OwnElasticPlastic(ContactLaw):
     unloading_stiffness: float = quantity("N/m", "stiffness below", low=0.0, scope=RUN)
     name = "own_elastic_plastic"
     memory = "indentation"
-    properties = sb.ElasticPlasticContact.properties
     force = staticmethod(sb.ElasticPlasticContact.force)
     energy = staticmethod(sb.ElasticPlasticContact.energy)
     yield_penetration = staticmethod(sb.ElasticPlasticContact.yield_penetration)
