@@ -161,3 +161,26 @@ def test_files_are_small_and_have_their_fonts(result: str, style: str, tmp_path)
 
 def test_text_of_the_schematic_is_inside_the_canvas() -> None:
     assert outside(SYSTEM.plot()) < 0.01
+
+
+def test_hysteresis_draws_the_motion_and_names_the_well_of_its_first_run() -> None:
+    """The status is drawn only if asked for; the sweep ends in another well than it began in."""
+    found = RESULTS["hysteresis"]()
+    assert len(set(found["final_well"].values.ravel())) == 2
+    ax = found.snapbeam.plot()
+    assert ax.get_ylabel().replace("\n", " ").startswith("Maximum distance of mid-span")
+    assert ax.get_title().replace("\u00a0", " ").endswith("from the lower well")
+    assert list(figures_of(found)[1])[-1] == "status"
+
+
+@pytest.mark.slow
+def test_a_branch_passes_through_its_special_points() -> None:
+    found = RESULTS["branch"]()
+    ax = found.snapbeam.plot()
+    solid = next(line for line in ax.lines if line.get_linestyle() == "-")
+    folds = [line for line in ax.lines if line.get_label() == "fold"]
+    assert len(folds) == found.sizes["special_point"] > 0
+    for fold in folds:
+        at = np.flatnonzero(solid.get_xdata() == fold.get_xdata()[0])
+        other = [line for line in ax.lines if line.get_linestyle() == "--"]
+        assert any(fold.get_ydata()[0] == line.get_ydata()[at[0]] for line in (solid, *other))

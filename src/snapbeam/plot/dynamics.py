@@ -24,6 +24,7 @@ from snapbeam.plot.style import (
     fix_ticks,
     frame,
     legend_below,
+    marker_size,
 )
 from snapbeam.plot.units import in_units, scale_text
 from snapbeam.util.si_prefixes import prefixed
@@ -150,6 +151,18 @@ def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Li
 def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     x, stable = branch[along].values, branch["stable"].values
     returns = branch["midspan_returns"].transpose("return", "orbit").values
+    after = branch["special_point_index"].values.astype(int) + 1
+    near = (
+        np.array([returns[:, at - 1 : at + 1].mean(axis=1) for at in after])
+        .reshape(after.size, len(returns))
+        .T
+    )
+    # the curve passes through its special points
+    x, returns = (
+        np.insert(x, after, branch["special_point_value"].values),
+        np.insert(returns, after, near, axis=1),
+    )
+    stable = np.insert(stable, after, stable[after - 1])
     # up to the stable orbits beside them, so that no gap is left
     beside = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
     for y in returns:
@@ -157,16 +170,11 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
         ax.plot(x, np.where(beside, y, np.nan), color=_BLACK, linewidth=0.9, dashes=(3, 2))
     drawn = [(line, name) for kind, (line, name) in _STABILITY.items() if (stable == kind).any()]
     handles = [Line2D([], [], color=_BLACK, linestyle=line, label=f"{name} orbit") for line, name in drawn]
-    for kind, value, after in zip(
-        branch["special_point_kind"].values,
-        branch["special_point_value"].values,
-        branch["special_point_index"].values,
-        strict=True,
+    for kind, value, heights in zip(
+        branch["special_point_kind"].values, branch["special_point_value"].values, near.T, strict=True
     ):
-        at = int(after)
-        near = returns[:, at : at + 2].mean(axis=1)
         handles += ax.plot(
-            np.full(near.size, value), near, _SPECIAL_POINTS[str(kind)], color=_BLACK, markersize=3.5,
+            np.full(heights.size, value), heights, _SPECIAL_POINTS[str(kind)], color=_BLACK, markersize=3.5,
             markerfacecolor="white", label=str(kind),
         )  # fmt: skip
     return handles
@@ -234,7 +242,7 @@ def _lifetime_line(dataset: xr.Dataset, ax: Axes, x: Any, legend: bool) -> None:
             yerr=bars,
             fmt="o-",
             color=_BLUE,
-            markersize=3.0,
+            markersize=marker_size(x.size),
             linewidth=0.7,
             elinewidth=0.7,
             label=label,
@@ -889,7 +897,8 @@ def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             points = dataset["state"].values[dataset["side"].values == side]
             label = f"{stability} manifold" if side > 0 else None
             ax.plot(*points[:, at].T, line, color=color, linewidth=0.7, label=label)
-        ax.plot(*dataset["saddle"].values[list(at)], "x", color="black", markersize=5.0)
+        saddle = dataset["saddle"].values[list(at)]
+        ax.plot(*saddle, "x", color="black", markersize=5.0, label="saddle" if new else None)
         if new:
             ax.set(xlabel=_coordinate(names[at[0]]), ylabel=_coordinate(names[at[1]]))
         ax.legend(loc="best")

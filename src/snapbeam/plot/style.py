@@ -231,11 +231,16 @@ def color_of(number: int, count: int, last: float = 0.85) -> Any:
     return cm.batlow(last * number / max(count - 1, 1))
 
 
+def marker_size(points: int) -> float:
+    """Size of the markers of a curve, points, so that those of many do not run into one another."""
+    return float(np.clip(120.0 / max(points, 1), 1.2, 3.0))
+
+
 def color_bar(mesh: Any, ax: Axes, label: str, **options: Any) -> None:
     """Draw the colour bar of cells or dots beside their axes."""
     bar = ax.figure.colorbar(mesh, ax=ax, label=label, **options)
     if isinstance(mesh.norm, LogNorm):
-        plain_decades(bar.ax.yaxis, mesh.norm.vmin, mesh.norm.vmax)
+        plain_decades(bar.ax.yaxis, *mesh.get_clim())
     bar.ax.tick_params(labelsize=_RC["ytick.labelsize"], width=_RC["ytick.major.width"])
 
 
