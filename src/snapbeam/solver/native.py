@@ -341,7 +341,9 @@ def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) 
         progress(arrays.ensemble.size, arrays.ensemble.size)
 
 
-def run_ensemble(ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None) -> Records:
+def run_ensemble(
+    ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
+) -> Records:
     """Integrate every run of an ensemble; returns a record of accumulators a run."""
     arrays = _Arrays(ensemble)
     _integrate(arrays, threads, progress)
@@ -470,7 +472,9 @@ def record(
         marks[1] = marks[2] = 0
 
 
-def _recorded(arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: Records) -> Recorded:
+def _recorded(
+    arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: Records
+) -> Recorded:
     channels = arrays.channels
     rows, values = recorder["rows"][:held], recorder["values"][:held]
     own = values[:, OF_SAMPLE:].reshape(held, channels.laws.size, CHANNEL_SAMPLE)
