@@ -63,7 +63,7 @@ def test_survival_ends_in_a_ring_where_runs_still_snap() -> None:
     assert (x[-1], y[-1]) == (CYCLES - QUIET, pytest.approx(going / runs))
     (ring,) = [line for line in ax.lines if line.get_marker() == "o"]
     assert (ring.get_xdata()[0], ring.get_ydata()[0]) == (x[-1], y[-1])
-    assert "right-censored" in [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "right-censored" in [text.get_text() for text in ax.figure.legends[0].get_texts()]
 
 
 def test_survival_without_a_ring_where_all_ended() -> None:
@@ -74,7 +74,7 @@ def test_survival_without_a_ring_where_all_ended() -> None:
     assert y[1] == pytest.approx(39 / 40)
     assert y[-1] == 0.0
     assert not [line for line in ax.lines if line.get_marker() == "o"]
-    assert "right-censored" not in [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "right-censored" not in [text.get_text() for text in ax.figure.legends[0].get_texts()]
 
 
 def test_a_section_and_basins_draw_every_state() -> None:

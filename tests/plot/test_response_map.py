@@ -34,7 +34,7 @@ def test_cells(synthetic_map):
     np.testing.assert_allclose(corners[[0, -1], 0, 1], [0.0, y[-1] + 0.5 * (y[-1] - y[-2])])
     assert ax.get_xlim() == pytest.approx((0.05, 4.05))
     assert ax.get_xlabel() == r"Excitation frequency $\Omega$"
-    assert ax.get_title() == r"$N$ = 32, 200 cycles, $x_\mathrm{s}$ = 0.4762"
+    assert ax.get_title().replace("\u00a0", " ") == r"$N$ = 32, 200 cycles, $x_\mathrm{s}$ = 0.4762"
 
 
 def test_every_pixel_of_a_cell_has_its_colour(synthetic_map, tmp_path):

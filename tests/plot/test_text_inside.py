@@ -1,144 +1,156 @@
-"""Every figure keeps its text inside the canvas, at the width of one column and of two."""
+"""Every kind of figure, drawn by its default call: text is inside and apart, legends name what occurs, once."""
 
 from __future__ import annotations
+
+from collections import Counter
+from itertools import combinations
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from every_kind import QUICK, RESULTS, SYSTEM
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.text import Text
 
 import snapbeam as sb
-from snapbeam.model import default_values
-from snapbeam.plot.dataset import figures_of
+from snapbeam.plot.dataset import _KINDS, figures_of
 from snapbeam.plot.style import COLUMN_WIDTHS, save_figure
-from snapbeam.util.datasets import xr
 
-SHORT = sb.Integration(cycles=20)
-MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.05)
-SYSTEM = sb.System(
-    MODEL,
-    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))],
-)
-AXES = {"drive.frequency_ratio": [0.8, 1.2, 1.6], "drive.velocity_amplitude": [0.1, 0.2, 0.3]}
+ELSEWHERE = {
+    "measured classes", "estimated density", "displacement field", "frequency response", "homoclinic points",
+    "bifurcation curve", "homoclinic tangency", "equilibrium branches",
+}  # fmt: skip
+"""Kinds that are measured, or need minutes; their figures have tests of their own."""
+KINDS = [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in RESULTS if name not in QUICK)]
 
 
-def exponents(**axes: np.ndarray) -> xr.Dataset:
-    shape = (*(len(values) for values in axes.values()), 1)
-    over = (*axes, "exponent_number")
-    data = {
-        "exponent": (over, np.linspace(-2.0, 2.0, np.prod(shape)).reshape(shape), {"units": "1/s"}),
-        "exponent_error": (over, np.full(shape, 0.3), {"units": "1/s"}),
-    }
-    return xr.Dataset(data, {**axes, "exponent_number": [1]})
+@pytest.fixture(autouse=True)
+def closed():
+    yield
+    plt.close("all")
 
 
-def probability() -> xr.Dataset:
-    ratio, v = np.linspace(0.5, 2.0, 9), np.linspace(0.05, 0.4, 8)
-    share = 1.0 / (1.0 + np.exp(-40.0 * (v - 0.1 - 0.05 * ratio[:, None])))[..., None]
-    dims = ("frequency_ratio", "velocity_amplitude", "outcome")
-    ends = {"": 0.0, "_low": -0.05, "_high": 0.05}
-    data = {f"probability{end}": (dims, np.clip(share + shift, 0.0, 1.0)) for end, shift in ends.items()}
-    data["reached"] = (dims[:2], share[..., 0] < 0.99)
-    coords = {"frequency_ratio": ratio, "velocity_amplitude": v, "outcome": ["snap"]}
-    return xr.Dataset(data, coords, {"confidence": 0.95})
-
-
-def basins() -> xr.Dataset:
-    grid = {"amplitude[1]": np.linspace(-0.98, 1.4, 6), "velocity[1]": np.linspace(-0.6, 0.6, 5)}
-    return sb.dynamics.basins_of_attraction(sb.dynamics.find_attractors(SYSTEM, 12), grid)
-
-
-def branch() -> xr.Dataset:
-    orbit = sb.dynamics.periodic_orbit(SYSTEM, transient=100)
-    return sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=40).to_dataset()
-
-
-def edge() -> xr.Dataset:
-    ends = np.array([-0.9, 0.0]), np.array([-1.0, 1.3])
-    return sb.dynamics.edge_tracking(SYSTEM, *ends, periods=25, horizon=60).to_dataset()
-
-
-def lifetimes() -> xr.Dataset:
-    settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
-    return sb.dynamics.lifetime_map(SYSTEM, AXES, SHORT, initial_conditions=4, settings=settings)
-
-
-RATIOS = np.linspace(0.5, 1.5, 9)
-QUICK = {
-    "run": lambda: sb.simulate(SYSTEM.replace(**{"model.modes": 3}), SHORT).dataset,
-    "map": lambda: sb.sweep(SYSTEM, AXES, SHORT)[["response_class", "peak_force"]],
-    "line of a map": lambda: QUICK["map"]().isel(frequency_ratio=1),
-    "lifetimes": lifetimes,
-    "lifetimes of a point": lambda: lifetimes().isel(frequency_ratio=1, velocity_amplitude=0),
-    "section": lambda: sb.dynamics.poincare_section(SYSTEM, "impact", 20),
-    "attractors": lambda: sb.dynamics.find_attractors(SYSTEM, 12).to_dataset(),
-    "line of exponents": lambda: exponents(frequency_ratio=RATIOS),
-    "map of exponents": lambda: exponents(
-        frequency_ratio=RATIOS, velocity_amplitude=np.linspace(0.1, 0.3, 5)
-    ),
-    "probability": probability,
-}
-SLOW = {
-    "basins": basins,
-    "branch": branch,
-    "edge": edge,
-    "diagram": lambda: sb.dynamics.bifurcation_diagram(
-        SYSTEM, "velocity_amplitude", np.linspace(0.02, 0.04, 3)
-    ),
-    "exponents": lambda: sb.dynamics.lyapunov_spectrum(SYSTEM, periods=40, transient=10),
-}
-
-
-def outside(figure: plt.Figure) -> float:
-    """How far the drawing, with its text, extends beyond the canvas, inches."""
-    figure.canvas.draw()
-    drawn = figure.get_tightbbox()
-    return float(np.max([*-drawn.min, *(drawn.max - figure.get_size_inches())]))
-
-
-@pytest.mark.parametrize("result", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
-def test_text_is_inside_the_canvas(result: str) -> None:
-    dataset = (QUICK | SLOW)[result]()
-    for name in figures_of(dataset)[1]:
-        figure = dataset.snapbeam.plot(name).get_figure(root=True)
-        for width, millimetres in COLUMN_WIDTHS.items():
-            figure.set_size_inches(millimetres / 25.4, figure.get_figheight())
-            assert outside(figure) < 0.01, f"{name} of {width} column"
-        plt.close(figure)
-
-
-@pytest.fixture(
-    params=["ieee", *(pytest.param(name, marks=pytest.mark.slow) for name in ("elsevier", "talk"))]
-)
+@pytest.fixture(params=["elsevier", "ieee", "talk"])
 def style(request):
     sb.plot.plot_style(request.param)
     yield request.param
     sb.plot.plot_style("elsevier")
 
 
-GALLERY = (
-    "run",
-    "map",
-    "line of a map",
-    "attractors",
-    "line of exponents",
-    "map of exponents",
-    "probability",
-)
+def outside(figure: Figure) -> float:
+    """How far the drawing, with its text, extends beyond the canvas, inches."""
+    figure.canvas.draw()
+    drawn = figure.get_tightbbox()
+    return float(np.max([*-drawn.min, *(drawn.max - figure.get_size_inches())]))
+
+
+def resized(figure: Figure, width: str) -> Figure:
+    """A figure at the width of columns, laid out anew: the layout of a figure follows its size in a draw or two."""
+    figure.set_size_inches(COLUMN_WIDTHS[width] / 25.4, figure.get_figheight())
+    figure.canvas.draw()
+    return figure
+
+
+def legends_of(figure: Figure) -> list[Legend]:
+    return [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend() is not None)]
+
+
+def texts_of(figure: Figure) -> list[Text]:
+    """Every text that is seen; an axis also has numbers for ticks beyond its ends."""
+    axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
+    numbers = [tick for axis in axes for tick in (*axis.majorTicks, *axis.minorTicks)]
+    seen = [tick for axis in axes for tick in axis._update_ticks()]
+    beyond = {id(label) for tick in numbers if tick not in seen for label in (tick.label1, tick.label2)}
+    return [
+        each
+        for each in figure.findobj(Text)
+        if each.get_visible() and each.get_text().strip() and id(each) not in beyond
+    ]
+
+
+def colors_of(ax: Axes) -> np.ndarray:
+    """Every colour that something in the axes has, of shape (n, 3)."""
+    found = [np.ones((1, 3))]  # white is paper
+    for line in ax.lines:
+        if np.isfinite(np.asarray(line.get_ydata(), dtype=float)).any():
+            found += [to_rgba(each)[:3] for each in (line.get_color(), line.get_markeredgecolor())]
+    for each in (*ax.collections, *ax.patches):
+        for color in (each.get_facecolor(), each.get_edgecolor()):
+            found.append(np.reshape(to_rgba(color) if np.ndim(color) == 1 else color, (-1, 4))[:, :3])
+    return np.concatenate([np.reshape(each, (-1, 3)) for each in found])
+
+
+def color_of_entry(handle: object) -> np.ndarray:
+    get = next(getattr(handle, name) for name in ("get_color", "get_facecolor") if hasattr(handle, name))
+    color = get()
+    return np.reshape(to_rgba(color) if isinstance(color, str) or np.ndim(color) == 1 else color, (-1, 4))[0]
+
+
+def check(figure: Figure, words: str) -> None:
+    assert outside(figure) < 0.01, words
+    width, height = figure.bbox.size
+    texts = texts_of(figure)
+    boxes = [(each.get_text(), each.get_window_extent()) for each in texts]
+    for text, box in boxes:
+        inside = min(box.x0, box.y0, width - box.x1, height - box.y1)
+        assert inside > -1.5, f"{words}: {text!r} is cut off by {-inside:.0f} px"
+    for (one, a), (other, b) in combinations(boxes, 2):
+        overlap = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
+        assert min(overlap) < 2.0, f"{words}: {one!r} over {other!r}, {overlap}"
+    names = Counter(each.get_text() for legend in legends_of(figure) for each in legend.get_texts())
+    names += Counter(
+        each for ax in figure.axes for each in (ax.get_xlabel(), ax.get_ylabel(), ax.get_title()) if each
+    )
+    assert not (twice := [name for name, count in names.items() if count > 1]), f"{words}: twice {twice}"
+    drawn = np.concatenate([colors_of(ax) for ax in figure.axes])
+    for legend in legends_of(figure):
+        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
+            color = color_of_entry(handle)[:3]
+            assert np.abs(drawn - color).max(axis=1).min() < 0.01, (
+                f"{words}: {text.get_text()} does not occur"
+            )
+
+
+@pytest.mark.parametrize("result", KINDS)
+def test_the_default_figure(result: str, style: str) -> None:
+    """In three styles, at both widths of each."""
+    dataset = RESULTS[result]()
+    figure = dataset.snapbeam.plot().get_figure(root=True)
+    check(figure, f"{result}, {style}")
+    for width in COLUMN_WIDTHS:
+        check(resized(figure, width), f"{result}, {style}, {width} column")
+
+
+@pytest.mark.parametrize("result", KINDS)
+def test_the_text_of_every_figure_is_inside(result: str) -> None:
+    dataset = RESULTS[result]()
+    for name in figures_of(dataset)[1]:
+        figure = dataset.snapbeam.plot(name).get_figure(root=True)
+        for width in COLUMN_WIDTHS:
+            assert outside(resized(figure, width)) < 0.01, f"{name} of {width} column"
+        plt.close(figure)
+
+
+@pytest.mark.slow
+def test_every_kind_of_result_is_drawn_here() -> None:
+    """A new kind fails here until a small result of it is among those of ``every_kind``."""
+    assert {figures_of(each())[0] for each in RESULTS.values()} | ELSEWHERE == {kind.words for kind in _KINDS}
+
+
+GALLERY = ("run", "map", "map of a line", "attractors", "probability map", "lifetimes")
 
 
 @pytest.mark.parametrize(
     "result", [pytest.param(name, marks=pytest.mark.slow if name == "run" else ()) for name in GALLERY]
 )
-def test_text_is_inside_the_canvas_in_each_style_and_the_files_are_small(
-    result: str, style: str, tmp_path
-) -> None:
-    """At both widths of the style; vector files have their fonts embedded as TrueType and are below 2 MB."""
-    dataset = QUICK[result]()
+def test_files_are_small_and_have_their_fonts(result: str, style: str, tmp_path) -> None:
+    """Vector files have their fonts embedded as TrueType and are below 2 MB."""
+    dataset = RESULTS[result]()
     for name in figures_of(dataset)[1]:
         figure = dataset.snapbeam.plot(name).get_figure(root=True)
-        for width, millimetres in COLUMN_WIDTHS.items():
-            figure.set_size_inches(millimetres / 25.4, figure.get_figheight())
-            assert outside(figure) < 0.01, f"{name} of {width} column"
         for suffix in (".pdf", ".svg"):
             file = save_figure(figure, tmp_path / f"figure{suffix}")
             assert file.stat().st_size < 2e6, f"{name}{suffix}"
@@ -148,6 +160,27 @@ def test_text_is_inside_the_canvas_in_each_style_and_the_files_are_small(
 
 
 def test_text_of_the_schematic_is_inside_the_canvas() -> None:
-    figure = SYSTEM.plot()
-    assert outside(figure) < 0.01
-    plt.close(figure)
+    assert outside(SYSTEM.plot()) < 0.01
+
+
+def test_hysteresis_draws_the_motion_and_names_the_well_of_its_first_run() -> None:
+    """The status is drawn only if asked for; the sweep ends in another well than it began in."""
+    found = RESULTS["hysteresis"]()
+    assert len(set(found["final_well"].values.ravel())) == 2
+    ax = found.snapbeam.plot()
+    assert ax.get_ylabel().replace("\n", " ").startswith("Maximum distance of mid-span")
+    assert ax.get_title().replace("\u00a0", " ").endswith("from the lower well")
+    assert list(figures_of(found)[1])[-1] == "status"
+
+
+@pytest.mark.slow
+def test_a_branch_passes_through_its_special_points() -> None:
+    found = RESULTS["branch"]()
+    ax = found.snapbeam.plot()
+    solid = next(line for line in ax.lines if line.get_linestyle() == "-")
+    folds = [line for line in ax.lines if line.get_label() == "fold"]
+    assert len(folds) == found.sizes["special_point"] > 0
+    for fold in folds:
+        at = np.flatnonzero(solid.get_xdata() == fold.get_xdata()[0])
+        other = [line for line in ax.lines if line.get_linestyle() == "--"]
+        assert any(fold.get_ydata()[0] == line.get_ydata()[at[0]] for line in (solid, *other))

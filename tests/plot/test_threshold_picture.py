@@ -66,13 +66,13 @@ def test_band(curve):
         quasi_static.get_ydata(), curve["frequency_ratio"] * np.sin(np.pi * 0.4) ** 2, rtol=1e-12
     )
     assert ax.get_xlabel().startswith("Excitation frequency") and "V" in ax.get_ylabel()
-    assert ax.get_title() == "200 cycles, $x_\\mathrm{s}$ = 0.4\nsteps of 0.01 in $V$"
+    assert ax.get_title().replace("\u00a0", " ") == "200 cycles, $x_\\mathrm{s}$ = 0.4\nsteps of 0.01 in $V$"
     assert len([each for each in ax.collections if isinstance(each, PolyCollection)]) == 2
     assert ax.get_ylim() == pytest.approx((0.0, 1.4 * 0.34))
     (none,) = [line for line in ax.lines if line.get_marker() == "^"]
     assert none.get_xdata().tolist() == [curve["frequency_ratio"].values[4]]
     one = plot_threshold(curve.isel(modes=1), quasi_static=False)
-    assert [line.get_xdata().size for line in one.lines] == [15, 0], "the curve and no isolated point"
+    assert [line.get_xdata().size for line in one.lines] == [15], "the curve"
 
 
 def texts_of(ax):
@@ -104,9 +104,8 @@ def test_isolated_points_are_markers(curve, tmp_path):
             one[name][gaps] = np.nan
     one["outcome"][gaps] = 1
     ax = plot_threshold(one, quasi_static=False)
-    (alone,) = [line for line in ax.lines if line.get_marker() == "o"]
-    assert alone.get_xdata().tolist() == one["frequency_ratio"].values[[0, 4, 14]].tolist()
-    np.testing.assert_array_equal(alone.get_ydata(), one["lower_threshold"].values[[0, 4, 14]])
+    (alone,) = [line for line in ax.lines if line.get_marker() == "."]
+    assert np.flatnonzero(np.isfinite(alone.get_ydata())).tolist() == [0, 4, 14]
     empty = plot_threshold(one.assign(lower_threshold=one["lower_threshold"] * np.nan), quasi_static=False)
     with_points, without = (
         plt.imread(save_figure(each.figure, tmp_path / f"{number}.png"))[..., :3]

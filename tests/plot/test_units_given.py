@@ -183,7 +183,7 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
     "gradient": (
         "striker",
         lambda s: U.gradient(s, "peak_midspan_velocity", ["beam.thickness", "drive.velocity_m_s"], integration=sb.Integration(cycles=2)),
-        ("Change in % for 1 % of the parameter:\nPeak midspan velocity",),
+        ("Change of peak midspan velocity\nfor 1 % of the parameter (%)",),
     ),
     "designs": ("striker", designs, ("Excitation frequency (Hz)",)),
     "hysteresis": ("base", lambda s: D.hysteresis(s, *numbers(GRAVITIES), integration=SHORT), (G,)),
@@ -226,7 +226,7 @@ def texts_of(figure: plt.Figure) -> list[str]:
         found += [text.get_text() for text in ax.texts]
         found += [] if ax.get_legend() is None else [text.get_text() for text in ax.get_legend().get_texts()]
         found += [text.get_text() for text in (*ax.get_xticklabels(), *ax.get_yticklabels())]
-    return [text for text in found if text]
+    return [text.replace("\u00a0", " ") for text in found if text]
 
 
 def plain(text: str) -> str:

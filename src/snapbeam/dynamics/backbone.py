@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.dynamics.arclength import Equations, Path, Point, follow
-from snapbeam.dynamics.results import in_unit, labelled
+from snapbeam.dynamics.results import beam_attributes, in_unit, labelled
 from snapbeam.dynamics.shooting import OrbitNotFoundError
 from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.harvester import Harvester
@@ -519,6 +519,6 @@ def _dataset(structure: _Structure, points: list[dict[str, Any]], end: str) -> x
     attrs = {
         "title": "backbone curve", "well": structure.well, "end": end, "modes": n,
         "reference_frequency": model.reference_frequency, "length_scale": model.length_scale,
-        "natural_frequencies": (structure.omega / (2.0 * np.pi)).tolist(),
+        "natural_frequencies": (structure.omega / (2.0 * np.pi)).tolist(), **beam_attributes(model),
     }  # fmt: skip
     return labelled(variables, coords, attrs)

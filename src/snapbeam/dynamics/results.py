@@ -13,6 +13,8 @@ from snapbeam.util.provenance import canonical_json
 if TYPE_CHECKING:
     import xarray as xr
 
+    from snapbeam.model.reduced_model import ReducedModel
+
 
 def labelled(
     variables: Mapping[str, tuple[Any, Any, Any]],
@@ -47,6 +49,12 @@ def coordinate_names(flow: Flow) -> list[str]:
     return list(getattr(flow, "names", (f"x[{i + 1}]" for i in range(flow.dimension))))
 
 
+def beam_attributes(model: ReducedModel) -> dict[str, float]:
+    """Dimensions of the beam that a figure states; none of a model of matrices."""
+    names = ("length", "thickness", "buckling_level") if model.beam is not None else ()
+    return {f"beam_{name}": float(getattr(model.beam, name)) for name in names}
+
+
 def fixed_parameters(flow: Flow, *varied: str) -> dict[str, Any]:
     """Return the parameters that a figure states: beam, modes, excitation and location, without the varied ones."""
     if not isinstance(flow, Stroboscope):
@@ -58,11 +66,7 @@ def fixed_parameters(flow: Flow, *varied: str) -> dict[str, Any]:
         "reference_frequency": model.reference_frequency,
         "system": canonical_json(system.to_mapping()),
     }
-    if model.beam is not None:
-        attrs |= {
-            f"beam_{name}": float(getattr(model.beam, name))
-            for name in ("length", "thickness", "buckling_level")
-        }
+    attrs |= beam_attributes(model)
     if system.primary_excitation is not None:
         section, drive = system.primary_excitation
         attrs |= {lookup(f"{section}.{name}").short: float(value) for name, value in drive.values().items()}

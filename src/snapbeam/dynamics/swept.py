@@ -326,9 +326,13 @@ def hysteresis(
     }
     state = system.initial_state
     places = [(i, k) for i, kind in enumerate(kinds) for k in swept.order(kind)]
+    attrs: dict[str, Any] = {}
     for done, (i, k) in enumerate(places, 1):
         here = system.replace(**{swept.name: float(swept.values[k]), "initial_state": state})
         run = simulate(here, settings, sample_times=[0.0])
+        attrs = attrs or dict(
+            run.dataset.attrs
+        )  # of the first run: later ones begin where the one before ended
         for key, table in tables.items():
             table[i, k] = run.summary[key]
         state = run.final_state
@@ -339,7 +343,7 @@ def hysteresis(
         if restarts:
             state = dataclasses.replace(state, phase=begun, modal=None)
     left_out = _OF_ONE_RUN | {swept.short, lookup(ratio_of(swept.name)).short}
-    attrs = {key: value for key, value in run.dataset.attrs.items() if key not in left_out}
+    attrs = {key: value for key, value in attrs.items() if key not in left_out}
     variables = {
         key: ((), table, {"units": rows[key].unit, "long_name": rows[key].long_name})
         for key, table in tables.items()

@@ -97,13 +97,15 @@ def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
         for name, item in dataset.data_vars.items()
         if item.dtype.kind in "biuf" and set(item.dims) == over and name != "response_class"
     ]
+    others.sort(key="status".__eq__)  # what the runs did comes first, how they ended last
     return {"response_class": plot_response_map} | {
         name: partial(plot_statistic, name=name) for name in others
     }
 
 
 def _swept(dataset: xr.Dataset) -> dict[str, _Draws]:
-    return {name: function for name, function in _map(dataset).items() if name != "response_class"}
+    figures = {name: function for name, function in _map(dataset).items() if name != "response_class"}
+    return dict(sorted(figures.items(), key=lambda each: each[0] != "peak_midspan_displacement"))
 
 
 def _lifetimes(dataset: xr.Dataset) -> dict[str, _Draws]:

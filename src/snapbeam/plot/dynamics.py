@@ -21,8 +21,10 @@ from snapbeam.plot.style import (
     color_of,
     contains,
     extend_title,
+    fix_ticks,
     frame,
     legend_below,
+    marker_size,
 )
 from snapbeam.plot.units import in_units, scale_text
 from snapbeam.util.si_prefixes import prefixed
@@ -84,7 +86,7 @@ def plot_diagram(
         if each is not None and not needed <= set(getattr(each, "dims", ())):
             raise InputError(f"{name}: must have the dimensions {', '.join(sorted(needed))}")
     new = ax is None
-    with frame(ax, first, "double", 80.0) as ax:
+    with frame(ax, first, height=80.0) as ax:
         handles: list[Line2D] = []
         if dataset is not None:
             contains(dataset, variable, variable)
@@ -99,7 +101,7 @@ def plot_diagram(
         place = "mid-span" if variable.startswith("midspan") else "the striker"
         ax.set_ylabel(f"{kind} at {place}\nonce a period, {scale_text(first.attrs, unit)}")
         unique = {handle.get_label(): handle for handle in handles}
-        legend_below(ax, list(unique.values()), 3)
+        legend_below(ax, list(unique.values()))
         if new:
             _close_gap(ax)
     return ax
@@ -125,21 +127,21 @@ def _close_gap(ax: Axes) -> None:
     ax.set_ylim(y[0] - pad, y[-1] + pad)
     ax.axhspan(low, high, color="0.92", linewidth=0.0, zorder=0)
     ax.annotate("axis broken", (0.995, 0.5 * (low + high)), xycoords=("axes fraction", "data"), ha="right",
-                va="center", fontsize=6, color="0.3")  # fmt: skip
+                va="center", fontsize="small", color="0.3")  # fmt: skip
 
 
 def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Line2D]:
     """Draw the points, those swept down smaller and over those swept up, so that both are seen where they agree."""
     handles = []
     looks = {
-        "up": (_BLUE, "swept up", 2.0), "down": (_RED, "swept down", 1.0)
+        "up": (_BLUE, "swept up", 2.4), "down": (_RED, "swept down", 1.5)
     }  # fmt: skip
     sweeps = [str(name) for name in dataset["sweep"].values]
     for name in sorted(sweeps, key=list(looks).index if set(sweeps) <= set(looks) else str):
         part = dataset[variable].isel(sweep=sweeps.index(name)).transpose(along, "period")
         x = np.repeat(dataset[along].values, part.sizes["period"])
         color, text, share = looks.get(name, (_STARTS, "from many starts", 2.0))
-        size = share * float(np.clip(260.0 / dataset.sizes[along], 0.6, 1.8))
+        size = share * float(np.clip(120.0 / dataset.sizes[along], 0.4, 1.6))
         look: dict[str, Any] = {"color": color, "markeredgewidth": 0.0, "linestyle": "", "marker": "o"}
         ax.plot(x, part.values.ravel(), markersize=size, rasterized=True, **look)
         handles.append(Line2D([], [], markersize=2.0 * share, label=text, **look))
@@ -149,6 +151,18 @@ def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Li
 def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     x, stable = branch[along].values, branch["stable"].values
     returns = branch["midspan_returns"].transpose("return", "orbit").values
+    after = branch["special_point_index"].values.astype(int) + 1
+    near = (
+        np.array([returns[:, at - 1 : at + 1].mean(axis=1) for at in after])
+        .reshape(after.size, len(returns))
+        .T
+    )
+    # the curve passes through its special points
+    x, returns = (
+        np.insert(x, after, branch["special_point_value"].values),
+        np.insert(returns, after, near, axis=1),
+    )
+    stable = np.insert(stable, after, stable[after - 1])
     # up to the stable orbits beside them, so that no gap is left
     beside = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
     for y in returns:
@@ -156,16 +170,11 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
         ax.plot(x, np.where(beside, y, np.nan), color=_BLACK, linewidth=0.9, dashes=(3, 2))
     drawn = [(line, name) for kind, (line, name) in _STABILITY.items() if (stable == kind).any()]
     handles = [Line2D([], [], color=_BLACK, linestyle=line, label=f"{name} orbit") for line, name in drawn]
-    for kind, value, after in zip(
-        branch["special_point_kind"].values,
-        branch["special_point_value"].values,
-        branch["special_point_index"].values,
-        strict=True,
+    for kind, value, heights in zip(
+        branch["special_point_kind"].values, branch["special_point_value"].values, near.T, strict=True
     ):
-        at = int(after)
-        near = returns[:, at : at + 2].mean(axis=1)
         handles += ax.plot(
-            np.full(near.size, value), near, _SPECIAL_POINTS[str(kind)], color=_BLACK, markersize=3.5,
+            np.full(heights.size, value), heights, _SPECIAL_POINTS[str(kind)], color=_BLACK, markersize=3.5,
             markerfacecolor="white", label=str(kind),
         )  # fmt: skip
     return handles
@@ -210,17 +219,57 @@ def plot_lifetimes(
     with frame(ax, dataset) as ax:
         if len(dims) == 1:
             x, _ = positions(dataset, dims[0])
-            low, high = dataset["lifetime_low"].values, dataset["lifetime_high"].values
-            top = np.where(np.isfinite(high), high, np.nan)
-            ax.fill_between(x, low, top, color=_BLUE, alpha=0.25, linewidth=0.0, label="interval")
-            ax.plot(x, dataset["lifetime"].values, color=_BLUE, label="lifetime")
-            ax.set_yscale("log")
-            ax.set_ylabel("Lifetime of snapping (cycles)")
-            ax.legend(loc="best")
+            _lifetime_line(dataset, ax, x, legend)
             dress(ax.xaxis, dataset, dims[0])
         else:
             _lifetime_cells(dataset, ax, list(in_order(dataset, dims)), limits, legend)
     return ax
+
+
+def _lifetime_line(dataset: xr.Dataset, ax: Axes, x: Any, legend: bool) -> None:
+    """Lifetimes with their intervals, upward without end where no end is known, and the points that have none."""
+    value, low, high = (dataset[f"lifetime{end}"].values for end in ("", "_low", "_high"))
+    ends = np.concatenate([value, low, high])
+    ends = ends[np.isfinite(ends) & (ends > 0.0)]
+    top = 3.0 * float(ends.max()) if ends.size else 10.0
+    bars = np.stack([value - low, np.minimum(high, top) - value])
+    share = 100.0 * float(dataset.attrs.get("confidence", 0.95))
+    label = f"lifetime, {share:g} % interval"
+    if np.isfinite(value).any():
+        ax.errorbar(
+            x,
+            value,
+            yerr=bars,
+            fmt="o-",
+            color=_BLUE,
+            markersize=marker_size(x.size),
+            linewidth=0.7,
+            elinewidth=0.7,
+            label=label,
+        )
+    ax.set(yscale="log", ylim=(0.5 * float(ends.min()) if ends.size else 0.1, top))
+    ax.set_ylabel("Lifetime of snapping (cycles)")
+    none, going = np.isnan(value), dataset["runs_snapping"].values > 0
+    for which, height, mark, words in (
+        (none & ~going, 0.03, "v", _NONE),
+        (none & going, 0.97, "^", _ENDLESS),
+    ):
+        if which.any():
+            at = np.full(int(which.sum()), height)
+            ax.plot(
+                x[which],
+                at,
+                mark,
+                color="0.4",
+                markersize=3.5,
+                transform=ax.get_xaxis_transform(),
+                label=words,
+            )
+    if legend:
+        legend_below(ax)
+
+
+_NONE, _ENDLESS = "no run snaps", "snaps on, no end seen"
 
 
 def _lifetime_cells(
@@ -231,17 +280,22 @@ def _lifetime_cells(
     edges = [edges_of(dataset, name) for name in dims]
     if known.size:
         low, high = (float(np.quantile(known, share)) for share in (0.02, 0.98))
-        norm = LogNorm(*((max(low, 1.0), max(high, low) * 1.001) if limits is None else limits))
-        cells = ax.pcolormesh(*edges, values, cmap=cm.batlow, norm=norm, rasterized=True)
-        color_bar(cells, ax, "Lifetime of snapping (cycles)", extend="both")
-    endless = np.isnan(values) & (dataset["runs_snapping"].transpose(*reversed(dims)).values > 0)
+        low, high = (max(low, 1.0), max(high, low, 1.0) * 1.001) if limits is None else limits
+        cells = ax.pcolormesh(*edges, values, cmap=cm.batlow, norm=LogNorm(low, high), rasterized=True)
+        beyond = known.min() < low, known.max() > high
+        extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
+        color_bar(cells, ax, "Lifetime of snapping (cycles)", extend=extend)
+    none = np.isnan(values)
+    endless = none & (dataset["runs_snapping"].transpose(*reversed(dims)).values > 0)
     hatched: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.4", "hatch": "//////", "linewidth": 0.0}
     for row, column in np.argwhere(endless):
         low, left = edges[1][row], edges[0][column]
         size = edges[0][column + 1] - left, edges[1][row + 1] - low
         ax.add_patch(Rectangle((left, low), *size, **hatched))
-    if endless.any() and legend:
-        legend_below(ax, [Patch(**hatched, label="snaps on, no end seen")])
+    if legend:
+        plain: dict[str, Any] = {"facecolor": "white", "edgecolor": "black", "linewidth": 0.4}
+        handles = [Patch(**plain, label=_NONE)] if (none & ~endless).any() else []
+        legend_below(ax, handles + ([Patch(**hatched, label=_ENDLESS)] if endless.any() else []))
     dress(ax.xaxis, dataset, dims[0])
     dress(ax.yaxis, dataset, dims[1])
 
@@ -311,14 +365,16 @@ def plot_survival(
         if not np.isfinite(rows).any():
             ax.text(0.5, 0.5, "no run snaps through", transform=ax.transAxes, ha="center")
         handles, _ = ax.get_legend_handles_labels()
-        handles.append(Line2D([], [], color="0.3", dashes=(4, 2), linewidth=0.7, label="fitted"))
+        own = color if len(rows) == 1 else "0.3"
+        if (np.isfinite(tau) & np.isfinite(delay)).any():
+            handles.append(Line2D([], [], color=own, dashes=(4, 2), linewidth=0.7, label="fitted"))
         if open_ends:
             ring = Line2D(
-                [], [], linestyle="none", marker="o", color="0.3", markerfacecolor="white", markersize=4.0,
+                [], [], linestyle="none", marker="o", color=own, markerfacecolor="white", markersize=4.0,
                 label="right-censored",
             )  # fmt: skip
             handles.append(ring)
-        ax.legend(handles=handles, loc="best", handlelength=1.0, fontsize=6)
+        legend_below(ax, handles)
     return ax
 
 
@@ -382,7 +438,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
             most = float(np.nanmax(np.abs(value.values))) or 1.0
             edges = [edges_of(dataset, name) for name in dims]
             cells = ax.pcolormesh(*edges, value.values.T, cmap=cm.vik, vmin=-most, vmax=most, rasterized=True)
-            color_bar(cells, ax, f"Largest Lyapunov exponent ({unit})")
+            color_bar(cells, ax, f"Largest Lyapunov exponent ({unit}),\nbelow 0: periodic, above 0: chaotic")
             _undecided_cells(ax, edges, value.values.T, error.values.T)
             dress(ax.xaxis, dataset, dims[0])
             dress(ax.yaxis, dataset, dims[1])
@@ -406,7 +462,15 @@ def _exponent_line(dataset: xr.Dataset, ax: Axes, name: str, value: Any, error: 
     """The largest exponent over one parameter, with its interval; marker and colour state its sign."""
     x, _ = positions(dataset, name)
     ax.axhline(0.0, color="0.6", linewidth=0.5)
-    ax.fill_between(x, value - 2 * error, value + 2 * error, color="0.6", alpha=0.35, linewidth=0.0)
+    ax.fill_between(
+        x,
+        value - 2 * error,
+        value + 2 * error,
+        color="0.6",
+        alpha=0.35,
+        linewidth=0.0,
+        label="two standard errors",
+    )
     ax.plot(x, value, color="0.45", linewidth=0.6)
     settled, chaotic = value + 2 * error < 0.0, value - 2 * error > 0.0
     for which, mark, color, words in (
@@ -416,8 +480,7 @@ def _exponent_line(dataset: xr.Dataset, ax: Axes, name: str, value: Any, error: 
     ):
         if which.any():
             ax.plot(x[which], value[which], mark, color=color, markersize=3.0, label=words)
-    if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc="best")
+    legend_below(ax)
     if name in dataset.coords:
         dress(ax.xaxis, dataset, name)
     else:
@@ -425,21 +488,16 @@ def _exponent_line(dataset: xr.Dataset, ax: Axes, name: str, value: Any, error: 
 
 
 def _undecided_cells(ax: Axes, edges: list[Any], value: Any, error: Any) -> None:
-    """Mark the cells whose sign is not decided, and state the meaning of the colours."""
+    """Mark the cells whose sign is not decided."""
     undecided = np.isfinite(value) & (np.abs(value) <= 2 * error)
     middle = [0.5 * (edge[1:] + edge[:-1]) for edge in edges]
-    handles: list[Any] = [
-        Patch(facecolor=cm.vik(share), edgecolor="black", linewidth=0.4, label=words)
-        for share, words in ((0.15, "negative: periodic"), (0.85, "positive: chaotic"))
-    ]
     if undecided.any():
         row, column = np.nonzero(undecided)
-        marks = ax.plot(
+        ax.plot(
             middle[0][column], middle[1][row], "x", color="0.2", markersize=2.5, markeredgewidth=0.6,
             label="sign not decided",
         )  # fmt: skip
-        handles += marks
-    legend_below(ax, handles)
+    legend_below(ax)
 
 
 @checked
@@ -484,7 +542,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
                     )
             ax.set_aspect("equal", adjustable="datalim")
             ax.set(xlabel="Floquet multiplier, real part", ylabel="Floquet multiplier, imaginary part")
-            legend_below(ax, columns=3)
+            legend_below(ax)
     return ax
 
 
@@ -548,13 +606,15 @@ def plot_backbone(
                 if (stable == kind).any():
                     ax.plot(x, y, _STABILITY[kind][0], **look)
                     kinds.add(kind)
-            handles.append(Line2D([], [], label=label, **look))
+            if len(curves) > 1:
+                handles.append(Line2D([], [], label=label, **look))
         unit = f" (1: {prefixed(curves[0].attrs['reference_frequency'], 'Hz')})" if one_model else ""
         ax.set(xlabel=rf"Frequency $\Omega$ of free vibration{unit}")
         ax.set_ylabel(scale_text(curves[0].attrs if one_model else {}, "Amplitude at mid-span $w/b$"))
         ax.set_ylim(bottom=0.0)
         for line, name in (_STABILITY[kind] for kind in sorted(kinds, reverse=True)):
-            handles.append(Line2D([], [], color="0.3", linestyle=line, label=f"{name} motion"))
+            own = (look["color"], f"{labels[0]}, {name}") if len(curves) == 1 else ("0.3", f"{name} motion")
+            handles.append(Line2D([], [], color=own[0], linestyle=line, label=own[1]))
         legend_below(ax, handles)
     return ax
 
@@ -660,7 +720,7 @@ def _multipliers_along(dataset: xr.Dataset, ax: Axes, sizes: Any) -> None:
         ax.axvline(float(value), color="0.6", linewidth=0.5)
         ax.annotate(
             str(kind), (float(value), 1.0), (2.0, -3.0), xycoords=("data", "axes fraction"),
-            textcoords="offset points", rotation=90, va="top", fontsize=6,
+            textcoords="offset points", rotation=90, va="top", fontsize="small",
         )  # fmt: skip
     ax.set(yscale="log", ylabel="Absolute value of the Floquet multipliers")
     legend_below(ax)
@@ -709,7 +769,7 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         ax.margins(0.08)
         unseen = 100 * float(dataset.attrs["unseen_share_95"])
         extend_title(ax, f"Attractors not found: below {unseen:.2g} % of the states (95 %)")
-        legend_below(ax, columns=1)
+        legend_below(ax)
     return ax
 
 
@@ -729,8 +789,15 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     y = x.replace("displacement", "velocity")
     contains(dataset, f"{x} and {y}", x, y)
     with frame(ax, dataset) as ax:
-        look: dict[str, Any] = {"color": _BLUE, "markersize": 2.0, "markeredgewidth": 0.0, "rasterized": True}
-        ax.plot(dataset[x].values, dataset[y].values, ".", **look)
+        # few points are large, and many do not run into one another
+        size = float(np.clip(20.0 / np.sqrt(dataset[x].size), 0.8, 3.0))
+        look: dict[str, Any] = {
+            "color": _BLUE,
+            "markersize": size,
+            "markeredgewidth": 0.0,
+            "rasterized": True,
+        }
+        ax.plot(dataset[x].values, dataset[y].values, "o", **look)
         # a point that repeats is not magnified to its rounding errors
         for limits, name in (("xlim", x), ("ylim", y)):
             values = dataset[name].values
@@ -793,7 +860,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
                 label=label,
             )  # fmt: skip
             handles.append(dots)
-        legend_below(ax, handles, 1)
+        legend_below(ax, handles)
     return ax
 
 
@@ -830,7 +897,8 @@ def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             points = dataset["state"].values[dataset["side"].values == side]
             label = f"{stability} manifold" if side > 0 else None
             ax.plot(*points[:, at].T, line, color=color, linewidth=0.7, label=label)
-        ax.plot(*dataset["saddle"].values[list(at)], "x", color="black", markersize=5.0)
+        saddle = dataset["saddle"].values[list(at)]
+        ax.plot(*saddle, "x", color="black", markersize=5.0, label="saddle" if new else None)
         if new:
             ax.set(xlabel=_coordinate(names[at[0]]), ylabel=_coordinate(names[at[1]]))
         ax.legend(loc="best")
@@ -887,40 +955,44 @@ def plot_homoclinic(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw an edge state: the first coordinate once a period, and the unstable orbit that it settles on.
 
-    The right axis, which is logarithmic, has the distance between the two states of different outcome.
+    Below it, on a logarithmic axis, is the distance between the two states of different outcome; with *ax* the
+    coordinate alone is drawn.
     """
     contains(dataset, "edge state", "orbit_state", "state")
-    name = str(dataset["coordinate"].values[0])
-    values = dataset["state"].values[:, 0]
-    with frame(ax, dataset) as ax:
-        for at, words in ((-1.0, "well"), (0.0, "straight")):
-            if name == "amplitude[1]" and values.min() - 0.3 < at < values.max() + 0.3:
-                ax.axhline(at, color="0.75", linewidth=0.5, zorder=0)
-                above = at < values.mean()
-                ax.annotate(
-                    words, (0.0, at), (2.0, 1.0 if above else -1.0), xycoords=("axes fraction", "data"),
-                    textcoords="offset points", va="bottom" if above else "top", fontsize=6, color="0.4",
-                )  # fmt: skip
+    name, new = str(dataset["coordinate"].values[0]), ax is None
+    values, points = dataset["state"].values[:, 0], dataset["orbit_state"].values[:, 0]
+    out = int((np.hypot(dataset["multiplier_real"], dataset["multiplier_imag"]) > 1.0).sum())
+    with frame(ax, dataset, height=104.0) as ax:
         period = np.arange(1, values.size + 1)
-        look: dict[str, Any] = {"color": _BLUE, "linewidth": 0.7, "markersize": 3.5}
-        ax.plot(period, values, ".-", label="between the two outcomes", **look)
-        points = dataset["orbit_state"].values[:, 0]
-        out = int((np.hypot(dataset["multiplier_real"], dataset["multiplier_imag"]) > 1.0).sum())
+        look: dict[str, Any] = {"color": _BLUE, "linewidth": 0.7, "markersize": 3.0}
+        ax.plot(period, values, "o-", label="state between the two outcomes", **look)
+        kind = f"unstable orbit of period {points.size}, {out} multiplier{'s' if out != 1 else ''} above 1"
         for i, point in enumerate(points):
-            words = f"orbit of period {points.size}, {out} multiplier{'s' if out != 1 else ''} outside"
-            label = words if i == 0 else None
-            ax.axhline(point, color=_RED, linewidth=0.9, dashes=(4, 2), label=label)
-        apart, distance = ax.twinx(), dataset["distance"].values
-        distance = np.where(distance > 0.0, distance, np.nan)
-        apart.semilogy(
-            period, distance, color=_STARTS, linewidth=0.7, label="distance of the two states (right)"
-        )
-        apart.set_ylabel("Distance of the two states")
-        ax.set_zorder(apart.get_zorder() + 1)
-        ax.patch.set_visible(False)
-        legend_below(ax, [line for each in (ax, apart) for line in each.get_legend_handles_labels()[0]], 1)
+            ax.axhline(
+                point, color=_RED, linewidth=0.9, dashes=(4, 2), label=kind if i == 0 else None, zorder=3
+            )
+        ax.margins(y=0.12)
+        legend_below(ax)
         ax.set(xlabel="Period of the drive", ylabel=_coordinate(name))
+        if new:
+            _distance(dataset, ax, period)
     return ax
+
+
+def _distance(dataset: xr.Dataset, ax: Axes, period: Any) -> None:
+    """Draw the distance of the two states in axes of its own below *ax*."""
+    spec = ax.get_subplotspec()
+    assert spec is not None
+    grid = spec.subgridspec(2, 1, height_ratios=(1.5, 1.0))
+    ax.set_subplotspec(grid[0])
+    below = ax.figure.add_subplot(grid[1], sharex=ax)
+    distance = dataset["distance"].values
+    below.semilogy(period, np.where(distance > 0.0, distance, np.nan), ".-", color=_STARTS, linewidth=0.7)
+    below.set(xlabel=ax.get_xlabel(), ylabel="Distance of\nthe two states")
+    ax.set_xlabel("")
+    ax.tick_params(labelbottom=False)
+    ax.figure.align_ylabels([ax, below])
+    fix_ticks(below)
 
 
 def _attractor_colors(count: int) -> list[Any]:

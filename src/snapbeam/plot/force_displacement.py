@@ -74,7 +74,7 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
                 ax.annotate(
                     f"{words} {prefixed(value, 'N')}", at,
                     xytext=(6.0 if right else -6.0, 9.0 if value > 0.0 else -15.0), textcoords="offset points",
-                    ha="right" if right else "left", fontsize=7.0,
+                    ha="right" if right else "left", fontsize="small",
                     bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}, zorder=7,
                 )  # fmt: skip
         ax.axhline(0.0, color="#000000", linewidth=0.5, zorder=0)

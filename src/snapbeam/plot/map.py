@@ -28,6 +28,7 @@ from snapbeam.plot.style import (
     fixed_value,
     frame,
     legend_below,
+    marker_size,
     set_title,
 )
 from snapbeam.plot.units import in_units, ratio_along, scale_text
@@ -369,7 +370,9 @@ def plot_statistic(
                 _swept(ax, dataset, data, dims[1])
             else:
                 points, _ = positions(dataset, dims[0])
-                ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=3)
+                ax.plot(
+                    points, data.values, ".-", color=BEAM_COLOR, markersize=1.5 * marker_size(points.size)
+                )
             dress(ax.xaxis, dataset, dims[-1])
             ax.set_ylabel(label)
             ax.set_yscale("log" if log else "linear")
@@ -396,7 +399,15 @@ def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None
     looks = {"up": ("^-", BEAM_COLOR, BEAM_COLOR), "down": ("v--", SHAKER_COLOR, "white")}
     for row, kind in zip(data.values, dataset["sweep"].values, strict=True):
         look, color, face = looks[str(kind)]
-        ax.plot(points, row, look, color=color, markerfacecolor=face, markersize=3.5, label=f"swept {kind}")
+        ax.plot(
+            points,
+            row,
+            look,
+            color=color,
+            markerfacecolor=face,
+            markersize=1.2 * marker_size(points.size),
+            label=f"swept {kind}",
+        )
     ax.legend(loc="best")
 
 

@@ -576,7 +576,7 @@ def plot_run(
             turned = (lambda w: np.multiply(w, metres), lambda w: np.divide(w, metres))
             beside = left[0].secondary_yaxis("right", functions=turned)
             beside.set_ylabel(f"Displacement ({unit})")
-        figure.legend(*left[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
+        figure.legend(*left[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
         set_title(left[0], caption(dataset, 2))
         say_scale_once(left[0])
         figure.align_ylabels(left)
@@ -586,8 +586,8 @@ def plot_run(
             around = seconds / scale
             right = _column(figure, grid, 1, near, around, scales)
             digits = _digits(near, axis_name)
-            after = f"\nafter $\\tau$ = {peak:.{digits}f}" if axis_name == "cycle" else ""
-            right[-1].set_xlabel(f"Time ({unit}){after}", loc="right")
+            onset = f"\nafter $\\tau$ = {peak:.{digits if peak else 0}f}" if axis_name == "cycle" else ""
+            right[-1].set_xlabel(f"Time ({unit}){onset}", loc="right")
             right[-1].xaxis.set_major_locator(MaxNLocator(3))
             right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
     return left[0]

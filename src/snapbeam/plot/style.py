@@ -16,10 +16,11 @@ import numpy as np
 from cmcrameri import cm
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.axis import Axis
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.ticker import AutoLocator
+from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.parameters import PHYSICAL, lookup
@@ -58,7 +59,9 @@ SERIES_COLORS = ("#16245E", "#B03A27", "#70BBF0", "#858585", "#000000")
 """Colours of curves and regions that are no response classes, in their order."""
 
 _SCALE_OF_LABEL = re.compile(r"\(\$?b\$? = ")
-_SCALE_OF_TITLE = re.compile(r", \$b\$ = [^,\n]*")
+_SCALE_OF_TITLE = re.compile(r", \$b\$\s=\s[^,\n]*")
+_NO_BREAK = re.compile(r"(?<=\$) (?==)|(?<==) | (?=\()|(?<=from) |(?<=the) | (?=well)")
+"""Spaces of a title that a line does not end at: about equals signs, before brackets and in the name of a well."""
 
 _RC: Any = {
     "axes.axisbelow": True,
@@ -228,15 +231,31 @@ def color_of(number: int, count: int, last: float = 0.85) -> Any:
     return cm.batlow(last * number / max(count - 1, 1))
 
 
+def marker_size(points: int) -> float:
+    """Size of the markers of a curve, points, so that those of many do not run into one another."""
+    return float(np.clip(120.0 / max(points, 1), 1.2, 3.0))
+
+
 def color_bar(mesh: Any, ax: Axes, label: str, **options: Any) -> None:
     """Draw the colour bar of cells or dots beside their axes."""
     bar = ax.figure.colorbar(mesh, ax=ax, label=label, **options)
+    if isinstance(mesh.norm, LogNorm):
+        plain_decades(bar.ax.yaxis, *mesh.get_clim())
     bar.ax.tick_params(labelsize=_RC["ytick.labelsize"], width=_RC["ytick.major.width"])
+
+
+def plain_decades(axis: Axis, low: float, high: float) -> None:
+    """Write plain numbers at a few ticks along a logarithmic axis of fewer than three decades."""
+    if 0.0 < low < high < 1e3 * low and 1e-3 <= low and high < 1e5:
+        few = LogLocator(subs=(1.0, 2.0, 5.0)) if high > 5.0 * low else MaxNLocator(4)
+        axis.set_major_locator(few)
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
 
 
 def set_title(ax: Axes, text: str) -> None:
     """Write the title of *ax*, which ``ax.set_title`` replaces; it continues on a new line at the edge of the figure."""
-    ax.set_title(text, loc="center", fontsize=_RC["legend.fontsize"], wrap=True)
+    ax.set_title(_NO_BREAK.sub("\u00a0", text), loc="center", fontsize=_RC["legend.fontsize"], wrap=True)
 
 
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
@@ -296,6 +315,9 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
 
 def beam_text(attrs: Any) -> str:
     """Short description of the beam from the attributes of a file; empty without one."""
+    attrs = {
+        name.removeprefix("fixed_"): value for name, value in attrs.items()
+    }  # those of designs are fixed
     if not {"beam_length", "beam_thickness"} <= set(attrs):
         return ""
     words = [f"beam {prefixed(attrs['beam_length'], 'm')} × {prefixed(attrs['beam_thickness'], 'm')}"]
@@ -357,7 +379,8 @@ def fixed_value(dataset: xr.Dataset, name: str, axes: Collection[str] = ()) -> f
     """Value of a parameter that is the same in the whole dataset; None if it differs or is not known."""
     if name in dataset.coords:
         return float(dataset[name].squeeze()) if dataset[name].size == 1 and name not in axes else None
-    return None if name in axes or name not in dataset.attrs else float(dataset.attrs[name])
+    value = dataset.attrs.get(name, dataset.attrs.get(f"fixed_{name}"))  # the second of designs
+    return None if name in axes or value is None else float(value)
 
 
 _GRAVITY = 9.80665
@@ -441,16 +464,30 @@ _LINE = 2.9  # mm
 _COLORS = {Severity.INFO: "0.35", Severity.WARNING: SHAKER_COLOR, Severity.ERROR: SHAKER_COLOR}
 
 
-def legend_below(ax: Axes, handles: Sequence[Artist] | None = None, columns: int = 2) -> None:
-    """Write a legend below: of the whole figure if no other axes stand in it, else of *ax*; none without entries."""
+def legend_below(ax: Axes, handles: Sequence[Artist] | None = None) -> None:
+    """Write a legend below, in up to three columns that fit; none without entries.
+
+    It is one of the whole figure if no other axes stand in it, else of *ax*.
+    """
     figure = ax.get_figure(root=True)
     assert figure is not None
     entries = ax.get_legend_handles_labels()[0] if handles is None else list(handles)
     places = {each.get_subplotspec() for each in figure.axes if each.get_label() != "<colorbar>"}
-    if entries and len(places) == 1 and figure.get_layout_engine() is not None:
-        figure.legend(handles=entries, loc="outside lower center", ncols=columns)
-    elif entries:
-        ax.legend(handles=entries, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns)
+    alone = len(places) == 1 and figure.get_layout_engine() is not None
+    room = figure.bbox.width if alone else 1.15 * ax.get_window_extent().width
+    count = len(entries)
+    for columns in (
+        each for each in (3, 2, 1) if each in {-(-count // rows) for rows in range(1, count + 1)}
+    ):
+        if alone:
+            legend = figure.legend(handles=entries, loc="outside lower center", ncols=columns)
+        else:
+            legend = ax.legend(
+                handles=entries, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns
+            )
+        if columns == 1 or legend.get_window_extent().width <= room:
+            break
+        legend.remove()
 
 
 def _lines(diagnostics: Iterable[Diagnostic], width: float, most: int) -> list[tuple[str, str]]:

@@ -34,8 +34,8 @@ def plot_threshold(
     """Draw the result of :func:`snapbeam.threshold`.
 
     The line is the lowest value that makes an interwell response.  The shade reaches up to the value above
-    which every run is interwell, or to the end of the range if the highest run is intrawell.  A point without
-    drawn neighbours has a marker.  A triangle at the top means that no run is interwell.  Hatching marks the
+    which every run is interwell, or to the end of the range if the highest run is intrawell.  Points
+    have markers.  A triangle at the top means that no run is interwell.  Hatching marks the
     points whose outcome is ``not_searched`` or ``undecided``.  A dotted line at a point shows the range in
     which failed runs leave the threshold open.
 
@@ -106,8 +106,7 @@ def plot_threshold(
         low = amplitude[0] if ax.get_yscale() == "log" else min(0.0, amplitude[0])
         ax.set(xlim=x[[0, -1]], ylim=(low, top))
         if quasi_static:
-            where = ": above the range" if static.min() > top else ""
-            line.set_label(rf"quasi-static, $V_\mathrm{{QS1}}${where}")
+            line.set_label(r"quasi-static, $V_\mathrm{QS1}$" if static.min() <= top else "")
         marks = _mark_no_threshold(ax, curves, x, edges)
         if is_geometric(amplitude):
             extend_title(ax, f"steps of a factor of {amplitude[1] / amplitude[0]:.3g}")
@@ -131,9 +130,8 @@ def _draw_curve(ax: Axes, curve: xr.Dataset, x: _Array, style: tuple[str, str], 
     always = np.where(found & ~np.isfinite(always), end, always)
     most = np.where(found & ~np.isfinite(most), end, most)
     ax.fill_between(x, first, always, color=color, alpha=0.25, linewidth=0.0)
-    ax.plot(x, first, dashes, color=color, linewidth=1.1, label=label)
+    ax.plot(x, first, dashes, color=color, linewidth=1.1, marker=".", markersize=3.5, label=label)
     alone = found & ~np.append(found[1:], False) & ~np.append(False, found[:-1])
-    ax.plot(x[alone], first[alone], "o", color=color, markersize=3.0, clip_on=False)
     ax.vlines(x[alone], first[alone], always[alone], color=color, alpha=0.25, linewidth=3.0)
     for low, high in ((least, first), (always, most)):
         wide = found & (low < high)

@@ -11,7 +11,6 @@ from cmcrameri import cm
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from snapbeam.model.parameters import PHYSICAL, lookup
 from snapbeam.model.quantity import split_name
@@ -26,6 +25,7 @@ from snapbeam.plot.style import (
     extend_title,
     frame,
     legend_below,
+    plain_decades,
 )
 from snapbeam.plot.units import in_units, ratio_along, ratio_name, scale_text
 from snapbeam.util.si_prefixes import prefixed
@@ -63,7 +63,8 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     ----------
     dataset : xarray.Dataset
     over : str, optional
-        A variable, such as ``"location"``; the second objective by default, or the first variable if there is one objective.
+        A variable, such as ``"location"``, or a distance to a constraint, such as ``"distance_snap"``; by default the second
+        objective, or the first variable that is not the objective.
     """
     if "constraints_satisfied" not in dataset or "tried" not in dataset.dims:
         raise InputError(f"no designs among {list(map(str, dataset.variables))}")
@@ -72,12 +73,12 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     variables = [
         name[6:] for name in names if name.startswith("tried_") and "parameter" in dataset[name].attrs
     ]
-    if over is None:
-        across = f"objective_{objectives[1]}" if len(objectives) > 1 else variables[0]
-    elif over in variables:
-        across = over
-    else:
-        raise InputError(f"over = {shown(over)}: must be one of {', '.join(variables)}")
+    # an objective that is the only variable is drawn over the distance to its constraint
+    known = [*variables, *(name[6:] for name in names if name.startswith("tried_distance_"))]
+    if over is not None and over not in known:
+        raise InputError(f"over = {shown(over)}: must be one of {', '.join(known)}")
+    free = next((name for name in known if name != objectives[0]), variables[0])
+    across = over or (f"objective_{objectives[1]}" if len(objectives) > 1 else free)
     up = f"objective_{objectives[0]}"
     with frame(ax, dataset, height=84.0) as ax:
         x, y = dataset[f"tried_{across}"].values, dataset[f"tried_{up}"].values
@@ -103,11 +104,8 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
         for values, scale, axis in ((x[kept], ax.set_xscale, ax.xaxis), (y[kept], ax.set_yscale, ax.yaxis)):
             if values.size and values.min() > 0.0 and values.max() > _DECADE * values.min():
                 scale("log")
-                if values.max() < _DECADE**3 * values.min():  # numbers of one decade run into one another
-                    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-                    axis.set_major_formatter("{x:g}")
-                    axis.set_minor_formatter(NullFormatter())
-        legend_below(ax, columns=1)
+                plain_decades(axis, values.min(), values.max())
+        legend_below(ax)
     return ax
 
 
@@ -120,6 +118,9 @@ def _errors(dataset: xr.Dataset, name: str, own: np.ndarray) -> np.ndarray | Non
 
 
 def _label(dataset: xr.Dataset, name: str) -> str:
+    short = name.removeprefix("objective_")
+    if f"fixed_{short}" in dataset.attrs or "parameter" in dataset.get(short, dataset[name]).attrs:
+        return axis_label(dataset, short)
     labels = dataset[name].attrs
     unit, words = str(labels.get("units", "1")), str(labels.get("long_name", name))
     words = scale_text(dataset.attrs, words) if "over b" in words else words
@@ -177,7 +178,7 @@ def plot_probability(
         raise InputError(f"probability over {dims}: is drawn over one or two parameters")
     with frame(ax, dataset, height=80.0) as ax:
         if len(dims) == 1:
-            _line(data, ax, dims[0], outcome, levels)
+            _line(data, ax, dims[0], outcome)
         else:
             dims = list(in_order(data, dims))
             _cells(data, ax, dims, outcome, levels)
@@ -196,16 +197,14 @@ def plot_probability(
     return ax
 
 
-def _line(data: xr.Dataset, ax: Axes, name: str, outcome: str, levels: tuple[float, ...]) -> None:
+def _line(data: xr.Dataset, ax: Axes, name: str, outcome: str) -> None:
     x, _ = positions(data, name)
     low, high = data["probability_low"].values, data["probability_high"].values
-    for level in levels:
-        ax.axhline(level, color="0.75", linewidth=0.6, zorder=0)
     share = 100.0 * float(data.attrs.get("confidence", 0.95))
     ax.fill_between(x, low, high, color=_BLUE, alpha=0.25, linewidth=0.0, label=f"{share:g} % interval")
     ax.plot(x, data["probability"].values, "o-", color=_BLUE, markersize=2.2, label="fraction of the runs")
     ax.set(ylim=(-0.02, 1.02), ylabel=_WORDS.get(outcome, outcome))
-    ax.legend(loc="best")
+    legend_below(ax)
     dress(ax.xaxis, data, name)
 
 
@@ -294,7 +293,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
             low, high = (np.clip(one[f"threshold_{end}"].values, bottom, top) for end in ("low", "high"))
             ax.fill_between(x, low, high, color=color, alpha=0.22, linewidth=0.0)
             look: dict[str, Any] = {"linestyle": dashes, "color": color, "linewidth": 1.1}
-            ax.plot(x, one["threshold"].values, label=f"P = {level:g}", **look)
+            ax.plot(x, one["threshold"].values, label=f"P = {level:g}", marker=".", markersize=3.0, **look)
         if quasi_static:
             line = quasi_static_along(data, ratio, x / wide)
             if raised != "velocity_amplitude":  # in m/s
@@ -316,7 +315,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
         ax.set_ylim(min(0.0, bottom), min(top, 1.08 * float(reach)) if np.isfinite(reach) else top)
         share = 100.0 * float(data.attrs.get("confidence", 0.95))
         extend_title(ax, f"{int(data['runs'].max())} runs a point, {share:g} % bands")
-        ax.legend(loc="best")
+        legend_below(ax)
     return ax
 
 
@@ -370,9 +369,11 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
     for name, color, label, shift in kinds:
         value, low, high = (data[f"{name}{end}"].values for end in ("", "_low", "_high"))
         ax.barh(place + shift, value, height=height, color=color, label=label)
-        ax.errorbar(value, place + shift, xerr=np.stack([value - low, high - value]), fmt="none", **_BARS)
+        words = f"{100.0 * float(data.attrs['confidence']):g} % interval" if name == kinds[-1][0] else None
+        error = np.stack([value - low, high - value])
+        ax.errorbar(value, place + shift, xerr=error, fmt="none", label=words, **_BARS)
     ax.axvline(0.0, color="black", linewidth=0.6)
-    ax.set_xlabel(f"Share of the variance: {data.attrs['quantity']}")
+    ax.set_xlabel(textwrap.fill(f"Share of the variance of {data.attrs['quantity']}", 44))
     legend_below(ax)
 
 
@@ -410,7 +411,7 @@ def plot_gradient(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         ax.barh(place, value, xerr=error, height=0.62, color=_BLUE, error_kw=_BARS)
         ax.axvline(0.0, color="black", linewidth=0.6)
         words = str(data.attrs["quantity"]).replace("_", " ")
-        ax.set_xlabel(f"Change in % for 1 % of the parameter:\n{words[:1].upper()}{words[1:]}")
+        ax.set_xlabel(f"Change of {words}\nfor 1 % of the parameter (%)")
     return ax
 
 
@@ -426,7 +427,7 @@ def plot_posterior(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         share = np.cumsum(weight[order]) - 0.5 * weight[order]
         found = np.interp((0.025, 0.25, 0.5, 0.75, 0.975), share, dataset[name].values[order])
         row = lookup(str(dataset[name].attrs["parameter"]))
-        labels.append(f"{_words(row.name)}\n{_with_unit(found[2], row.quantity.unit, 4)}")
+        labels.append(f"{_words(row.name)}\nmedian {_with_unit(found[2], row.quantity.unit, 4)}")
         ends.append(100.0 * (found / found[2] - 1.0))
     with frame(ax, dataset, height=28.0 + 9.0 * len(names)) as ax:
         place, at = _rows(ax, labels), np.array(ends)

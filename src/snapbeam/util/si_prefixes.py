@@ -30,7 +30,7 @@ def prefixed(value: float, unit: str, digits: int = 3) -> str:
 
 def scale_of(values: Any, unit: str) -> tuple[float, str]:
     """Divisor for a short axis, and the resulting unit, such as ``(1e-3, "mN")``."""
-    most = float(np.nanmax(np.abs(np.asarray(values, dtype=float)))) if np.size(values) else 0.0
+    most = float(np.fmax.reduce(np.abs(np.asarray(values, dtype=float)), axis=None, initial=0.0))
     if most == 0.0 or not np.isfinite(most):
         return 1.0, unit
     step = _step(most)

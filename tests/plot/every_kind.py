@@ -1,0 +1,132 @@
+"""A small result of every kind that has a figure, each from the public function that computes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+import snapbeam as sb
+from snapbeam.model import default_values
+from snapbeam.util.datasets import xr
+
+SHORT = sb.Integration(cycles=20)
+SYSTEM = sb.System(
+    sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.05),
+    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))],
+)
+CHAOTIC = SYSTEM.replace(**{"drive.frequency_ratio": 0.8, "drive.velocity_amplitude": 0.5})
+PLANE = {
+    "drive.frequency_ratio": np.linspace(0.8, 1.6, 5),
+    "drive.velocity_amplitude": np.linspace(0.05, 0.3, 6),
+}
+SPEEDS = {"drive.velocity_amplitude": np.linspace(0.05, 0.5, 16)}
+SPREAD = sb.uncertainty.ParameterUncertainty(
+    of={"location": sb.uncertainty.Normal(0.01), "contact.stiffness": sb.uncertainty.LogNormal(0.2)}
+)
+MOVING = sb.uncertainty.ParameterUncertainty(
+    of={"velocity_amplitude": sb.uncertainty.Normal(0.1, relative=True)}
+)
+
+
+@cache
+def _attractors() -> sb.dynamics.Attractors:
+    return sb.dynamics.find_attractors(SYSTEM, 12)
+
+
+@cache
+def _branch() -> sb.dynamics.Branch:
+    orbit = sb.dynamics.periodic_orbit(SYSTEM, transient=100)
+    return sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=40)
+
+
+def _lifetimes(axes: dict[str, np.ndarray]) -> xr.Dataset:
+    settings = sb.dynamics.LifetimeSettings(settling_cycles=10)
+    how = sb.Integration(cycles=60)
+    return sb.dynamics.lifetime_map(SYSTEM, axes, how, initial_conditions=8, settings=settings)
+
+
+def _basins() -> xr.Dataset:
+    grid = {"amplitude[1]": np.linspace(-0.98, 1.4, 12), "velocity[1]": np.linspace(-0.6, 0.6, 9)}
+    return sb.dynamics.basins_of_attraction(_attractors(), grid)
+
+
+def _edge() -> xr.Dataset:
+    ends = np.array([-0.9, 0.0]), np.array([-1.0, 1.3])
+    return sb.dynamics.edge_tracking(SYSTEM, *ends, periods=25, horizon=60).to_dataset()
+
+
+def _posterior() -> xr.Dataset:
+    draw = np.random.default_rng(1).normal(size=(2000, 3))
+    values = np.array([3.4e-4, 4e8, 0.005]) * (1.0 + np.array([0.02, 0.1, 0.05]) * draw)
+    names = ("beam.buckling_level", "contact.stiffness", "model.damping_ratio")
+    return sb.uncertainty.Posterior(names, values, np.full(2000, 1 / 2000)).to_dataset()
+
+
+def _designs(objectives: object = "velocity_amplitude") -> xr.Dataset:
+    effort = sb.uncertainty.OptimizerSettings(
+        generations=6, population=10, samples=40, validation_samples=80, candidates=3
+    )
+    variables = {"velocity_amplitude": (0.03, 0.3), "location": (0.3, 0.5)}
+    limit = sb.uncertainty.Constraint(quantity="snap", lower=0.8)
+    return sb.uncertainty.optimize_design(
+        CHAOTIC, variables, objectives, limit, MOVING, effort, integration=SHORT
+    )
+
+
+def _saddle() -> sb.dynamics.PeriodicOrbit:
+    return sb.dynamics.periodic_orbit(SYSTEM, [0.0, 0.0])
+
+
+QUICK: dict[str, Callable[[], xr.Dataset]] = {
+    "run": lambda: sb.simulate(CHAOTIC.replace(**{"model.modes": 3}), SHORT).dataset,
+    "map": lambda: sb.sweep(SYSTEM, PLANE, SHORT)[["response_class", "peak_force"]],
+    "map of a line": lambda: sb.sweep(SYSTEM, SPEEDS, SHORT)[
+        ["response_class", "peak_force", "min_midspan_displacement", "max_midspan_displacement"]
+    ],
+    "threshold": lambda: sb.threshold(
+        SYSTEM, "drive.velocity_amplitude", np.linspace(0.02, 0.4, 20),
+        {"drive.frequency_ratio": np.linspace(0.6, 1.6, 6)}, SHORT,
+    ),
+    "hysteresis": lambda: sb.dynamics.hysteresis(SYSTEM, "velocity_amplitude", np.linspace(0.05, 0.3, 8), SHORT),
+    "lifetimes": lambda: _lifetimes(PLANE),
+    "lifetimes of a line": lambda: _lifetimes(SPEEDS),
+    "lifetimes of a point": lambda: _lifetimes({"drive.velocity_amplitude": [0.2, 0.3]}).isel(velocity_amplitude=0),
+    "impact section": lambda: sb.dynamics.poincare_section(CHAOTIC, "impact", 60),
+    "stroboscopic section": lambda: sb.dynamics.poincare_section(CHAOTIC, "stroboscopic", 60),
+    "attractors": lambda: _attractors().to_dataset(),
+    "orbit": lambda: sb.dynamics.periodic_orbit(SYSTEM, transient=100).to_dataset(),
+    "backbone": lambda: sb.dynamics.backbone_curve(sb.System(SYSTEM.model), max_points=20),
+    "posterior": _posterior,
+    "probability map": lambda: sb.uncertainty.probability_map(
+        CHAOTIC, {key: values[1:4] for key, values in PLANE.items()}, MOVING, 12, integration=SHORT
+    ),
+    "probability line": lambda: sb.uncertainty.probability_map(CHAOTIC, SPEEDS, MOVING, 20, integration=SHORT),
+}  # fmt: skip
+SLOW: dict[str, Callable[[], xr.Dataset]] = {
+    "basins": _basins,
+    "branch": lambda: _branch().to_dataset(),
+    "edge": _edge,
+    "diagram": lambda: sb.dynamics.bifurcation_diagram(
+        SYSTEM, "velocity_amplitude", np.linspace(0.02, 0.1, 9), periods=(100, 16)
+    ),
+    "exponents": lambda: sb.dynamics.lyapunov_spectrum(SYSTEM, 2, periods=40, transient=10),
+    "line of exponents": lambda: sb.dynamics.lyapunov_spectrum(CHAOTIC, periods=40, transient=10, axes=SPEEDS),
+    "map of exponents": lambda: sb.dynamics.lyapunov_spectrum(CHAOTIC, periods=40, transient=10, axes=PLANE),
+    "designs": _designs,
+    "front of designs": lambda: _designs(["velocity_amplitude", "peak_force"]),
+    "quantiles": lambda: sb.uncertainty.quantile_threshold(
+        CHAOTIC, "velocity_amplitude", (0.02, 0.4), {"frequency_ratio": [0.8, 1.2, 1.6]}, MOVING,
+        sb.uncertainty.QuantileSearchSettings(runs=120), integration=SHORT,
+    ),
+    "sensitivities": lambda: sb.uncertainty.sensitivity(CHAOTIC, "peak_force", SPREAD, samples=8, integration=SHORT),
+    "sensitivity indices": lambda: sb.uncertainty.sensitivity(
+        CHAOTIC, "peak_force", SPREAD, "sobol", samples=64, integration=SHORT
+    ),
+    "gradient": lambda: sb.uncertainty.gradient(CHAOTIC, "peak_force", ["contact.stiffness", "location"], integration=SHORT),
+    "manifold": lambda: sb.dynamics.invariant_manifold(_saddle(), max_arclength=1.0),
+    "force-displacement curve": lambda: sb.force_displacement(SYSTEM),
+    "growth of a perturbation": lambda: sb.perturbation_growth(CHAOTIC, SHORT),
+}  # fmt: skip
+RESULTS = QUICK | SLOW
