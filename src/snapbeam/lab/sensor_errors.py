@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import butter, lfilter
+from scipy.signal.windows import tukey
 from scipy.stats import chi2
 
 from snapbeam.lab.decay.poles import Line
@@ -36,12 +37,12 @@ _CURVE_ERROR = 0.05  # of its harmonics by which a curve may differ from a famil
 _COURSE = 8  # cycles of a course, at least
 _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
-_BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
 _START = 20.0  # cycles of the start that a filter shapes
-_START_LIMIT = (
-    40.0  # chi-square by which a start, which no model describes to the noise, speaks against a filter
-)
+_CONTRADICTS = 40.0  # chi-square of what a start or a drive that no model describes to the noise leaves
+_BETWEEN = 0.02  # of a start, which filters between those that are tried leave
+_BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
 _CONSTANT = 4  # cycles on either side of a jump
+_FADES = (8.0, 30.0)  # rates of starts that are not over, over the length
 _TAIL = 4.0  # cycles after the start-up whose transient is no noise
 _MAINS = (50.0, 60.0, 100.0, 120.0)
 _FASTEST = 3.0  # m/s
@@ -336,7 +337,11 @@ def _candidates(drive: float) -> Iterator[_Filter]:
 
 
 def _filters(record: Record) -> list[Hypothesis]:
-    """Filters, by the spectrum of the noise about the drive and by what they make of the start of the motion."""
+    """Filters, by the spectrum of the noise about the drive and by what they make of the start of the motion.
+
+    What the noise contradicts is no filter, whatever it explains of the start: the suspension of a shaker and the control of
+    its amplitude leave tails as filters do.
+    """
     drive = record.fit.frequency
     noise = _noise_misfit(record)
     plain = noise(None)
@@ -354,7 +359,10 @@ def _filters(record: Record) -> list[Hypothesis]:
             "wanted": 20.0 * drive,
             "delay_ms": 1e3 * order / (2.0 * math.pi * one.centre),
         }
-        gain = max(gain, -_START_LIMIT) + plain - noise(one)
+        shown = plain - noise(one)
+        # a notch rings where its noise has a hole
+        seen = one.kind == "notch" or shown > -_CONTRADICTS
+        gain = shown + max(gain, -_CONTRADICTS) if seen else shown
         told.append(Hypothesis(one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
     return told
 
@@ -365,7 +373,12 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
     left = record.left[min(round(_TAIL * rate / drive), record.left.size // 4) :]
     n = left.size
     freq = np.fft.rfftfreq(n, 1.0 / rate)
-    power = np.abs(np.fft.rfft(left)) ** 2
+    # a start that is not over is no noise
+    wave = np.exp(2j * math.pi * drive / rate * np.arange(n)[:, None] - np.linspace(0.0, 1.0, n)[:, None] * _FADES)
+    late = np.hstack([wave.real, wave.imag])
+    left = left - late @ solve(late, left)
+    # without a taper, steep noise leaks from high frequencies over all lines
+    power = np.abs(np.fft.rfft(left * tukey(n, 0.2))) ** 2
     used = (freq > 2.5 * rate / n) & (freq < min(12.0 * drive, 0.4 * rate))
     for line in (*record.lines, *(drive * np.arange(1, 13))):
         used &= np.abs(freq - line) > 1.5 * rate / n
@@ -377,7 +390,7 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
     edges = np.unique(np.searchsorted(freq, freq[0] * 1.01**steps))
     count = np.diff(np.append(edges, freq.size))
     freq, power = np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count
-    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 9), [0.0, 0.1, 1.0, 10.0])
+    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 17), [0.0, *np.geomspace(0.03, 30.0, 7)])
     colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
     slope, knee = np.meshgrid([0.5, 1.0], np.geomspace(0.03, 3.0, 9))
     bent = ((freq / drive) ** 2 + knee.reshape(-1, 1) ** 2) ** (-0.5 * slope.reshape(-1, 1))
@@ -426,9 +439,11 @@ def _start_gains(record: Record, filters: list[_Filter]) -> list[float]:
 
     plain = left(None)
     rests = np.array([plain if one.kind == "low_pass" else left(one) for one in filters])
-    # what no filter explains is no noise
-    unit = max(fit.noise_rms**2, 1e-12 * fit.amplitude**2, float(rests.min()) / time.size)
-    gains: _Array = (plain - rests) / unit
+    noise = time.size * max(fit.noise_rms, 1e-6 * fit.amplitude) ** 2
+    gains: _Array = (plain - rests) * (time.size / noise)
+    # a start that a filter does not explain to the noise is of another kind, and speaks for none
+    unexplained = 2.0 * math.sqrt(2.0 / time.size) * noise + _BETWEEN * max(plain - noise, 0.0)
+    gains = np.where(rests - noise < unexplained, gains, np.minimum(gains, 0.0))
     # noise that drifts looks as the tail behind a high-pass
     slow_noise = noise_colour(record.left, record.part.sampling_frequency, fit.frequency) ** 2
     scale = [slow_noise if one.kind == "high_pass" else 1.0 for one in filters]
