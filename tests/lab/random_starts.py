@@ -10,7 +10,7 @@ import sys
 from collections import Counter
 
 import numpy as np
-from scipy.signal import butter, lfilter
+from scipy.signal import butter, freqz, lfilter
 
 from snapbeam import InputError
 from snapbeam.lab import make_signal, measure_drive
@@ -69,28 +69,34 @@ def record(rng, start, *, filtered):
     turn = 2.0 * np.pi * freq * since + rng.uniform(-np.pi, np.pi)
     wave = np.cos(turn) + rng.uniform(0.0, 0.02) * np.cos(2.0 * turn + rng.uniform(-3.0, 3.0))
     clean = envelope(rng, start, freq * since) * wave * (since >= 0.0)
+    amplitude = 0.02
     if start == "resonance":  # the table on its suspension, struck by the sine
         own, damping = freq * float(np.exp(rng.uniform(np.log(0.08), np.log(0.6)))), rng.uniform(0.05, 1.2)
         speed = rate / (np.pi * own)  # of the bilinear transform
-        below = (
-            np.array([speed**2, 2.0 * damping * speed, 1.0])
-            @ [[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]]
-        )
+        below = np.array([speed**2, 2.0 * damping * speed, 1.0]) @ [
+            [1.0, -2.0, 1.0],
+            [1.0, 0.0, -1.0],
+            [1.0, 2.0, 1.0],
+        ]
         above = speed**2 * np.array([1.0, -2.0, 1.0])
         clean = lfilter(above / below[0], below / below[0], clean)
-    amplitude = 0.02
-    if start == "resonance":
-        late = slice(count - round(10 * rate / freq), count)
-        amplitude = 0.02 * abs(2.0 * np.mean(clean[late] * np.exp(-1j * turn[late])))
+        amplitude *= abs(freqz(above, below, [freq], fs=rate)[1][0])
     clean *= 0.02
     kind = NOISES[rng.integers(len(NOISES))]
-    values = clean + 0.02 / np.sqrt(2.0) * 10.0 ** (-rng.uniform(20.0, 50.0) / 20.0) * noise(rng, kind, count, rate)
+    values = clean + 0.02 / np.sqrt(2.0) * 10.0 ** (-rng.uniform(20.0, 50.0) / 20.0) * noise(
+        rng, kind, count, rate
+    )
     corner = 0.0
     if filtered:
         corner = freq * float(np.exp(rng.uniform(np.log(0.12), np.log(1.5))))
         values = lfilter(*butter(1, corner, "high", fs=rate), values)
     values = values + 0.02 * rng.uniform(-0.1, 0.1)
-    return make_signal(values, "m/s", rate, name="velocity"), {"amplitude": amplitude, "frequency": freq}, corner, kind
+    return (
+        make_signal(values, "m/s", rate, name="velocity"),
+        {"amplitude": amplitude, "frequency": freq},
+        corner,
+        kind,
+    )
 
 
 def judged(seed, k, *, filtered):
@@ -101,7 +107,10 @@ def judged(seed, k, *, filtered):
         drive = measure_drive(signal)
     except InputError as error:
         return [f"refused: {error}"], 0.0, start, kind, corner / truth["frequency"]
-    off = max(abs(getattr(drive.steady, name) - true) / getattr(drive.steady, f"{name}_se") for name, true in truth.items())
+    off = max(
+        abs(getattr(drive.steady, name) - true) / getattr(drive.steady, f"{name}_se")
+        for name, true in truth.items()
+    )
     codes = [one.code.partition(".")[2] for one in doubtful(diagnostics_of(drive))]
     return codes, off, start, kind, corner / truth["frequency"]
 
@@ -117,5 +126,9 @@ if __name__ == "__main__":
         print({name: sum(n for key, n in alarms.items() if name in key) for name in (*STARTS, *NOISES)})
         print("covered by two standard errors", np.mean([off < 2.0 for _, off, *_ in found]))
         if filtered:
-            missed = sorted((round(c, 2), round(off, 1), kind, start) for codes, off, start, kind, c in found if "high_pass" not in codes)
+            missed = sorted(
+                (round(c, 2), round(off, 1), kind, start)
+                for codes, off, start, kind, c in found
+                if "high_pass" not in codes
+            )
             print("not told", missed)

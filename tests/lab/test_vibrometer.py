@@ -299,7 +299,7 @@ def test_noise_behind_a_filter_of_first_order_tells_its_corner():
     ("kind", "least"),
     [
         ("notch", 2),
-        ("AC coupling", 2),
+        ("AC coupling", 1),
         ("slew limit", 2),
         ("hysteresis", 1),
         ("jitter", 1),

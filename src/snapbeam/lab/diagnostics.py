@@ -442,10 +442,17 @@ KINDS_RESPONSE = table(
         "by random vibration, an impact or a sweep, or record longer",
     ),
     Kind(
+        "response.no_mode", WARNING,
+        "lines about the highest peak",
+        "no mode can be fitted to the peak at {frequency:.5g} Hz: its height may be too small by the window, and its "
+        "standard error is that of the noise alone; choose another resolution (--resolution)",
+        ("resolution",),
+    ),
+    Kind(
         "response.coarse", WARNING,
-        "half-power bandwidth of the highest peak, in lines",
-        "the peak at {frequency:.5g} Hz is {lines:.0f} line(s) wide: its height is too small and its damping too large; "
-        "choose a smaller resolution (--resolution), or record longer",
+        "bias of the highest peak by the window, of the mode fitted to it",
+        "the line at the peak of {frequency:.5g} Hz is {bias_percent:.2g} % off by the window, which is in its standard "
+        "error; the fitted mode has {magnitude:.4g}; choose a smaller resolution (--resolution), or record longer",
         ("resolution",),
     ),
 )  # fmt: skip
