@@ -82,6 +82,15 @@ def test_the_mode_at_the_peak_has_no_bias_by_the_window(frequency, damping, line
     assert told == (estimator == "h1" and lines < 8.0)
 
 
+def test_a_response_without_a_peak_has_no_mode():
+    rng = np.random.default_rng(12)
+    force = lab.make_signal(rng.standard_normal(20_000), "N", RATE)
+    flat = lab.make_signal(2.0 * force.values + 0.01 * rng.standard_normal(20_000), "m", RATE)
+    found = lab.frequency_response(force, flat, resolution=5.0)
+    assert not diagnostics_of(found) and "peak_magnitude" not in found.attrs
+    assert not found.window_bias.any()
+
+
 @pytest.mark.parametrize("lines", [3.0, 6.0, 12.0, 25.0])
 def test_a_pole_through_a_window_is_lowered_as_its_closed_form_says(lines):
     """-4/(3 L**2) with L lines in the half-power width, and the transform of the window's autocorrelation by a sum."""

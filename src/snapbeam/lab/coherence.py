@@ -27,6 +27,8 @@ _BIAS = 0.02
 _CORRELATED = 35.0 / 18.0
 """Lines of a Hann window over those that are independent."""
 _LEAST_LINES = 5
+_WIDE = 8
+"""Lines in the half-power bandwidth of a peak from which its bias is below 2 %."""
 _UNRELATED = 0.05
 """Probability that the coherence of unrelated signals exceeds its limit."""
 _NEIGHBOURS = 6
@@ -196,7 +198,8 @@ def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None
     )
     reach = max(top - high[0] + 1, high[1] - top, _LEAST_LINES // 2)
     lines = slice(max(top - reach, seen[0]), min(top + reach + 1, seen[1]))
-    if lines.stop - lines.start < _LEAST_LINES or not lines.start < top < lines.stop - 1:
+    falls = seen[0] < high[0] and high[1] < seen[1]  # to half its height on either side
+    if not falls or lines.stop - lines.start < _LEAST_LINES:
         return None
     frequency, spacing = found["frequency"].values, float(found.attrs["resolution"])
     k = (frequency[lines] - frequency[top]) / spacing
@@ -234,6 +237,8 @@ def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None
         height = abs((p[2] + 1j * p[3]) / math.exp(p[0]) + p[4] + 1j * p[5])
         return np.array([middle, height, math.exp(p[0]) * spacing / (2.0 * math.pi * middle)])
 
+    if not (np.isfinite(covariance).all() and np.diag(covariance).min() > 0.0):
+        return None
     value = numbers(p)
     steps = 1e-4 * np.sqrt(np.diag(covariance))
     slope = np.column_stack([(numbers(p + step) - numbers(p - step)) / 2e-4 for step in np.diag(steps)])
@@ -288,7 +293,12 @@ def _diagnostics(found: xr.Dataset) -> list[Diagnostic]:
     size = np.where(coherent, found["magnitude"].values, 0.0)
     top = int(np.argmax(size))
     bias = float(found["window_bias"].values[top])
-    if "peak_magnitude" not in found.attrs and 0 < top < size.size - 1:
+    if "peak_magnitude" not in found.attrs:
+        first, last = next(
+            each for each in stretches(size > size[top] / math.sqrt(2.0)) if each[0] <= top < each[1]
+        )
+        if first == 0 or last == size.size or last - first >= _WIDE:
+            return []
         return [KINDS_RESPONSE["no_mode"].found(frequency=float(found["frequency"].values[top]))]
     if abs(bias) > _BIAS:
         frequency, magnitude = (float(found.attrs[f"peak_{name}"]) for name in ("frequency", "magnitude"))
