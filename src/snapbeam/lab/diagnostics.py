@@ -594,6 +594,13 @@ KINDS_VIBROMETER = table(
         "corner below {limit:.2g} Hz",
     ),
     Kind(
+        "vibrometer.high_pass_possible", INFO,
+        "noise and start of the motion, against a high-pass filter of the first order",
+        "noise and start do not exclude a high-pass filter (AC coupling) of up to {corner:.3g} Hz, which would take "
+        "{loss_percent:.2g} % of the amplitude: it is in the standard error; a sudden start after a longer rest, a longer "
+        "record or less noise excludes it, and DC coupling or a corner below {limit:.2g} Hz",
+    ),
+    Kind(
         "vibrometer.notch", WARNING,
         "spectrum of the noise and start of the motion, against coloured noise, low-pass, high-pass and notch filters",
         "the noise has a hole at {centre:g} Hz as behind a notch filter: at the drive's frequency it may take "
@@ -703,6 +710,6 @@ KINDS_VIBROMETER = table(
     Kind(
         "vibrometer.no_rest", INFO,
         "rest before the motion",
-        "the record begins in motion: its start-up is not in it",
+        "the record begins in motion: its start-up is not in it, and a filter of the electronics shows in the noise alone",
     ),
 )  # fmt: skip
