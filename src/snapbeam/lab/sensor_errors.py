@@ -529,6 +529,9 @@ def _start_gains(record: Record, filters: list[_Filter]) -> list[float]:
     # a start that a filter does not explain to the noise is of another kind, and speaks for none
     unexplained = 2.0 * math.sqrt(2.0 / time.size) * noise + _BETWEEN * max(plain - noise, 0.0)
     gains = np.where(rests - noise < unexplained, gains, np.minimum(gains, 0.0))
+    # only a notch rings long at another frequency, whatever the start is, and what nothing explains is no noise
+    ringing = (plain - rests) / max(noise / time.size, float(rests.min()) / time.size)
+    gains = np.where([one.kind == "notch" for one in filters], ringing, gains)
     # noise that drifts looks as the tail behind a high-pass
     slow_noise = noise_colour(record.left, record.part.sampling_frequency, fit.frequency) ** 2
     scale = [slow_noise if one.kind == "high_pass" else 1.0 for one in filters]
