@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.signal import cont2discrete, dlsim
+from scipy.signal import cont2discrete, dlsim, lfilter
 from typer.testing import CliRunner
 
 from snapbeam import InputError, lab
 from snapbeam.cli.app import app
+from snapbeam.lab.coherence import windowed_pole
 from snapbeam.util.diagnostics import diagnostics_of
 
 RATE = 2000.0  # Hz
@@ -46,6 +47,62 @@ def records(seed, noise=(0.0, 0.0), count=60_000):
         for values, share in zip((force, motion[:, 0]), noise, strict=True)
     ]
     return lab.make_signal(pair[0], "N", RATE, name="force"), lab.make_signal(pair[1], "m", RATE, name="beam")
+
+
+def struck(seed, frequency, damping, count):
+    """Signals of an oscillator of unit mass and impulse-invariant response with 3 % of noise, and its height at resonance."""
+    rng = np.random.default_rng(seed)
+    force = rng.standard_normal(count)
+    turn = 2.0 * np.pi * frequency / RATE
+    free, fall = turn * np.sqrt(1.0 - damping**2), np.exp(-damping * turn)
+    above = [0.0, fall * np.sin(free) * turn / free / (2.0 * np.pi * frequency) / RATE]
+    motion = lfilter(above, [1.0, -2.0 * fall * np.cos(free), fall**2], force)
+    motion += 0.03 * motion.std() * rng.standard_normal(count)
+    height = 1.0 / (2.0 * damping * (2.0 * np.pi * frequency) ** 2)
+    return lab.make_signal(force, "N", RATE), lab.make_signal(motion, "m", RATE), height
+
+
+@pytest.mark.parametrize("estimator", ["h1", "h2"])
+@pytest.mark.parametrize(
+    ("frequency", "damping", "lines"),
+    [(150.0, 0.004, 1.0), (90.0, 0.01, 2.0), (70.3, 0.02, 4.0), (210.0, 0.012, 9.0)],
+)
+def test_the_mode_at_the_peak_has_no_bias_by_the_window(frequency, damping, lines, estimator):
+    resolution = 2.0 * damping * frequency / lines
+    force, motion, height = struck(11, frequency, damping, int(60 * RATE / resolution))
+    found = lab.frequency_response(force, motion, resolution=resolution, estimator=estimator)
+    for name, true in (("frequency", frequency), ("magnitude", height), ("damping_ratio", damping)):
+        value, error = found.attrs[f"peak_{name}"], found.attrs[f"peak_{name}_se"]
+        assert abs(value - true) < 3.0 * error + 2e-3 * true * (name != "frequency"), name
+        assert error < 0.15 * true
+    top = found.isel(frequency=int(np.argmax(found.magnitude.values)))
+    assert abs(top.magnitude - height) < 3.0 * top.magnitude_se
+    told = "response.coarse" in [one.code for one in diagnostics_of(found)]
+    assert told == (abs(float(top.window_bias)) > 0.02)
+    assert told == (estimator == "h1" and lines < 8.0)
+
+
+def test_a_response_without_a_peak_has_no_mode():
+    rng = np.random.default_rng(12)
+    force = lab.make_signal(rng.standard_normal(20_000), "N", RATE)
+    flat = lab.make_signal(2.0 * force.values + 0.01 * rng.standard_normal(20_000), "m", RATE)
+    found = lab.frequency_response(force, flat, resolution=5.0)
+    assert not diagnostics_of(found) and "peak_magnitude" not in found.attrs
+    assert not found.window_bias.any()
+
+
+@pytest.mark.parametrize("lines", [3.0, 6.0, 12.0, 25.0])
+def test_a_pole_through_a_window_is_lowered_as_its_closed_form_says(lines):
+    """-4/(3 L**2) with L lines in the half-power width, and the transform of the window's autocorrelation by a sum."""
+    turn = np.array([np.pi * lines + 0j, np.pi * lines + 3.0j])
+    found = windowed_pole(turn) * turn
+    assert found[0].real - 1.0 == pytest.approx(-4.0 / (3.0 * lines**2), rel=5.0 / lines**2)
+    time = (np.arange(200_000) + 0.5) / 200_000
+    shape = (1.0 - time) * (2.0 + np.cos(2.0 * np.pi * time)) / 3.0 + np.sin(2.0 * np.pi * time) / (
+        2.0 * np.pi
+    )
+    for k in range(2):
+        assert found[k] == pytest.approx((shape * np.exp(-turn[k] * time)).mean() * turn[k], rel=1e-6)
 
 
 def test_standard_errors_cover_the_response_of_an_oscillator():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,13 @@ _SEGMENTS = 31
 _LEAST_SEGMENTS = 7
 _OVERLAP = 1.0 / 36.0
 """Squared correlation of the spectra of two Hann windows that overlap by half."""
-_LINES = 4.0
-"""Lines in the half-power bandwidth of a peak below which its height is too small by more than 2 %."""
+_BIAS = 0.02
+"""Relative bias of a line by the window above which it is told."""
+_CORRELATED = 35.0 / 18.0
+"""Lines of a Hann window over those that are independent."""
+_LEAST_LINES = 5
+_WIDE = 8
+"""Lines in the half-power bandwidth of a peak from which its bias is below 2 %."""
 _UNRELATED = 0.05
 """Probability that the coherence of unrelated signals exceeds its limit."""
 _NEIGHBOURS = 6
@@ -58,7 +63,10 @@ def frequency_response(
     -------
     xarray.Dataset
         ``magnitude`` and ``phase`` [rad] with standard errors ``magnitude_se`` and ``phase_se``, and ``coherence``, over
-        ``frequency`` [Hz].  The attribute ``coherence_limit`` is exceeded by unrelated signals at 5 % of the lines.
+        ``frequency`` [Hz].  ``window_bias`` is the relative bias of the magnitude by the window, 0 away from the highest
+        peak.  The attribute ``coherence_limit`` is exceeded by unrelated signals at 5 % of the lines.  Those of the mode,
+        where it can be fitted: ``peak_frequency`` [Hz], ``peak_magnitude`` and ``peak_damping_ratio``, each with its
+        standard error ``..._se``.
 
     Raises
     ------
@@ -128,8 +136,121 @@ def frequency_response(
             "response_units": above,
         },
     )  # fmt: skip
+    mode = _peak_mode(found, ratio)
+    bias = np.zeros(frequency.size)
+    if mode is not None:
+        found.attrs |= mode.attributes()
+        bias[mode.lines] = mode.bias
+    words = {"units": "1", "long_name": "relative bias of the magnitude by the window"}
+    found["window_bias"] = "frequency", bias, words
+    found["magnitude_se"] = found["magnitude_se"].copy(
+        data=np.abs(ratio) * np.hypot(error, bias / (1.0 + bias))
+    )
     found.attrs["diagnostics"] = to_json(_diagnostics(found))
     return found
+
+
+def windowed_pole(turn: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """The response 1/s of a pole as spectra of Hann windows of length 1 give it; its limit for Re s >> 1 is 1/s.
+
+    It is the Laplace transform of the window's autocorrelation on (0, 1), by which the expected cross-correlation of a
+    segment multiplies an impulse response: (1 - t) (2 + cos 2 pi t)/3 + sin(2 pi t)/(2 pi).
+    """
+    low, high = turn - 2j * math.pi, turn + 2j * math.pi
+
+    def constant(s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        return np.asarray(-np.expm1(-s) / s)
+
+    def falling(s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        return np.asarray((s + np.expm1(-s)) / s**2)
+
+    return np.asarray(
+        2.0 / 3.0 * falling(turn) + (falling(low) + falling(high)) / 6.0
+        + (constant(low) - constant(high)) / (4j * math.pi)
+    )  # fmt: skip
+
+
+class _Mode(NamedTuple):
+    """The mode at a peak: its numbers with standard errors, and the relative bias at the lines of the fit."""
+
+    lines: slice
+    bias: _Array
+    numbers: dict[str, tuple[float, float]]
+
+    def attributes(self) -> dict[str, float]:
+        """Numbers and standard errors by the names of attributes."""
+        values = {f"peak_{name}": value for name, (value, _) in self.numbers.items()}
+        return values | {f"peak_{name}_se": error for name, (_, error) in self.numbers.items()}
+
+
+def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None:
+    """The mode at the highest coherent peak, fitted to the lines about it; None where they are too few."""
+    from scipy.optimize import least_squares
+
+    coherent, _ = coherent_lines(found)
+    size = np.where(coherent, np.abs(ratio), 0.0)
+    top = int(np.argmax(size))
+    if not size[top] > 0.0:
+        return None
+    high, seen = (
+        next(each for each in stretches(part) if each[0] <= top < each[1])
+        for part in (size > 0.5 * size[top], coherent)
+    )
+    reach = max(top - high[0] + 1, high[1] - top, _LEAST_LINES // 2)
+    lines = slice(max(top - reach, seen[0]), min(top + reach + 1, seen[1]))
+    falls = seen[0] < high[0] and high[1] < seen[1]  # to half its height on either side
+    if not falls or lines.stop - lines.start < _LEAST_LINES:
+        return None
+    frequency, spacing = found["frequency"].values, float(found.attrs["resolution"])
+    k = (frequency[lines] - frequency[top]) / spacing
+    values = ratio[lines]
+    # of a computed signal without noise the window's own scatter remains
+    sigma = np.hypot(found["magnitude_se"].values[lines], 1e-6 * size[top])
+    both = found.attrs["estimator"] == "h2"
+
+    def poles(decay: float, middle: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """Responses of the pole through the window and without it."""
+        turn = math.exp(decay) + 2j * math.pi * (k - middle)
+        pole = windowed_pole(turn)
+        # H2 divides by it the windowed autocorrelation of the response
+        return (pole.real / (turn.real * pole.conj()) if both else pole), 1.0 / turn
+
+    def misfit(p: _Array) -> _Array:
+        left = ((p[2] + 1j * p[3]) * poles(p[0], p[1])[0] + p[4] + 1j * p[5] - values) / sigma
+        return np.concatenate([left.real, left.imag])
+
+    wide = max(float(np.sum(size[lines] > size[top] / math.sqrt(2.0))) - 1.0, 0.3)
+    decay = math.log(math.pi * wide)
+    first = values[top - lines.start] / poles(decay, 0.0)[0][top - lines.start]
+    start = np.array([decay, 0.0, first.real, first.imag, 0.0, 0.0])
+    answer = least_squares(misfit, start, x_scale="jac", method="lm")
+    p = answer.x
+    freedom = 2 * k.size - p.size
+    stray = max(2.0 * answer.cost / max(freedom, 1), 1.0) * _CORRELATED
+    if not answer.success or not abs(p[1]) < 2.0 or not -5.0 < p[0] < math.log(math.pi * k.size):
+        return None
+    covariance = np.linalg.pinv(answer.jac.T @ answer.jac) * stray
+
+    def numbers(p: _Array) -> _Array:
+        """Frequency, magnitude there without the window, and damping ratio."""
+        middle = frequency[top] + p[1] * spacing
+        height = abs((p[2] + 1j * p[3]) / math.exp(p[0]) + p[4] + 1j * p[5])
+        return np.array([middle, height, math.exp(p[0]) * spacing / (2.0 * math.pi * middle)])
+
+    if not (np.isfinite(covariance).all() and np.diag(covariance).min() > 0.0):
+        return None
+    value = numbers(p)
+    steps = 1e-4 * np.sqrt(np.diag(covariance))
+    slope = np.column_stack([(numbers(p + step) - numbers(p - step)) / 2e-4 for step in np.diag(steps)])
+    scale = np.sqrt(np.diag(covariance))
+    errors = np.sqrt(np.diag(slope @ (covariance / np.outer(scale, scale)) @ slope.T))
+    other = p[4] + 1j * p[5]
+    through, true = ((p[2] + 1j * p[3]) * pole + other for pole in poles(p[0], p[1]))
+    names = ("frequency", "magnitude", "damping_ratio")
+    return _Mode(
+        lines, np.abs(through) / np.abs(true) - 1.0,
+        {name: (float(a), float(b)) for name, a, b in zip(names, value, errors, strict=True)},
+    )  # fmt: skip
 
 
 def _common(x: SignalSamples, y: SignalSamples) -> tuple[SignalSamples, SignalSamples]:
@@ -171,10 +292,18 @@ def _diagnostics(found: xr.Dataset) -> list[Diagnostic]:
         return [KINDS_RESPONSE["incoherent"].found(lines=longest)]
     size = np.where(coherent, found["magnitude"].values, 0.0)
     top = int(np.argmax(size))
-    if 0 < top < size.size - 1:
-        high = size > size[top] / math.sqrt(2.0)
-        first, last = next(each for each in stretches(high) if each[0] <= top < each[1])
-        if first > 0 and last < size.size and last - first < _LINES:
-            peak = float(found["frequency"].values[top])
-            return [KINDS_RESPONSE["coarse"].found(frequency=peak, lines=last - first)]
+    bias = float(found["window_bias"].values[top])
+    if "peak_magnitude" not in found.attrs:
+        first, last = next(
+            each for each in stretches(size > size[top] / math.sqrt(2.0)) if each[0] <= top < each[1]
+        )
+        if first == 0 or last == size.size or last - first >= _WIDE:
+            return []
+        return [KINDS_RESPONSE["no_mode"].found(frequency=float(found["frequency"].values[top]))]
+    if abs(bias) > _BIAS:
+        frequency, magnitude = (float(found.attrs[f"peak_{name}"]) for name in ("frequency", "magnitude"))
+        told = KINDS_RESPONSE["coarse"].found(
+            bias_percent=100.0 * bias, frequency=frequency, magnitude=magnitude
+        )
+        return [told]
     return []

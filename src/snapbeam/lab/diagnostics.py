@@ -442,10 +442,17 @@ KINDS_RESPONSE = table(
         "by random vibration, an impact or a sweep, or record longer",
     ),
     Kind(
+        "response.no_mode", WARNING,
+        "lines about the highest peak",
+        "no mode can be fitted to the peak at {frequency:.5g} Hz: its height may be too small by the window, and its "
+        "standard error is that of the noise alone; choose another resolution (--resolution)",
+        ("resolution",),
+    ),
+    Kind(
         "response.coarse", WARNING,
-        "half-power bandwidth of the highest peak, in lines",
-        "the peak at {frequency:.5g} Hz is {lines:.0f} line(s) wide: its height is too small and its damping too large; "
-        "choose a smaller resolution (--resolution), or record longer",
+        "bias of the highest peak by the window, of the mode fitted to it",
+        "the line at the peak of {frequency:.5g} Hz is {bias_percent:.2g} % off by the window, which is in its standard "
+        "error; the fitted mode has {magnitude:.4g}; choose a smaller resolution (--resolution), or record longer",
         ("resolution",),
     ),
 )  # fmt: skip
@@ -587,6 +594,13 @@ KINDS_VIBROMETER = table(
         "corner below {limit:.2g} Hz",
     ),
     Kind(
+        "vibrometer.high_pass_possible", INFO,
+        "noise and start of the motion, against a high-pass filter of the first order",
+        "noise and start do not exclude a high-pass filter (AC coupling) of up to {corner:.3g} Hz, which would take "
+        "{loss_percent:.2g} % of the amplitude: it is in the standard error; a sudden start after a longer rest, a longer "
+        "record or less noise excludes it, and DC coupling or a corner below {limit:.2g} Hz",
+    ),
+    Kind(
         "vibrometer.notch", WARNING,
         "spectrum of the noise and start of the motion, against coloured noise, low-pass, high-pass and notch filters",
         "the noise has a hole at {centre:g} Hz as behind a notch filter: at the drive's frequency it may take "
@@ -696,6 +710,6 @@ KINDS_VIBROMETER = table(
     Kind(
         "vibrometer.no_rest", INFO,
         "rest before the motion",
-        "the record begins in motion: its start-up is not in it",
+        "the record begins in motion: its start-up is not in it, and a filter of the electronics shows in the noise alone",
     ),
 )  # fmt: skip

@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline
 from scipy.signal import butter, lfilter
+from scipy.signal.windows import tukey
 from scipy.stats import chi2
 
 from snapbeam.lab.decay.poles import Line
@@ -36,12 +38,15 @@ _CURVE_ERROR = 0.05  # of its harmonics by which a curve may differ from a famil
 _COURSE = 8  # cycles of a course, at least
 _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
-_BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
 _START = 20.0  # cycles of the start that a filter shapes
-_START_LIMIT = (
-    40.0  # chi-square by which a start, which no model describes to the noise, speaks against a filter
-)
+_CONTRADICTS = 40.0  # chi-square of what a start or a drive that no model describes to the noise leaves
+_BETWEEN = 0.02  # of a start, which filters between those that are tried leave
+_POSSIBLE = 3.0  # chi-square by which a filter may be worse than none, or than the best, and be there
+_SHOWS = 12.0  # chi-square by which noise or start alone show a filter, whatever the other says
+_UNSEEN = 0.002  # of the amplitude, up to which a filter that nothing shows is not thought of
+_BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
 _CONSTANT = 4  # cycles on either side of a jump
+_FADES = (8.0, 30.0)  # rates of starts that are not over, over the length
 _TAIL = 4.0  # cycles after the start-up whose transient is no noise
 _MAINS = (50.0, 60.0, 100.0, 120.0)
 _FASTEST = 3.0  # m/s
@@ -166,7 +171,9 @@ def find_errors(record: Record) -> list[Hypothesis]:
     # a zero that drifts is no noise
     record = record._replace(left=record.left - slow @ solve(slow, record.left))
     told: list[Hypothesis] = []
-    for group in ((_converters, _jumps), (_curves, _courses), (_clocks, _jitter), (_filters,)):
+    for group in (
+        (_converters, _jumps), (_curves, _courses), (_clocks, _jitter), (_filters,), (_hidden_filters,)
+    ):  # fmt: skip
         if any(one.matters for one in told) or (record.clipped and group[0] is not _converters):
             break
         for detector in group:
@@ -336,7 +343,11 @@ def _candidates(drive: float) -> Iterator[_Filter]:
 
 
 def _filters(record: Record) -> list[Hypothesis]:
-    """Filters, by the spectrum of the noise about the drive and by what they make of the start of the motion."""
+    """Filters, by the spectrum of the noise about the drive and by what they make of the start of the motion.
+
+    A high-pass is told only where the noise shows it, whatever it explains of the start: the suspension of a shaker and the
+    control of its amplitude leave tails as filters do.  It is then one of the ``_hidden_filters``.
+    """
     drive = record.fit.frequency
     noise = _noise_misfit(record)
     plain = noise(None)
@@ -354,9 +365,87 @@ def _filters(record: Record) -> list[Hypothesis]:
             "wanted": 20.0 * drive,
             "delay_ms": 1e3 * order / (2.0 * math.pi * one.centre),
         }
-        gain = max(gain, -_START_LIMIT) + plain - noise(one)
-        told.append(Hypothesis(one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
+        shown = plain - noise(one)
+        # a notch rings where its noise has a hole
+        seen = one.kind == "notch" or shown > -_CONTRADICTS
+        gain = shown + max(gain, -_CONTRADICTS) if seen else shown
+        # what the start alone shows may be the shaker's own: it is in the standard error, and not told
+        own = one.kind == "high_pass" and shown < float(chi2.isf(FALSE_ALARM_RATE, 2))
+        told.append(Hypothesis("" if own else one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
     return told
+
+
+def _hidden_filters(record: Record) -> list[Hypothesis]:
+    """The largest loss by a high-pass that noise and start do not exclude: in the standard error, and no doubt.
+
+    It is possible where both together are not against it, or where one of them shows it, whatever the other says: noise
+    may hold the end of a transient, and a start may be of any kind.
+    """
+    if not record.early.size:
+        return []
+    drive = record.fit.frequency
+    filters = [one for one in _candidates(drive) if one.kind == "high_pass"]
+    misfit = _noise_misfit(record)
+    noise = np.array([misfit(one) for one in filters]) - misfit(None)
+    start, unexplained, freedom = _free_start(record, filters)
+    described = 1.0 + unexplained / freedom
+    weight = 1.0 / described if described < 2.0 else 0.0  # a start of another kind says nothing
+    both = np.minimum(noise, _CONTRADICTS) + np.maximum(weight * start, -_CONTRADICTS)
+    possible = both < min(float(both.min()), 0.0) + _POSSIBLE
+    possible |= noise < min(float(noise.min()) + _POSSIBLE, -_SHOWS)
+    possible |= start < min(float(start.min()) + _POSSIBLE + unexplained, -_SHOWS)
+    loss = np.array([1.0 / abs(one.response(drive)) - 1.0 for one in filters])
+    if not (possible & (loss > _UNSEEN)).any():
+        return []
+    most = int(np.argmax(np.where(possible, loss, 0.0)))
+    taken = float(loss[most])
+    numbers = {
+        "corner": filters[most].centre,
+        "loss_percent": 100.0 * taken / (1.0 + taken),
+        "limit": 0.05 * drive,
+    }
+    return [Hypothesis("high_pass_possible", math.inf, 1, taken, numbers=numbers)]
+
+
+def _free_start(record: Record, filters: list[_Filter]) -> tuple[_Array, float, int]:
+    """Chi-square by which filters fit the first cycles worse than none, what the best leaves beyond noise, and the freedom.
+
+    The motion behind each is a sine of any amplitude and phase that change over a cycle: its start at once, the tail behind
+    a filter is no such sine.  Noise is what the same sine leaves of the end of the record.
+    """
+    fit, moving = record.fit, record.moving
+    every = max(int(moving.sampling_frequency / (40.0 * fit.frequency)), 1)
+    size = min(int(_START * moving.sampling_frequency / fit.frequency), moving.values.size) // every
+    first, last = (
+        (part - fit.offset).reshape(size, every).mean(1)
+        for part in (moving.values[: size * every], moving.values[-size * every :])
+    )
+    rate = moving.sampling_frequency / every
+    cycles = np.arange(size) * fit.frequency / rate
+    knots = np.arange(math.ceil(cycles[-1]) + 1.0)
+    inside = np.minimum(cycles, knots[-1] - 1e-9)
+    course = BSpline.design_matrix(inside, np.pad(knots, 3, mode="edge"), 3).toarray()
+    turn = np.exp(2j * math.pi * cycles)[:, None]
+    waves = np.hstack([course * turn, turn**2, turn**3])
+    columns = np.hstack([waves.real, waves.imag])
+    freedom = size - columns.shape[1] - 2
+    if freedom < 100:
+        return np.zeros(len(filters)), 0.0, 1
+
+    def left(values: _Array, one: _Filter | None) -> float:
+        passed = columns
+        if one is not None:
+            speed = rate / (math.pi * one.centre)
+            passed = lfilter([speed, -speed], [speed + 1.0, 1.0 - speed], columns, axis=0)
+        own = np.linalg.qr(np.hstack([passed, np.ones((size, 1))]))[0]
+        rest = (values - own @ (own.T @ values))[1:]
+        return float(rest @ rest)
+
+    plain = left(first, None)
+    colour = noise_colour(record.left, moving.sampling_frequency, fit.frequency) ** 2
+    unit = colour * max(left(last, None) / freedom, 1e-12 * fit.amplitude**2)
+    worse = (np.array([left(first, one) for one in filters]) - plain) / unit
+    return worse, max(plain / unit - freedom / colour + min(float(worse.min()), 0.0), 0.0), freedom
 
 
 def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
@@ -365,7 +454,16 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
     left = record.left[min(round(_TAIL * rate / drive), record.left.size // 4) :]
     n = left.size
     freq = np.fft.rfftfreq(n, 1.0 / rate)
-    power = np.abs(np.fft.rfft(left)) ** 2
+    # a start that is not over is no noise
+    wave = np.exp(
+        2j * math.pi * drive / rate * np.arange(n)[:, None] - np.linspace(0.0, 1.0, n)[:, None] * _FADES
+    )
+    late = np.hstack([wave.real, wave.imag])
+    left = left - late @ solve(late, left)
+    # without a taper, steep noise leaks from high frequencies over all lines
+    taper = tukey(n, 0.6)
+    lines = n * float((taper**4).sum()) / float((taper**2).sum()) ** 2  # over those that are independent
+    power = np.abs(np.fft.rfft(left * taper)) ** 2
     used = (freq > 2.5 * rate / n) & (freq < min(12.0 * drive, 0.4 * rate))
     for line in (*record.lines, *(drive * np.arange(1, 13))):
         used &= np.abs(freq - line) > 1.5 * rate / n
@@ -377,7 +475,7 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
     edges = np.unique(np.searchsorted(freq, freq[0] * 1.01**steps))
     count = np.diff(np.append(edges, freq.size))
     freq, power = np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count
-    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 9), [0.0, 0.1, 1.0, 10.0])
+    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 17), [0.0, *np.geomspace(0.03, 30.0, 7)])
     colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
     slope, knee = np.meshgrid([0.5, 1.0], np.geomspace(0.03, 3.0, 9))
     bent = ((freq / drive) ** 2 + knee.reshape(-1, 1) ** 2) ** (-0.5 * slope.reshape(-1, 1))
@@ -389,7 +487,7 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
         # noise that rises and is filtered again would explain any hill
         shape = (colours[falling] if one is not None and one.kind == "low_pass" else colours) * kept
         level = (count * power / shape).sum(-1) / count.sum()
-        return 2.0 * float(np.min(count.sum() * np.log(level) + (count * np.log(shape)).sum(-1)))
+        return 2.0 / lines * float(np.min(count.sum() * np.log(level) + (count * np.log(shape)).sum(-1)))
 
     return misfit
 
@@ -426,9 +524,14 @@ def _start_gains(record: Record, filters: list[_Filter]) -> list[float]:
 
     plain = left(None)
     rests = np.array([plain if one.kind == "low_pass" else left(one) for one in filters])
-    # what no filter explains is no noise
-    unit = max(fit.noise_rms**2, 1e-12 * fit.amplitude**2, float(rests.min()) / time.size)
-    gains: _Array = (plain - rests) / unit
+    noise = time.size * max(fit.noise_rms, 1e-6 * fit.amplitude) ** 2
+    gains: _Array = (plain - rests) * (time.size / noise)
+    # a start that a filter does not explain to the noise is of another kind, and speaks for none
+    unexplained = 2.0 * math.sqrt(2.0 / time.size) * noise + _BETWEEN * max(plain - noise, 0.0)
+    gains = np.where(rests - noise < unexplained, gains, np.minimum(gains, 0.0))
+    # only a notch rings long at another frequency, whatever the start is, and what nothing explains is no noise
+    ringing = (plain - rests) / max(noise / time.size, float(rests.min()) / time.size)
+    gains = np.where([one.kind == "notch" for one in filters], ringing, gains)
     # noise that drifts looks as the tail behind a high-pass
     slow_noise = noise_colour(record.left, record.part.sampling_frequency, fit.frequency) ** 2
     scale = [slow_noise if one.kind == "high_pass" else 1.0 for one in filters]

@@ -62,6 +62,7 @@ def frequency_response(
         top = found.isel(frequency=int(np.argmax(np.where(coherent, found["magnitude"].values, 0.0))))
         names = ("frequency", "magnitude", "magnitude_se", "phase", "coherence")
         peak = {name: float(top[name]) for name in names}
+    mode = {name: float(value) for name, value in found.attrs.items() if name.startswith("peak_")}
     console = out()
     unit = found["magnitude"].attrs["units"]
     console.print(
@@ -75,6 +76,12 @@ def frequency_response(
             f"  highest peak  {peak['magnitude']:.5g} +- {peak['magnitude_se']:.1g} {unit} at {peak['frequency']:.5g} Hz, "
             f"phase {peak['phase']:.3f} rad, coherence {peak['coherence']:.3f}"
         )
+    if mode:
+        console.print(
+            f"  mode          {mode['peak_magnitude']:.5g} +- {mode['peak_magnitude_se']:.1g} {unit} at "
+            f"{mode['peak_frequency']:.6g} +- {mode['peak_frequency_se']:.1g} Hz, damping ratio "
+            f"{mode['peak_damping_ratio']:.3g} +- {mode['peak_damping_ratio_se']:.1g}, without the width of the window"
+        )
     diagnostics = diagnostics_of(found)
     lab.print_diagnostics(console, diagnostics)
     if plot is not None:
@@ -87,6 +94,6 @@ def frequency_response(
         write_netcdf(found, output)
         console.print(f"Written: {file_line(output)}")
     add_json(
-        peak=peak or None, coherent_share=float(coherent.mean()), resolution_hz=float(found.attrs["resolution"]),
+        peak=peak or None, mode=mode or None, coherent_share=float(coherent.mean()), resolution_hz=float(found.attrs["resolution"]),
         segments=int(found.attrs["segments"]), diagnostics=[one.plain() for one in diagnostics],
     )  # fmt: skip

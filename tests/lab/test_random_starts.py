@@ -1,0 +1,52 @@
+"""A few of the records of ``random_starts``; the rates of hundreds are in the page on diagnostics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import random_starts
+
+from snapbeam.lab import make_signal, measure_drive
+from snapbeam.util.diagnostics import diagnostics_of
+
+
+def test_starts_and_noise_of_many_kinds_are_no_high_pass():
+    """Each kind of start twice; some of them were credited to a filter in one of four records."""
+    found = [random_starts.judged(812, k, filtered=False) for k in range(2 * len(random_starts.STARTS))]
+    assert not [start for codes, _, start, *_ in found if "high_pass" in codes]
+
+
+def test_a_high_pass_is_told_where_the_noise_shows_it():
+    found = [random_starts.judged(812, k, filtered=True) for k in range(12)]
+    assert sum("high_pass" in codes for codes, *_ in found) >= 5
+
+
+def test_a_high_pass_that_nothing_shows_is_in_the_standard_error():
+    """A third of them were off by more than 5 standard errors without a word when only the noise told a filter."""
+    found = [random_starts.judged(813, k, filtered=True) for k in range(12)]
+    silent = [(codes, off) for codes, off, *_ in found if not codes]
+    assert len(silent) >= 3
+    assert max(off for _, off in silent) < 5.0
+
+
+def of_a_start(cycles, level):
+    """A record at 100 Hz whose amplitude, 20 mm/s, rises over *cycles*, with white noise of *level* times it."""
+    time = np.arange(16_000) / 2e4
+    since = np.maximum(time - 0.1, 0.0)
+    rise = np.minimum(100.0 * since / max(cycles, 1e-9), 1.0)
+    rise = (0.5 - 0.5 * np.cos(np.pi * rise)) * (time >= 0.1)
+    noise = level * np.random.default_rng(5).standard_normal(time.size)
+    return make_signal(0.02 * (rise * np.cos(200.0 * np.pi * since + 0.7) + noise), "m/s", 2e4)
+
+
+def test_a_sudden_start_excludes_a_filter_and_a_gentle_one_does_not():
+    sudden, gentle = (measure_drive(of_a_start(cycles, 0.01)) for cycles in (0.0, 12.0))
+    assert not diagnostics_of(sudden)
+    assert sudden.steady.amplitude_se < 1e-3 * sudden.steady.amplitude
+    (told,) = (one for one in diagnostics_of(gentle) if one.code == "vibrometer.high_pass_possible")
+    assert not told.is_warning
+    kept = 1.0 / np.hypot(1.0, told.numbers["corner"] / 100.0)
+    assert told.numbers["loss_percent"] == pytest.approx(100.0 * (1.0 - kept), rel=1e-3)
+    # of the true amplitude, whose filtered one is measured
+    assert gentle.steady.amplitude_se > 0.99 * (1.0 / kept - 1.0) * gentle.steady.amplitude
+    assert abs(gentle.steady.amplitude - 0.02) < 2.0 * gentle.steady.amplitude_se
