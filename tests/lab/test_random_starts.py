@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 import random_starts
 
 from snapbeam.lab import make_signal, measure_drive
@@ -43,10 +42,7 @@ def test_a_sudden_start_excludes_a_filter_and_a_gentle_one_does_not():
     sudden, gentle = (measure_drive(of_a_start(cycles, 0.01)) for cycles in (0.0, 12.0))
     assert not diagnostics_of(sudden)
     assert sudden.steady.amplitude_se < 1e-3 * sudden.steady.amplitude
-    (told,) = (one for one in diagnostics_of(gentle) if one.code == "vibrometer.high_pass_possible")
-    assert not told.is_warning
-    kept = 1.0 / np.hypot(1.0, told.numbers["corner"] / 100.0)
-    assert told.numbers["loss_percent"] == pytest.approx(100.0 * (1.0 - kept), rel=1e-3)
-    # of the true amplitude, whose filtered one is measured
-    assert gentle.steady.amplitude_se > 0.99 * (1.0 / kept - 1.0) * gentle.steady.amplitude
+    # a notch may be named, but no high-pass; what may be lost is in the standard error
+    assert "vibrometer.high_pass" not in {one.code for one in diagnostics_of(gentle)}
+    assert gentle.steady.amplitude_se > 1e-2 * gentle.steady.amplitude
     assert abs(gentle.steady.amplitude - 0.02) < 2.0 * gentle.steady.amplitude_se

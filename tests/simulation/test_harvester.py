@@ -107,7 +107,7 @@ def test_the_figure_shows_voltage_and_power(run):
     legend = figure.legends[0]
     assert [text.get_text() for text in legend.get_texts()] == ["beam, centre"]
     for words in ("base 75.5 Hz", "0.521 $g$", "$R$ = 10 kΩ"):
-        assert words in figure.axes[0].get_title().replace("\n", " ")
+        assert words in figure.axes[0].get_title().replace("\n", " ").replace("\xa0", " ")
     mean = figure.axes[2].lines[-1]
     assert mean.get_ydata()[0] == pytest.approx(1e6 * late_means(run)[0], rel=1e-9)
     assert mean.get_xdata()[0] == pytest.approx(30.0, abs=0.02)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from snapbeam.lab.diagnostics import KINDS_RESPONSE
 from snapbeam.lab.signals import SignalSamples, check_signal, stretches
 from snapbeam.util.diagnostics import Diagnostic, to_json
+from snapbeam.util.singular_values import pinv
 from snapbeam.util.validation import InputError, checked, choice, positive
 
 if TYPE_CHECKING:
@@ -229,7 +230,7 @@ def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None
     stray = max(2.0 * answer.cost / max(freedom, 1), 1.0) * _CORRELATED
     if not answer.success or not abs(p[1]) < 2.0 or not -5.0 < p[0] < math.log(math.pi * k.size):
         return None
-    covariance = np.linalg.pinv(answer.jac.T @ answer.jac) * stray
+    covariance = pinv(answer.jac.T @ answer.jac) * stray
 
     def numbers(p: _Array) -> _Array:
         """Frequency, magnitude there without the window, and damping ratio."""
