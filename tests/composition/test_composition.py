@@ -357,7 +357,8 @@ def test_a_random_system(seed: int) -> None:
 @pytest.mark.parametrize("engine", ["native", "python"])
 def test_a_motion_that_leaves_the_range_of_a_law(engine: str) -> None:
     """A softening spring on a struck beam: each engine ends where the reference leaves the range, and is right before."""
-    report = checked(75, engine=engine)
+    features = Features(1, (("hertz", "sine", False),), local=("softening_spring",), started=True)
+    report = checked(33, features, engine=engine)
     judge([report])
     assert math.isfinite(report.left)
 
