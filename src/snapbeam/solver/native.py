@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from snapbeam import _core
+from snapbeam.model.matrix_pairs import coupled_blocks
 from snapbeam.solver.channels import (
     AXIAL_LOAD,
     BASE,
@@ -106,9 +106,8 @@ class _Arrays:
         first = structure.modes_of_bodies.stop
         states += range(first, first + len(structure.indentations))
         kept = np.setdiff1d(np.arange(structure.omega.size), states)
-        count, label = connected_components(structure.coupling[np.ix_(kept, kept)] != 0.0, directed=False)
-        self.order = kept[np.argsort(label, kind="stable")]
-        sizes = np.bincount(label, minlength=count).astype(np.int32)
+        order, sizes = coupled_blocks(structure.coupling[np.ix_(kept, kept)] != 0.0)
+        self.order = kept[order]
         n, modes = kept.size, structure.equilibrium.size
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
         halvings += graded
