@@ -171,7 +171,7 @@ class _Writer:
 
     def finish(self) -> RunSummary:
         """Write the remaining samples, the impacts, the summary and the attributes."""
-        from xarray.backends import H5NetCDFStore
+        from snapbeam.util.datasets import NetCDFStore
 
         run, last = self.run, self.waiting
         assert last is not None  # an engine yields at least one piece
@@ -189,12 +189,12 @@ class _Writer:
             "summary": summary_dataset(summary),
         }
         for name, table in tables.items():
-            table.dump_to_store(H5NetCDFStore(self.file.create_group(name)), encoding=compressed(table))
+            table.dump_to_store(NetCDFStore(self.file.create_group(name)), encoding=compressed(table))
         return summary
 
     def append(self, samples: Recorded, times: Any = None) -> None:
         """Append samples to the file; *times* are times that were not reached."""
-        from xarray.backends import H5NetCDFStore
+        from snapbeam.util.datasets import NetCDFStore
 
         if samples.times.size == 0 and times is None:
             return
@@ -202,7 +202,7 @@ class _Writer:
         begin, end = self.written, self.written + dataset.sizes["time"]
         if begin == 0:
             dataset.dump_to_store(
-                H5NetCDFStore(self.file), encoding=_chunked(dataset), unlimited_dims={"time"}
+                NetCDFStore(self.file), encoding=_chunked(dataset), unlimited_dims={"time"}
             )
         else:
             self.file.resize_dimension("time", end)
