@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.equilibria import landscape_of
-from snapbeam.model.matrix_pairs import eigenpairs, fixed_coordinates, is_positive_definite, is_sparse, symmetric
+from snapbeam.model.matrix_pairs import (
+    eigenpairs,
+    fixed_coordinates,
+    is_positive_definite,
+    is_sparse,
+    symmetric,
+)
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import InputError, finite_array, integer, nonnegative, positive, shown, within

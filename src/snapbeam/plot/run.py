@@ -713,8 +713,12 @@ def _smooth(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return x, y
     h, secant = np.diff(x), np.diff(y) / np.diff(x)
     before, after, weight = secant[:-1], secant[1:], (h[:-1] + 2.0 * h[1:]) / (3.0 * (h[:-1] + h[1:]))
-    turns = before * after <= 0.0  # else a harmonic mean; scipy.interpolate takes a third of a second to import
-    inner = np.where(turns, 0.0, before * after / np.where(turns, 1.0, weight * after + (1.0 - weight) * before))
+    turns = (
+        before * after <= 0.0
+    )  # else a harmonic mean; scipy.interpolate takes a third of a second to import
+    inner = np.where(
+        turns, 0.0, before * after / np.where(turns, 1.0, weight * after + (1.0 - weight) * before)
+    )
     slope = np.concatenate((secant[:1], inner, secant[-1:]))
     dense = np.union1d(x, np.linspace(x[0], x[-1], 600))
     i = np.clip(np.searchsorted(x, dense, side="right") - 1, 0, h.size - 1)

@@ -201,9 +201,7 @@ class _Writer:
         dataset = run_dataset(self.run.ensemble, self.run.system, samples, times, self.run.period, {})
         begin, end = self.written, self.written + dataset.sizes["time"]
         if begin == 0:
-            dataset.dump_to_store(
-                NetCDFStore(self.file), encoding=_chunked(dataset), unlimited_dims={"time"}
-            )
+            dataset.dump_to_store(NetCDFStore(self.file), encoding=_chunked(dataset), unlimited_dims={"time"})
         else:
             self.file.resize_dimension("time", end)
             for name, variable in _over_time(dataset):
@@ -222,5 +220,5 @@ def _chunked(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
     for name, variable in _over_time(dataset):
         beside = variable.size // variable.sizes["time"]
         rows = max(1, _CHUNK // beside)
-        encoding[name] = {**encoding[name], "chunksizes": (rows, *variable.shape[1:])}
+        encoding[name] = {**encoding.get(name, {}), "chunksizes": (rows, *variable.shape[1:])}
     return encoding
