@@ -21,6 +21,7 @@ from snapbeam.simulation.simulate import (
     prepared,
     reached_by,
     run_attributes,
+    tell_imbalance,
 )
 from snapbeam.simulation.summary import RunSummary
 from snapbeam.solver.engines import engine_of
@@ -180,6 +181,7 @@ class _Writer:
             last = reached_by(
                 last, float(last.accumulators_of_runs["time"][0] * run.ensemble.runs["tick"][0])
             )
+        tell_imbalance(run, summary, last.accumulators_of_runs)
         attrs = run_attributes(run, summary, last.accumulators_of_runs)
         self.append(last, np.zeros(1) if self.written + last.times.size == 0 else None)
         end = end_state(run.ensemble, last, summary)
