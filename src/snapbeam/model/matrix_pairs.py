@@ -39,7 +39,7 @@ def coupled_blocks(coupled: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArra
     *coupled* has the shape (N, N), either triangle counts; blocks and their coordinates keep the order of the coordinates.
     """
     reached, before = coupled | coupled.T | np.eye(len(coupled), dtype=bool), 0
-    while (count := np.count_nonzero(reached)) > before:
+    while (count := int(np.count_nonzero(reached))) > before:
         before, links = count, reached.astype(np.float32)  # products of numbers are faster than those of bool
         reached = links @ links > 0.0
     first = reached.argmax(axis=1)

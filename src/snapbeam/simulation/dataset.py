@@ -145,8 +145,8 @@ def trajectory_dataset(
             raise InputError(
                 f"{name} of shape {values.shape}: must have dimensions {dims}, with time of {length}"
             )
-    labelled = ({name: variable(name, *each) for name, each in part.items()} for part in (data, coords))
-    dataset = xr.Dataset(*labelled, dict(attrs or {}))
+    series, axes = ({name: variable(name, *each) for name, each in part.items()} for part in (data, coords))
+    dataset = xr.Dataset(series, axes, dict(attrs or {}))
     check_trajectory(dataset, require=())
     return dataset
 
