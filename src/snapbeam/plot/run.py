@@ -643,7 +643,13 @@ def cut(dataset: xr.Dataset, across: str, window: tuple[float, float] | None) ->
         raise InputError(
             f"window = ({first:g}, {last:g}): must hold at least two samples of a run of {end:g} cycles"
         )
-    return dataset.isel(time=inside)
+    return dataset.isel(time=_range(inside))
+
+
+def _range(inside: np.ndarray) -> slice:
+    """The samples from the first to the last that is *inside*; time increases, so that there is no other between them."""
+    at = np.flatnonzero(inside)
+    return slice(int(at[0]), int(at[-1]) + 1)
 
 
 def _column(
@@ -752,6 +758,6 @@ def _hardest_impact(part: xr.Dataset) -> tuple[xr.Dataset, np.ndarray, float]:
     start, stop = hardest_impact(part["contact_force"].values)
     margin = 0.6 * (time[stop] - time[start])
     inside = (time >= time[start] - margin) & (time <= time[stop] + margin)
-    near = part.isel(time=inside)
+    near = part.isel(time=_range(inside))
     cycle = float(part["cycle"].values[start]) if "cycle" in part.variables else 0.0
     return near, near["time"].values - time[start], cycle

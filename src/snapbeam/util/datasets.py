@@ -33,8 +33,22 @@ def variable(
     return xr.Variable(dims, values, attrs, fastpath=True)
 
 
+class _Writer:
+    """Writer of arrays at once; xarray's own imports dask, and leaves arrays of dask to a later call."""
+
+    def add(self, source: Any, target: Any) -> None:
+        """Write an array to a variable of a file."""
+        target[...] = np.asarray(source)
+
+
 class NetCDFStore(H5NetCDFStore):
     """Store of a NetCDF file that hands numbers on as they are; the coders of texts would import dask too."""
+
+    def set_variables(
+        self, variables: Any, check_encoding_set: Any, writer: Any, unlimited_dims: Any = None
+    ) -> None:
+        """Write variables."""
+        super().set_variables(variables, check_encoding_set, _Writer(), unlimited_dims)
 
     def encode_variable(self, variable: xr.Variable, name: Any = None) -> xr.Variable:
         """Return a variable as it is stored."""
