@@ -108,19 +108,15 @@ def test_a_long_run_is_drawn_by_its_range(synthetic_run):
     assert not plot_run(long, window=(0.0, 50.0)).figure.axes[2].collections
 
 
-def test_the_curve_between_samples_is_monotone():
+@pytest.mark.parametrize("seed", range(8))
+def test_the_curve_between_samples_is_that_of_scipy(seed):
     from scipy.interpolate import PchipInterpolator
 
     from snapbeam.plot.run import _smooth
 
-    random = np.random.default_rng(3)
+    random = np.random.default_rng(seed)
     x, y = np.sort(random.random(25)), random.normal(size=25)
     y[7], y[12] = y[8], np.nan
     kept = np.isfinite(y)
     dense, curve = _smooth(x, y)
-    inner = (dense >= x[1]) & (dense <= x[-2])
-    reference = PchipInterpolator(x[kept], y[kept])(dense)
-    assert np.allclose(curve[inner], reference[inner], rtol=0.0, atol=1e-13)
-    for ends in (dense < x[1], dense > x[-2]):
-        part = curve[ends]
-        assert (np.diff(part) * np.sign(part[-1] - part[0]) >= 0.0).all()
+    assert np.allclose(curve, PchipInterpolator(x[kept], y[kept])(dense), rtol=0.0, atol=1e-13)

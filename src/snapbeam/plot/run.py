@@ -725,12 +725,21 @@ def _smooth(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     inner = np.where(
         turns, 0.0, before * after / np.where(turns, 1.0, weight * after + (1.0 - weight) * before)
     )
-    slope = np.concatenate((secant[:1], inner, secant[-1:]))
+    slope = np.concatenate(([_slope_at_end(h, secant)], inner, [_slope_at_end(h[::-1], secant[::-1])]))
     dense = np.union1d(x, np.linspace(x[0], x[-1], 600))
     i = np.clip(np.searchsorted(x, dense, side="right") - 1, 0, h.size - 1)
     t = (dense - x[i]) / h[i]
     bend = (1.0 - t) * (slope[i] - secant[i]) - t * (slope[i + 1] - secant[i])
     return dense, y[i] + h[i] * t * (secant[i] + (1.0 - t) * bend)
+
+
+def _slope_at_end(h: np.ndarray, secant: np.ndarray) -> float:
+    """Slope of the parabola through the first three points, limited so that the curve is monotone before the second."""
+    slope = ((2.0 * h[0] + h[1]) * secant[0] - h[0] * secant[1]) / (h[0] + h[1])
+    if slope * secant[0] <= 0.0:
+        return 0.0
+    turns = secant[0] * secant[1] <= 0.0
+    return float(3.0 * secant[0] if turns and abs(slope) > 3.0 * abs(secant[0]) else slope)
 
 
 def _envelope(ax: Axes, x: np.ndarray, y: np.ndarray, color: str, label: str | None) -> None:
