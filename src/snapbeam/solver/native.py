@@ -214,7 +214,9 @@ class _Arrays:
         """q and p of the structure, of those in the core and of the states of laws, shape (..., channels)."""
         n, structure = self.order.size, self.ensemble.structure
         q, p = np.zeros((2, *states.shape[:-1], structure.omega.size))
-        q[..., self.order], p[..., self.order] = states[..., :n], states[..., n : 2 * n]
+        # a slice is copied several times as fast as columns by their numbers
+        at = slice(n) if np.array_equal(self.order, np.arange(n)) else self.order
+        q[..., at], p[..., at] = states[..., :n], states[..., n : 2 * n]
         for circuit, channel in zip(structure.circuits, self.circuits.tolist(), strict=True):
             if circuit.mode is not None:
                 q[..., circuit.mode] = laws[..., channel] + q @ circuit.row
