@@ -86,7 +86,7 @@ def _ends(points: Points) -> list[int]:
             tuple(size - 1 if i == at else 0 for i in range(len(points.shape)))
             for at, size in enumerate(points.shape)
         ]
-        return [int(np.ravel_multi_index(corner, points.shape)) for corner in corners]
+        return [int(np.ravel_multi_index(corner, points.shape)) for corner in dict.fromkeys(corners)]
     numbers = [values for values in points.columns.values() if values.dtype.kind in "if"]
     return sorted({int(at) for values in numbers for at in (values.argmin(), values.argmax())})
 
