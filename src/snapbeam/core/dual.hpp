@@ -64,6 +64,19 @@ template <int K> SNAPBEAM_FN Turn<Dual<K>> turn(const Dual<K> &x) {
     return {{w.sine, Pack<K>(w.cosine) * x.d}, {w.cosine, Pack<K>(-w.sine) * x.d}, {w.cosine_less_one, Pack<K>(-w.sine) * x.d}};
 }
 
+// A number as one of type T, without its derivatives if T has none.
+template <class T, class X> SNAPBEAM_FN T as(const X &x) {
+    if constexpr (requires(T with) { with.d; }) return T(x);
+    else return T(value(x));
+}
+// The root of a cubic moves with it.
+template <int K> SNAPBEAM_FN Dual<K> root(const Cubic<Dual<K>> &u, const Dual<K> &high) {
+    Cubic<double> plain(0.0, 0.0, 0.0, 0.0, 0.0);
+    plain.c0 = u.c0.v, plain.c1 = u.c1.v, plain.c2 = u.c2.v, plain.c3 = u.c3.v;
+    const double x = root(plain, high.v);
+    return {x, Pack<K>(-1.0 / plain.slope(x)) * u.at(Dual<K>(x)).d};
+}
+
 // The layout of one run with K directions.
 template <int K> struct Tangents {
     typedef Dual<K> Number;
