@@ -47,7 +47,7 @@ def gradient(
 
     Of a statistic the core takes exact derivatives through the run, with those of the times of impacts, by all parameters that
     leave the modes, the laws of a user and the times of jumps of a motion as they are, such as a frequency, an amplitude, a gap, a
-    contact's stiffness or location, a resistance; the error is the change with half the step.  The formula from what a run adds
+    contact's stiffness or location, a resistance; the error is the change with a quarter of the step.  The formula from what a run adds
     up to the statistic, and the numbers of a run by the parameter, are differentiated by a small difference; no run is.
 
     By other parameters, and of a function, central differences of order six between neighbouring systems, whose step is shortened
@@ -136,7 +136,7 @@ def _exact(system: System, quantity: str, names: list[str], here: _Array, how: I
     sides = (1.0 + _STEP, 1.0 - _STEP)
     found, impacts = [], []
     which = list(range(here.size))
-    for factor in (1.0, 0.5):
+    for factor in (1.0, 0.25):
         ensemble = make_ensemble(system, how, step_factor=factor)
         if ensemble.channels.of_user:
             return moved, error, growth
