@@ -49,8 +49,8 @@ template <int K> SNAPBEAM_FN Dual<K> fma(const Dual<K> &a, const Dual<K> &b, con
 }
 template <int K> SNAPBEAM_FN Dual<K> fma(double a, const Dual<K> &b, const Dual<K> &c) { return {fma(a, b.v, c.v), fma(Pack<K>(a), b.d, c.d)}; }
 template <int K> SNAPBEAM_FN Dual<K> fma(const Dual<K> &a, double b, const Dual<K> &c) { return fma(b, a, c); }
-template <int K> SNAPBEAM_FN Dual<K> min(const Dual<K> &a, const Dual<K> &b) { return a.v < b.v ? a : b; }
-template <int K> SNAPBEAM_FN Dual<K> max(const Dual<K> &a, const Dual<K> &b) { return a.v > b.v ? a : b; }
+template <int K> SNAPBEAM_FN Dual<K> min(const Dual<K> &a, const Dual<K> &b) { return b.v < a.v ? b : a; }  // of equal ones the first
+template <int K> SNAPBEAM_FN Dual<K> max(const Dual<K> &a, const Dual<K> &b) { return b.v > a.v ? b : a; }
 template <int K> SNAPBEAM_FN Dual<K> abs(const Dual<K> &x) { return x.v < 0.0 ? -x : x; }
 template <int K> SNAPBEAM_FN Dual<K> sqrt(const Dual<K> &x) {  // slope 0 at 0: forces d^(3/2) have none there
     const double root = sqrt(x.v);

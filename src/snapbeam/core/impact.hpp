@@ -52,7 +52,7 @@ template <int K> void move_in_time(Group<Tangents<K>> &runs, Dual<K> later) {
     for (int i = 0; i < z.signals; ++i) z.signal[i].move_in_time(later);
     z.drift += later;
     tension_at(z, z.q, z.k);
-    runs.totals.look_again(z);
+    runs.totals.look_again(z, !(z.t < runs.end));
 }
 
 // Impacts of contact *number*, where its gap closes at the rate r0.

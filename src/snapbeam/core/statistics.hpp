@@ -452,11 +452,11 @@ template <class L> struct Totals {
             if (one.harvests && !(z.t < late)) one.sums[LATE_LOST] += Number(value(lost)) * by;
         }
     }
-    // After the state has moved: what is observed, and what is largest there.
-    void look_again(Runs<L> &z) requires(L::directions > 0) {
+    // After the state has moved: what is observed, and at the end of the run what is largest there.
+    void look_again(Runs<L> &z, bool at_end) requires(L::directions > 0) {
         using namespace snapbeam;
         const auto follow = [&](Number &to, Number moved) { to.d = moved.d; };
-        const auto end = [&](Statistic k, Number x) { if (sum[k].v == x.v) sum[k].d = x.d; };
+        const auto end = [&](Statistic k, Number x) { if (at_end && sum[k].v == x.v) sum[k].d = x.d; };
         follow(point.u, height(z, z.q)), follow(point.v, dot<L>(row, z.p, s->size()));
         follow(center.u, center_height(z, z.q)), follow(center.v, dot<L>(s->center, z.p, s->size()));
         end(MIN_DISPLACEMENT, point.u), end(MAX_DISPLACEMENT, point.u), end(MIN_CENTER, center.u), end(MAX_CENTER, center.u);
@@ -466,8 +466,9 @@ template <class L> struct Totals {
             if (!c.contact) continue;
             follow(c.d0, penetration(z, c, z.q)), follow(c.r0, signal_slope(z, c) - dot<L>(c.row, z.p, s->size()));
             c.d1.d = c.d0.d, c.r1.d = c.r0.d;
+            if (!at_end || !c.closed || c.impulsive) continue;
             if (c.deepest.v == c.d0.v) c.deepest.d = c.d0.d;
-            if (!c.closed || !c.lossy || c.impulsive) continue;
+            if (!c.lossy) continue;
             const Number f = force_at(c, max(c.d0, Number(0.0)), c.r0);
             if (c.hardest.v == f.v) c.hardest.d = f.d;
         }

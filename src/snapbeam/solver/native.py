@@ -369,10 +369,10 @@ def integrate_with_output_states(
 
 
 def differentiable(above: Ensemble, below: Ensemble) -> bool:
-    """Return whether two ensembles differ only in numbers of which the core takes derivatives: the same modes and pieces of signals, no jumps that move."""
+    """Return whether two ensembles differ only in numbers of which the core takes derivatives: the same modes, pieces of signals and times of jumps."""
     one, other = above.channels, below.channels
     assert one is not None and other is not None
-    if not np.array_equal(one.pieces, other.pieces) or one.jumps.size or other.jumps.size:
+    if not np.array_equal(one.pieces, other.pieces) or not np.array_equal(one.jumps, other.jumps):
         return False
     first, second = (
         {name: value for name, value in _Arrays(each).problem.items() if name != "levels"} for each in (above, below)
