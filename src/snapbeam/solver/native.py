@@ -375,7 +375,8 @@ def differentiable(above: Ensemble, below: Ensemble) -> bool:
     if not np.array_equal(one.pieces, other.pieces) or not np.array_equal(one.jumps, other.jumps):
         return False
     first, second = (
-        {name: value for name, value in _Arrays(each).problem.items() if name != "levels"} for each in (above, below)
+        {name: value for name, value in _Arrays(each).problem.items() if name != "levels"}
+        for each in (above, below)
     )
     return all(np.array_equal(value, second[name]) for name, value in first.items())
 
