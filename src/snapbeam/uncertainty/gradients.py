@@ -27,6 +27,15 @@ if TYPE_CHECKING:
 _Array = NDArray[np.float64]
 _STEP = 1e-5
 """Relative change of a parameter over which numbers of a run and the formulas of statistics are differentiated."""
+_SQUARES = (
+    "square_displacement",
+    "square_center",
+    "square_velocity",
+    "square_midspan_velocity",
+    "energy_time",
+)
+_FAR = 1e-3
+"""Relative change of the sums under a root or in a quotient over that step, beyond which the formulas are not linear: the motion is chaotic."""
 _DOUBTFUL = 1e-4
 """Relative error of a derivative that is reported."""
 _NOT_SMOOTH = {
@@ -47,7 +56,7 @@ def gradient(
 
     Of a statistic the core takes exact derivatives through the run, with those of the times of impacts, by all parameters that
     leave the modes, the laws of a user and the times of jumps of a motion as they are, such as a frequency, an amplitude, a gap, a
-    contact's stiffness or location, a resistance; the error is the change with a quarter of the step.  The formula from what a run adds
+    contact's stiffness or location, a resistance; the step is a quarter of the usual one, and the error a third of what this changes.  The formula from what a run adds
     up to the statistic, and the numbers of a run by the parameter, are differentiated by a small difference; no run is.
 
     By other parameters, and of a function, central differences of order six between neighbouring systems, whose step is shortened
@@ -155,12 +164,17 @@ def _exact(
             return moved, error, growth
         beside = [pair for pair, each in zip(beside, same, strict=True) if each]
         pairs, grown, whole = native.changed_accumulators(ensemble, beside, how.threads)
-        values = [
-            [
-                float(statistics_of(near, records)[quantity][0])
-                for near, records in zip(both, each, strict=False)
+        with np.errstate(invalid="ignore"):  # chaos: a sum of squares may become negative; the error says so
+            values = [
+                [
+                    float(statistics_of(near, rows)[quantity][0])
+                    for near, rows in zip(both, each, strict=False)
+                ]
+                for both, each in zip(beside, pairs, strict=True)
             ]
-            for both, each in zip(beside, pairs, strict=True)
+        far = [
+            any(abs(high[name][0] - low[name][0]) > _FAR * whole[name][0] for name in _SQUARES)
+            for high, low in pairs
         ]
         found.append((np.array(values) @ (1.0, -1.0)) / (2.0 * _STEP))
         counts = np.array(
@@ -170,10 +184,15 @@ def _exact(
         size = np.linalg.norm(ensemble.structure.omega * ensemble.structure.shift)
         growth[which] = grown[0] * np.abs(here[which]) / (size or np.nan)
     moved[which] = found[1]
-    change = np.abs(found[1] - found[0])
+    change = np.abs(found[1] - found[0]) / 3.0  # of first order in the step, at least
     error[which] = np.where(change == 0.0, 0.0, change / np.maximum(np.abs(found[1]), 1e-300))
     (one, some), (other, others) = impacts
-    grazes = (np.hstack((some, others)) != one).any(axis=1) | (one != other)
+    grazes = (
+        (np.hstack((some, others)) != one).any(axis=1)
+        | (one != other)
+        | np.array(far)
+        | ~np.isfinite(found[1])
+    )
     error[which] = np.where(grazes, np.inf, error[which])
     return moved, error, growth
 
@@ -252,7 +271,7 @@ def _dataset(
         Diagnostic(
             "gradient.doubtful",
             f"{name}: the derivative of {label} has an estimated relative error of {each:.1g}: an impact grazes, or begins or ends "
-            "with the run; change the parameter a little or the number of cycles",
+            "with the run, or the motion is chaotic; change the parameter a little or the number of cycles",
             {"relative_error": float(each)},
         )
         for name, each in zip(names, error, strict=True)
