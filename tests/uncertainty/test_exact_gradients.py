@@ -168,3 +168,13 @@ def test_jumps_that_move_take_differences() -> None:
     )
     assert one["method"].values.tolist() == ["differences"]
     assert found["derivative"].values[1] == pytest.approx(one["derivative"].values[0], rel=1e-4)
+
+
+def test_chaos_is_said() -> None:
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
+    drive = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.3)
+    system = sb.System(model, [sb.Contact(paper.CONTACT, sb.Striker(drive=drive))])
+    how = sb.Integration(cycles=60, early_termination=False)
+    with pytest.warns(UserWarning, match="or the motion is chaotic"):
+        found = sb.uncertainty.gradient(system, "striker_work", "drive.velocity_amplitude", integration=how)
+    assert found["growth"].values[0] > 1e3 and found["relative_error"].values[0] > 1e-4
