@@ -68,7 +68,18 @@ def test_the_version_loads_next_to_nothing():
 def test_a_run_without_files_loads_no_pictures_and_no_tables():
     loaded = loaded_by("simulate", "--modes", "1", "--cycles", "2", "--quiet")
     assert "snapbeam.solver.native" in loaded
-    assert not loaded & {"matplotlib", "pandas", "xarray", "dask", "scipy.stats"}
+    assert not loaded & {"matplotlib", "pandas", "xarray", "dask", "scipy"}
+
+
+def test_help_loads_no_scipy():
+    assert not loaded_by("--help") & {"scipy", "matplotlib", "pandas", "xarray"}
+
+
+def test_a_run_that_is_written_and_drawn_loads_no_arrays_of_other_libraries(tmp_path):
+    files = ("-o", str(tmp_path / "run.nc"), "--plot", str(tmp_path / "run.png"), "--window", "0:2")
+    loaded = loaded_by("simulate", "--modes", "2", "--cycles", "3", "--quiet", *files)
+    assert {"xarray", "matplotlib"} <= loaded
+    assert not loaded & {"dask.base", "dask.array", "pint", "scipy"}
 
 
 def test_every_public_name_is_found_where_it_stands():

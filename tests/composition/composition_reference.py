@@ -21,6 +21,8 @@ Motion = Callable[[float], tuple[float, float, float]]
 """Displacement, velocity and acceleration."""
 MOST_PIECES = 20_000
 """Events of a run at which the reference gives up."""
+NEAR = 0.8
+"""Share of the time at which SciPy fails at an infinite force, up to which its states are compared."""
 LEAST_DEPTH, LEAST_FORCE = 1e-14, 1e-9
 """Penetration (m) and force (N) beyond zero at which events lie, so that rounding makes none."""
 
@@ -130,6 +132,16 @@ class ReferenceBeam:
         return np.asarray(mv @ np.diag(2.0 * self.damping_ratio * omega) @ mv.T)
 
 
+def limit(local: PointForce, sign: float) -> Callable[[float, Array, Sequence[bool]], float]:
+    """Event in which a displacement leaves the range of its law."""
+
+    def value(t: float, y: Array, touching: Sequence[bool]) -> float:
+        return sign * float(local.row @ y[: local.row.size]) - local.reach
+
+    value.terminal, value.direction = True, 1.0  # type: ignore[attr-defined]
+    return value
+
+
 def wavenumber(i: int) -> float:
     """The wavenumber of a buckling mode of a clamped beam, times the length."""
     if i % 2 == 1:
@@ -163,6 +175,8 @@ class PointForce:
     row: Array
     force: Callable[[float], float]
     damping: Callable[[float, float], float] | None = None
+    reach: float = math.inf
+    """Displacement of either sign up to which the law is valid."""
 
 
 @dataclass(frozen=True)
@@ -192,16 +206,13 @@ class Parts:
     """Times at which a motion is not smooth."""
 
 
-class Singular(Exception):
-    """The motion reaches an electrode or a magnet, where its force is infinite, at a time (s)."""
-
-    def __init__(self, time: float) -> None:
-        super().__init__(f"the force is infinite at t = {time:.6g} s")
-        self.time = time
-
-
 class Solution:
-    """States of a run at the times asked for."""
+    """States of a run at the times asked for, up to where the motion leaves the range of a law."""
+
+    left: float = math.inf
+    """Time at which a force is infinite, or a displacement leaves the range of its law, s."""
+    latest: float = math.inf
+    """Time up to which the motion is certain, s: where a force grows without bound, the end is only near."""
 
     def __init__(
         self,
@@ -321,24 +332,38 @@ class Solution:
         watched = [(j, False) for j in range(len(tips))]
         watched += [(j, True) for j, tip in enumerate(tips) if tip.damping is not None]
         found: list[Array] = []
-        pieces = 0
+        pieces, ends = (
+            0,
+            [
+                limit(local, sign)
+                for local in self.parts.local
+                for sign in (1.0, -1.0)
+                if local.reach < math.inf
+            ],
+        )
         while t < last:
             until = min([at for at in self.parts.breaks if at > t * (1.0 + 1e-12)] + [last])
             events = [self.event(j, of, not (pressing if of else touching)[j]) for j, of in watched]
             part = solve_ivp(
                 self.rate, (t, until), y, "DOP853", dense_output=True, rtol=rtol, atol=atol,
-                max_step=longest, first_step=min(1e-3 * longest, until - t), args=(tuple(touching),), events=events or None,
+                max_step=longest, first_step=min(1e-3 * longest, until - t), args=(tuple(touching),), events=events + ends or None,
             )  # fmt: skip
             pieces += 1
-            if not part.success:
-                raise Singular(float(part.t[-1]))
             assert pieces < MOST_PIECES
             end = float(part.t[-1])
+            if not part.success:
+                self.left, self.latest = end, NEAR * end
+            elif any(hit.size for hit in (part.t_events or [])[len(watched) :]):
+                self.left = self.latest = end
+            if self.left < math.inf:
+                inside = times[(times >= t) & (times < self.latest)]
+                found.append(part.sol(inside).T if inside.size else np.zeros((0, y.size)))
+                break
             inside = times[(times >= t) & ((times < end) | (end >= last))]
             if inside.size:
                 found.append(part.sol(inside).T)
             t, y = end, part.y[:, -1]
-            for (j, of_force), hit in zip(watched, part.t_events or [], strict=True):
+            for (j, of_force), hit in zip(watched, (part.t_events or [])[: len(watched)], strict=True):
                 if hit.size and of_force:
                     pressing[j] = not pressing[j]
                 elif hit.size:

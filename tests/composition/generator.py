@@ -415,6 +415,11 @@ def touching(
     return law, lambda d: float(kind.force(numbers, d)) if d > 0.0 else 0.0, loss
 
 
+def falling(stiff: float, cubic: float) -> float:
+    """Displacement at which the force of a softening spring falls to zero."""
+    return math.sqrt(-stiff / cubic) if cubic < 0.0 else math.inf
+
+
 def acting(name: str, number: Numbers, beam: ReferenceBeam) -> tuple[sb.LocalForce, PointForce]:
     """A local force."""
     place, share, far = number(0.25, 0.75), number(0.0, 1.0), number(2.5, 4.0) * number.unit
@@ -427,11 +432,11 @@ def acting(name: str, number: Numbers, beam: ReferenceBeam) -> tuple[sb.LocalFor
     if name == "local_spring":
         stiff, cubic = 5.0 + 60.0 * share, number(-1e7, 1e8)
         spring = sb.LocalSpring(stiffness=stiff, cubic_stiffness=cubic, location=place)
-        return spring, PointForce(row, lambda u: -stiff * u - cubic * u**3)
+        return spring, PointForce(row, lambda u: -stiff * u - cubic * u**3, reach=falling(stiff, cubic))
     if name == "softening_spring":
         stiff, cubic = 5.0 * share, number(-3e8, -5e7)
         soft = sb.LocalSpring(stiffness=stiff, cubic_stiffness=cubic, location=place)
-        return soft, PointForce(row, lambda u: -stiff * u - cubic * u**3)
+        return soft, PointForce(row, lambda u: -stiff * u - cubic * u**3, reach=falling(stiff, cubic))
     if name in ("magnetic_force", "attracting_magnet"):
         share = 2.0 * share - 1.0 if name == "magnetic_force" else 1.0 + 1.5 * share
         strength = 0.02 * share * number.unit**2

@@ -112,8 +112,10 @@ def test_a_socket_needs_the_origin_and_the_cookie(served, cookie):
 
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
 def test_sessions_have_a_limit_and_end_unused(small_map, monkeypatch):
-    """Requests without a socket keep the owner out for 20 s, not for good."""
+    """Requests without a socket keep the owner out for 20 s, here for 8.5 s, not for good."""
     monkeypatch.setattr(server, "SESSIONS", 3)
+    monkeypatch.setattr(server, "UNUSED", 8000)
+    monkeypatch.setattr(server, "CHECKED", 500)
     shown = sb.explorer.explore(small_map)
     try:
         base, _, search = shown.url.partition("?")

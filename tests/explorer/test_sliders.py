@@ -92,7 +92,7 @@ def _state(page):
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
 def test_a_page_read_from_the_address_of_another_shows_the_same(page):
     rng = np.random.default_rng(11)
-    for _ in range(4):
+    for _ in range(2):
         page.card.show.value = str(rng.choice(page.card.source.variables()))
         left, low = rng.uniform(0.4, 1.0), rng.uniform(0.02, 0.1)
         page.card.view.view = (left, left + 0.5, low, low + 0.2)

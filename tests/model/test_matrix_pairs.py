@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam.model import buckling_modes
-from snapbeam.model.matrix_pairs import eigenpairs
+from snapbeam.model.matrix_pairs import coupled_blocks, eigenpairs
 from snapbeam.util import diagnostics
 from snapbeam.util.validation import InputError
 
@@ -409,3 +409,16 @@ def test_penalty_hides_no_asymmetry() -> None:
     stiffness[0, 1] = 1.0
     with pytest.raises(InputError, match=r"stiffness\[0, 1\] = 1.0"):
         model_of(np.eye(3), stiffness)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0, 2.0, 20.0])
+def test_blocks_are_connected_components(share):
+    from scipy.sparse.csgraph import connected_components
+
+    random = np.random.default_rng(5)
+    for count in (1, 2, 7, 60):
+        coupled = random.random((count, count)) < share / count
+        order, sizes = coupled_blocks(coupled)
+        number, label = connected_components(coupled, directed=False)
+        assert np.array_equal(order, np.argsort(label, kind="stable"))
+        assert np.array_equal(sizes, np.bincount(label, minlength=number))

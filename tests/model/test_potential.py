@@ -308,3 +308,40 @@ def test_magnets_on_both_sides_at_nearly_the_same_place():
     directions = [each.unstable_directions for each in potential.equilibria]
     assert sorted(n for n, beyond in zip(directions, far, strict=True) if not beyond) == [0, 0, 1, 1, 1]
     assert [n for n, beyond in zip(directions, far, strict=True) if beyond] in ([], [2])
+
+
+ATTRACTION = 1e-9
+
+
+@pytest.mark.parametrize(
+    ("modes", "magnets", "directions"),
+    [
+        # on both sides: next to each, to each pair and to all three
+        (
+            6,
+            [(ATTRACTION, 1.0e-3, 0.3), (ATTRACTION, -1.1e-3, 0.5), (ATTRACTION, 1.0e-3, 0.7)],
+            [0, 0, 1, 1, 1, 1, 2, 2, 2, 3],
+        ),
+        (
+            5,
+            [(3e-9, -1.15e-3, 0.3), (2e-9, 0.9e-3, 0.41), (8e-10, 1.3e-3, 0.73)],
+            [0, 0, 1, 1, 1, 2, 2, 3],
+        ),
+        # one that repels between two, so near that the beam bends around it
+        (
+            5,
+            [(2e-12, -0.9e-3, 0.4), (2.5e-12, -1.15e-3, 0.63), (-2e-9, -0.93e-3, 0.525)],
+            [0, 0, 1, 1, 1, 2],
+        ),
+    ],
+)
+def test_equilibria_next_to_several_magnets(modes, magnets, directions):
+    """Hilltops between poles whose forces differ much: sum of (-1)^directions = 1 - chi of the faces that attract."""
+    forces = [sb.MagneticForce(strength=s, gap=gap, location=x) for s, gap, x in magnets]
+    potential = sb.System(model_of(modes), forces=forces).potential
+    assert sorted(each.unstable_directions for each in potential.equilibria) == directions
+    for each in potential.equilibria:
+        # the distance to a pole follows from the amplitudes to their rounding, and so does its force
+        rounding = 1e-15 * np.abs(potential.tangent(each.amplitude)) @ np.abs(each.amplitude)
+        terms = np.abs(potential.terms(each.amplitude)).sum(axis=0)
+        assert (np.abs(potential.gradient(each.amplitude)) <= 1e-10 * terms.max() + 10.0 * rounding).all()

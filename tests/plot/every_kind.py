@@ -129,4 +129,12 @@ SLOW: dict[str, Callable[[], xr.Dataset]] = {
     "force-displacement curve": lambda: sb.force_displacement(SYSTEM),
     "growth of a perturbation": lambda: sb.perturbation_growth(CHAOTIC, SHORT),
 }  # fmt: skip
-RESULTS = QUICK | SLOW
+
+
+def _once(make: Callable[[], xr.Dataset]) -> Callable[[], xr.Dataset]:
+    """A result that is computed for its first figure only."""
+    kept = cache(make)
+    return lambda: kept().copy()
+
+
+RESULTS = {name: _once(make) for name, make in (QUICK | SLOW).items()}

@@ -106,3 +106,17 @@ def test_a_long_run_is_drawn_by_its_range(synthetic_run):
     assert top[second][:, 1].max() == pytest.approx(most, rel=1e-9) and most > 0.0
     assert figure.legends[0].get_texts()[0].get_text() == "beam, centre (range)"
     assert not plot_run(long, window=(0.0, 50.0)).figure.axes[2].collections
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_curve_between_samples_is_that_of_scipy(seed):
+    from scipy.interpolate import PchipInterpolator
+
+    from snapbeam.plot.run import _smooth
+
+    random = np.random.default_rng(seed)
+    x, y = np.sort(random.random(25)), random.normal(size=25)
+    y[7], y[12] = y[8], np.nan
+    kept = np.isfinite(y)
+    dense, curve = _smooth(x, y)
+    assert np.allclose(curve, PchipInterpolator(x[kept], y[kept])(dense), rtol=0.0, atol=1e-13)

@@ -49,9 +49,14 @@ def outside(figure: Figure) -> float:
 
 def resized(figure: Figure, width: str) -> Figure:
     """A figure at the width of columns, laid out anew: the layout of a figure follows its size in a draw or two."""
-    figure.set_size_inches(COLUMN_WIDTHS[width] / 25.4, figure.get_figheight())
-    figure.canvas.draw()
+    if not has_width(figure, width):
+        figure.set_size_inches(COLUMN_WIDTHS[width] / 25.4, figure.get_figheight())
+        figure.canvas.draw()
     return figure
+
+
+def has_width(figure: Figure, width: str) -> bool:
+    return abs(25.4 * figure.get_figwidth() - COLUMN_WIDTHS[width]) < 1e-6
 
 
 def legends_of(figure: Figure) -> list[Legend]:
@@ -120,16 +125,17 @@ def test_the_default_figure(result: str, style: str) -> None:
     dataset = RESULTS[result]()
     figure = dataset.snapbeam.plot().get_figure(root=True)
     check(figure, f"{result}, {style}")
-    for width in COLUMN_WIDTHS:
+    for width in [each for each in COLUMN_WIDTHS if not has_width(figure, each)]:
         check(resized(figure, width), f"{result}, {style}, {width} column")
 
 
 @pytest.mark.parametrize("result", KINDS)
 def test_the_text_of_every_figure_is_inside(result: str) -> None:
+    """Of one column; a figure that fits there fits two, as one of each result shows."""
     dataset = RESULTS[result]()
-    for name in figures_of(dataset)[1]:
+    for number, name in enumerate(figures_of(dataset)[1]):
         figure = dataset.snapbeam.plot(name).get_figure(root=True)
-        for width in COLUMN_WIDTHS:
+        for width in COLUMN_WIDTHS if number == 0 else ["single"]:
             assert outside(resized(figure, width)) < 0.01, f"{name} of {width} column"
         plt.close(figure)
 

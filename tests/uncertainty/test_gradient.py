@@ -45,7 +45,9 @@ def test_derivatives_of_runs_are_those_of_two_runs(quantity: str) -> None:
             )
             for sign in (1.0, -1.0)
         ]
-        assert derivative == pytest.approx((ends[0] - ends[1]) / (2.0 * step * value), rel=1e-5)
+        # two runs move their steps against the maximum, which a cubic finds between them
+        close = 2e-4 if quantity == "max_displacement" else 1e-5
+        assert derivative == pytest.approx((ends[0] - ends[1]) / (2.0 * step * value), rel=close)
 
 
 @pytest.mark.slow

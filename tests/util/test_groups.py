@@ -36,3 +36,12 @@ def test_a_plain_file_stays_plain(tmp_path) -> None:
     assert split_group(path) == (path, None)
     with pytest.raises(InputError, match=r"has no result 'group'; it is one result; give one\.nc alone"):
         read_result(f"{path}:group")
+
+
+def test_arrays_of_dask_are_written(tmp_path):
+    pytest.importorskip("dask.array")
+    lazy = xr.Dataset({"gap": ("time", [1.0, 2.0, 3.0]), "name": ("time", ["a", "b", "c"])}).chunk(time=2)
+    sb.write_netcdf(lazy, tmp_path / "lazy.nc")
+    written = read_result(tmp_path / "lazy.nc")
+    assert written["gap"].values.tolist() == [1.0, 2.0, 3.0]
+    assert written["name"].values.tolist() == ["a", "b", "c"]

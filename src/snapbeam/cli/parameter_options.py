@@ -100,7 +100,7 @@ _WORDS = {
     "model.damping_ratio": "damping ratio of every linear mode, or one for each: zeta1,zeta2,...",
     "integration.step": "step in free flight, s; follows from the model by default",
     "integration.accuracy": "accuracy level: standard, or reference (much shorter steps, to check results)",
-    "integration.engine": "solver: auto or native, the core in C++; python, the equations in Python, slow",
+    "integration.engine": "solver: auto or native, the core in C++; python, the equations in Python, slow; cuda, the core on a GPU, for maps",
     "integration.early_termination": "end a run once its response class is certain; its statistics then cover the time until then",
 }
 _PAIRS = ("contact.young_modulus", "contact.poisson_ratio")

@@ -95,11 +95,12 @@ struct Tangent {
     const double *q, *p;          // (runs, DIRECTIONS, modes)
     const double *numbers;        // (runs, DIRECTIONS, channels, law_numbers)
     const double *laws;           // (runs, DIRECTIONS, channels): of the states of laws
-    const double *offset, *rest;  // (runs, DIRECTIONS, channels)
-    const double *rows;           // (runs, DIRECTIONS, channels, modes)
+    const double *offset;         // (runs, DIRECTIONS, channels)
+    const double *rest, *rows;    // (runs, DIRECTIONS, channels + 1), (..., modes): the last is of the displacement observed
     const double *signals;        // (runs, DIRECTIONS, signals, SIGNAL_NUMBERS)
     const double *end;            // (runs, DIRECTIONS): of the time of the end, s
     double *states;               // (runs, outputs, DIRECTIONS, 2 modes + channels): q, p, states of laws
+    double *statistics, *of_channels;  // (runs, DIRECTIONS, STATISTICS), (runs, DIRECTIONS, channels, OF_CHANNEL)
 };
 
 struct Batch {

@@ -51,7 +51,7 @@ template <class L> struct Group {
     static constexpr int FLOWS = DISTINCT_FLOWS * CELLS * 4;
     Held<Plain, FLOWS * LEVELS> tables;  // flows of the steps of every length, and of another one
     Held<Plain, FLOWS> own;
-    Held<Plain, CELLS * Inside<L>::ROWS> scratch;
+    Held<Cell, CELLS * Inside<L>::ROWS> scratch;
     Held<Plain, CELLS> amplitude;
     Held<Channel<L>, CHANNELS> channel;
     Held<Signal<L>, KNOWN_SIGNALS> signal;
@@ -145,7 +145,7 @@ template <class L> struct Group {
             for (int i = 0; i < z.channels; ++i) c.M[i] = Number(0.0);
             c.rest = c.offset = c.tip = c.tip_slope = c.early = c.z = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
             for (Number &x : c.decay) x = Number(0.0);
-            c.closed = c.pressing = FromBits<Marks>::of(0), c.onset = c.safe = Real(0.0);
+            c.closed = c.pressing = FromBits<Marks>::of(0), c.onset = c.safe = Real(0.0), c.begun = Number(0.0);
             c.impulse = c.work = c.lost = c.own_impulse = c.deepest = c.hardest = Number(0.0);
             for (Number &x : c.sums) x = Number(0.0);
             Event<L> &e = events[j];
@@ -225,13 +225,13 @@ template <class L> struct Group {
             }
             if (c.circuit) load_circuit(c, l, row, row_of);
             for (Number &x : c.sums) set_lane(x, l, 0.0);
-            Number *zeros[] = {&c.own_impulse, &c.deepest, &c.hardest, &c.d0, &c.r0};
+            Number *zeros[] = {&c.begun, &c.own_impulse, &c.deepest, &c.hardest, &c.d0, &c.r0};
             for (Number *x : zeros) set_lane(*x, l, 0.0);
             set_lane(c.safe, l, 0.0), set_lane(c.onset, l, 0.0), set_lane(c.closed, l, false), set_lane(c.pressing, l, false);
         }
-        if constexpr (L::directions > 0) seed(i);
         const double *observed = batch->rows + long(row_of[z.channels]) * modes;
         totals.load(*batch, i, l, observed, rest[z.channels]);
+        if constexpr (L::directions > 0) seed(i);
         advance_jump(l);
         // flows of the steps of every length
         const int n = s->cells, distinct = s->composition.distinct;
@@ -261,9 +261,12 @@ template <class L> struct Group {
                 for (int x = 0; x < numbers && !of_user(c.law); ++x) c.P[x].d.set(k, t.numbers[of * numbers + x]);
                 for (int x = User::OWN; x < numbers && of_user(c.law); ++x) c.P[x].d.set(k, t.numbers[of * numbers + x]);
                 if (c.state >= 0) c.P[c.state].d.set(k, t.laws[of]);
-                c.rest.d.set(k, t.rest[of]), c.offset.d.set(k, t.offset[of] - (c.memory ? lane(c.P[c.state].d, k) : 0.0));
-                for (int m = 0; m < modes; ++m) c.row[s->place[m]].d.set(k, t.rows[of * modes + m]);
+                c.rest.d.set(k, t.rest[of + row]), c.offset.d.set(k, t.offset[of] - (c.memory ? lane(c.P[c.state].d, k) : 0.0));
+                for (int m = 0; m < modes; ++m) c.row[s->place[m]].d.set(k, t.rows[(of + row) * modes + m]);
             }
+            const long observed = row * (channels + 1) + channels;  // each row of directions has one more than channels
+            totals.rest.d.set(k, t.rest[observed]), totals.later.d.set(k, totals.late / end * t.end[row]);
+            for (int m = 0; m < modes; ++m) totals.row[s->place[m]].d.set(k, t.rows[observed * modes + m]);
             for (int x = 0; x < z.signals; ++x)
                 for (int y = 0; y < snapbeam::SIGNAL_NUMBERS; ++y) z.signal[x].p[y].d.set(k, t.signals[(row * z.signals + x) * snapbeam::SIGNAL_NUMBERS + y]);
         }
@@ -355,7 +358,7 @@ template <class L> struct Group {
                 if (closed) set_lane(c.deepest, l, depth > 0.0 ? depth : 0.0);
             }
         }
-        assign(which, energy, totals.energy(z, true, true));
+        assign(which, energy, value(totals.energy(z, true, true)));
         if (!continued) totals.start(z, which, totals.energy(z, true));
         const bool saved = recorder() && batch->recorder->marks[4];
         for (int j = 0; j < z.channels; ++j) {  // in touch and closing
@@ -549,7 +552,7 @@ template <class L> struct Group {
         // Impacts without duration leave gaps as small as the error of what is followed inside: first that at the end of the step is
         // found, which a cubic without value and slope at the beginning then takes away.
         for (int pass = c.impulsive ? 0 : 1; pass < 2; ++pass) {
-            inside.begin(z, scratch);
+            inside.begin(z, reinterpret_cast<Plain *>(static_cast<Cell *>(scratch)));
             for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].begun), z.signal[i].ahead(0, Number(inside.part));
             Real d0 = min(value(c.d0), Real(0.0)), r0 = value(c.r0);
             for (;;) {
@@ -633,18 +636,24 @@ template <class L> struct Group {
         }
         return touching;
     }
-    // A step that ends where a contact opens, closes or yields, with the derivatives of that time.
+    // What is zero where the step of contact j ends; *on_force*: where its force changes.
+    Number zero_of(int j, bool on_force) {
+        Channel<L> &c = z.channel[j];
+        if (!on_force) return c.d1;
+        return going_on(c, c.d1, c.r1, c.impulsive ? pressed_by(z, c, z.q1, z.p1, z.k1) : c.f);
+    }
+    // A step that ends where a contact opens, closes, yields or ceases to press, with the derivatives of that time.
     void follow_event() requires(L::directions > 0) {
         for (int j = 0; j < z.channels; ++j) {
-            Channel<L> &c = z.channel[j];
-            const bool yields = c.memory && events[j].force && !c.pressing;
-            if (!c.contact || !(events[j].flip || yields)) continue;
-            const Number gap = yields ? c.d1 - yield_of(c) : c.d1;
-            z.h = Number(value(z.h), Pack<L::directions>(-1.0 / value(c.r1)) * gap.d);
-            set_lengths();
-            take_step(z);
-            end_of_contacts();
-            z.drift += z.h - Number(value(z.h)), key = -1.0;
+            const Event<L> &e = events[j];
+            const bool on_force = e.force && !e.flip;
+            if (!z.channel[j].contact || !(e.flip || e.force)) continue;
+            const auto lasting = [&](Number h) { z.h = h, set_lengths(), take_step(z), end_of_contacts(); };
+            const Number gap = zero_of(j, on_force), h = Number(value(z.h));
+            double rate = value(z.channel[j].r1);
+            if (on_force) lasting(Number(value(h), 1.0)), rate = lane(zero_of(j, true).d - gap.d, 0);
+            lasting(Number(value(h), rate != 0.0 ? Pack<L::directions>(-1.0 / rate) * gap.d : Pack<L::directions>(0.0)));
+            z.drift += z.h - h, key = -1.0;
             return;
         }
     }
@@ -729,7 +738,7 @@ template <class L> struct Group {
                 if (!have_amplitudes) amplitudes(z, amplitude), have_amplitudes = true;
                 const Marks near = may_close(c, unsafe, touching);
                 if (any(near)) {
-                    totals.sum[snapbeam::SAMPLED_STEPS] += select(near, Real(1.0), Real(0.0));
+                    totals.sum[snapbeam::SAMPLED_STEPS] += select(near, Number(1.0), Number(0.0));
                     Real found = closing(c, near, noise);
                     // a step that ends closed although nothing was seen inside it: at the zero of the cubic
                     const Marks unseen = near & (found > Real(1.0)) & (d1 > noise);
@@ -745,7 +754,7 @@ template <class L> struct Group {
             const Marks sooner = (at < length) | (mine & (at < Real(NEVER)) & (!redo));
             length = select(sooner, at, length), which = select(sooner, Real(double(j)), which), redo = redo | sooner;
         }
-        totals.sum[snapbeam::TRIALS] += select(alive, Real(1.0), Real(0.0));
+        totals.sum[snapbeam::TRIALS] += select(alive, Number(1.0), Number(0.0));
         const Marks over = broken & (!pulled) & (cuts < Real(double(MOST_CUTS))) & (ticks > Real(1.0));  // a force that repels may turn a shorter step before
         length = select(over, max(nearest(Real(0.5) * ticks), Real(1.0)), length), which = select(over, Real(-1.0), which);
         broken = broken & (!over);
@@ -817,6 +826,7 @@ template <class L> struct Group {
             if (!c.memory) c.pressing = (c.pressing & (!(off | force))) | begins;
             c.closed = (c.closed & (!off)) | on;
             assign(begins, c.onset, z.t);
+            if constexpr (L::directions > 0) assign(begins, c.begun, z.drift);
             assign(on | off, c.d0, Number(0.0));  // the gap at an event is zero
             changed = changed | on | off | force;
         }
@@ -830,20 +840,20 @@ template <class L> struct Group {
                 if (c.contact) assign(jumped, c.r0, signal_slope(z, c) - dot<L>(c.row, z.p, n)), assign(jumped, c.safe, z.t);
             }
         if (any(changed)) {
-            assign(changed, energy, totals.energy(z, true, true));
+            assign(changed, energy, value(totals.energy(z, true, true)));
             for (int j = 0; j < z.channels; ++j) assign(changed, z.channel[j].safe, z.t);
         }
+        totals.add_modes(z, ok, z.h);
         if constexpr (L::directions > 0) {
             bool held = false;
             for (int j = 0; j < z.channels; ++j) held |= z.channel[j].contact && z.channel[j].closed;
             if (!held || z.t >= min(limit, end)) move_in_time(*this, -z.drift);
         }
-        totals.add_modes(z, ok, value(z.h));
         if (recorder()) record_end(*this, was_touching);
         const Marks finite = abs(totals.center.u) < Real(1e9);
         const Marks diverged = ok & (broken | (!finite));
         const Marks early = ok & totals.decided(z);
-        const Marks spent = ok & (totals.sum[snapbeam::STEPS] >= most_steps);
+        const Marks spent = ok & (totals.so_far(snapbeam::STEPS) >= most_steps);
         const Marks reached = ok & (z.t >= min(limit, end));
         if (any(diverged | early | spent | reached)) stop_at(bits(diverged), bits(early), bits(spent), bits(reached));
     }
@@ -860,7 +870,7 @@ template <class L> struct Group {
 
     SNAPBEAM_SELDOM void close_impact(Channel<L> &c, int j, Marks off) {
         using namespace snapbeam;
-        const Number zero = Number(0.0), peak = peak_of(c), lasted = Number((z.t - max(c.onset, Real(0.0))) * z.tick);
+        const Number zero = Number(0.0), peak = peak_of(c), lasted = Number((z.t - max(c.onset, Real(0.0))) * z.tick) + (z.drift - c.begun);
         const Marks counts = off & (c.deepest > zero);
         c.sums[IMPACTS] += select(counts, Number(1.0), zero);
         c.sums[IMPULSE] += select(off, c.own_impulse, zero);
@@ -919,13 +929,17 @@ template <class L> struct Group {
         }
         if constexpr (L::directions > 0) write_tangents();
     }
+    // Derivatives of the time at hand as a share of the whole.
+    Number later_end() const requires(L::directions > 0) {
+        Number later = Number(0.0);
+        for (int k = 0; k < L::directions; ++k) later.d.set(k, lane(z.t, 0) / lane(end, 0) * batch->tangent->end[long(run[0]) * L::directions + k]);
+        return later;
+    }
     // Derivatives of an output, whose time may move; after its state was written.
     void write_tangents() requires(L::directions > 0) {
         const int modes = problem->modes, width = 2 * modes + z.channels;
         const long first = (long(run[0]) * batch->outputs + output[0] - 1) * L::directions;
-        const double share = lane(z.t, 0) / lane(end, 0);
-        Number later = Number(0.0);
-        for (int k = 0; k < L::directions; ++k) later.d.set(k, share * batch->tangent->end[long(run[0]) * L::directions + k]);
+        const Number later = later_end();
         move_in_time(*this, later);
         for (int k = 0; k < L::directions; ++k) {
             double *to = batch->tangent->states + (first + k) * width;
@@ -938,14 +952,15 @@ template <class L> struct Group {
     SNAPBEAM_SELDOM void finish(int l, int status) {
         using namespace snapbeam;
         const Marks mine = FromBits<Marks>::of(1u << l);
+        if constexpr (L::directions > 0) move_in_time(*this, later_end());
         totals.finish(z, mine);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             const bool pressed = c.contact && lane(Marks(acting(c)), l);
             const bool goes_on = batch->outputs && !recorder();
             if (pressed && goes_on) {  // the run goes on elsewhere: what the contact gave so far
-                set_lane(c.sums[CONTACT_TIME], l, lane(value(c.sums[CONTACT_TIME]), l) + (lane(z.t, l) - (lane(c.onset, l) > 0.0 ? lane(c.onset, l) : 0.0)) * lane(z.tick, l));
-                set_lane(c.sums[IMPULSE], l, lane(value(c.sums[IMPULSE]), l) + lane(value(c.own_impulse), l));
+                c.sums[CONTACT_TIME] += select(mine, Number((z.t - max(c.onset, Real(0.0))) * z.tick) + (z.drift - c.begun), Number(0.0));
+                c.sums[IMPULSE] += select(mine, c.own_impulse, Number(0.0));
                 assign(mine, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], peak_of(c)));
             }
             set_lane(c.sums[TOUCHING], l, pressed), set_lane(c.sums[ONSET], l, pressed ? lane(c.onset, l) : 0.0);
@@ -958,10 +973,17 @@ template <class L> struct Group {
         using namespace snapbeam;
         set_lane(totals.sum[STATUS], l, status), set_lane(totals.sum[TIME], l, lane(z.t, l));
         if (status == EARLY_STOP) set_lane(totals.sum[EARLY_STOP_TIME], l, lane(z.t, l) * lane(z.tick, l));
-        for (int k = 0; k < STATISTICS; ++k) batch->statistics[long(run[l]) * STATISTICS + k] = lane(totals.sum[k], l);
+        for (int k = 0; k < STATISTICS; ++k) batch->statistics[long(run[l]) * STATISTICS + k] = lane(value(totals.sum[k]), l);
         for (int j = 0; j < z.channels; ++j)
             for (int k = 0; k < OF_CHANNEL; ++k)
                 batch->of_channels[(long(run[l]) * z.channels + j) * OF_CHANNEL + k] = lane(value(z.channel[j].sums[k]), l);
+        if constexpr (L::directions > 0)
+            for (int d = 0; d < L::directions; ++d) {
+                const long row = long(run[l]) * L::directions + d;
+                for (int k = 0; k < STATISTICS; ++k) batch->tangent->statistics[row * STATISTICS + k] = lane(totals.sum[k].d, d);
+                for (int j = 0; j < z.channels; ++j)
+                    for (int k = 0; k < OF_CHANNEL; ++k) batch->tangent->of_channels[(row * z.channels + j) * OF_CHANNEL + k] = lane(z.channel[j].sums[k].d, d);
+            }
     }
 
     // The runs at hand are left where they stand.

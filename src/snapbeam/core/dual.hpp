@@ -49,8 +49,8 @@ template <int K> SNAPBEAM_FN Dual<K> fma(const Dual<K> &a, const Dual<K> &b, con
 }
 template <int K> SNAPBEAM_FN Dual<K> fma(double a, const Dual<K> &b, const Dual<K> &c) { return {fma(a, b.v, c.v), fma(Pack<K>(a), b.d, c.d)}; }
 template <int K> SNAPBEAM_FN Dual<K> fma(const Dual<K> &a, double b, const Dual<K> &c) { return fma(b, a, c); }
-template <int K> SNAPBEAM_FN Dual<K> min(const Dual<K> &a, const Dual<K> &b) { return a.v < b.v ? a : b; }
-template <int K> SNAPBEAM_FN Dual<K> max(const Dual<K> &a, const Dual<K> &b) { return a.v > b.v ? a : b; }
+template <int K> SNAPBEAM_FN Dual<K> min(const Dual<K> &a, const Dual<K> &b) { return b.v < a.v ? b : a; }  // of equal ones the first
+template <int K> SNAPBEAM_FN Dual<K> max(const Dual<K> &a, const Dual<K> &b) { return b.v > a.v ? b : a; }
 template <int K> SNAPBEAM_FN Dual<K> abs(const Dual<K> &x) { return x.v < 0.0 ? -x : x; }
 template <int K> SNAPBEAM_FN Dual<K> sqrt(const Dual<K> &x) {  // slope 0 at 0: forces d^(3/2) have none there
     const double root = sqrt(x.v);
@@ -62,6 +62,19 @@ template <int K> SNAPBEAM_FN Dual<K> tanh(const Dual<K> &x) { const double y = t
 template <int K> SNAPBEAM_FN Turn<Dual<K>> turn(const Dual<K> &x) {
     const Turn<double> w = turn(x.v);
     return {{w.sine, Pack<K>(w.cosine) * x.d}, {w.cosine, Pack<K>(-w.sine) * x.d}, {w.cosine_less_one, Pack<K>(-w.sine) * x.d}};
+}
+
+// A number as one of type T, without its derivatives if T has none.
+template <class T, class X> SNAPBEAM_FN T as(const X &x) {
+    if constexpr (requires(T with) { with.d; }) return T(x);
+    else return T(value(x));
+}
+// The root of a cubic moves with it.
+template <int K> SNAPBEAM_FN Dual<K> root(const Cubic<Dual<K>> &u, const Dual<K> &high) {
+    Cubic<double> plain(0.0, 0.0, 0.0, 0.0, 0.0);
+    plain.c0 = u.c0.v, plain.c1 = u.c1.v, plain.c2 = u.c2.v, plain.c3 = u.c3.v;
+    const double x = root(plain, high.v);
+    return {x, Pack<K>(-1.0 / plain.slope(x)) * u.at(Dual<K>(x)).d};
 }
 
 // The layout of one run with K directions.

@@ -19,75 +19,79 @@ namespace SNAPBEAM_SET {
 
 constexpr double MARGIN = 1.25, TRUST = 8.0, NEVER = 1e300;
 // The motion inside a step, part after part.
-template <class L> struct Inside {
+template <class L, class Cell = typename L::Plain, class Number = typename L::Real> struct Inside {
     typedef typename L::Real Real;
     typedef typename L::Plain Plain;
-    Plain *q, *p, *a, *change, *flow;
-    Real parts, part, half, share;
+    Cell *q, *p, *a, *change;  // with derivatives or without
+    Plain *flow;
+    Real parts, share;
+    Number part, half;
 
     static constexpr int ROWS = 8;  // a flow has four
-    SNAPBEAM_FN void begin(const Runs<L> &z, Plain *memory) {
+    SNAPBEAM_FN void begin(const Runs<L> &z, Cell *memory) {
         const Structure<L> &s = *z.s;
         const int n = s.size();
-        q = memory, p = q + n, a = p + n, change = a + n, flow = change + n;
+        q = memory, p = q + n, a = p + n, change = a + n, flow = reinterpret_cast<Plain *>(change + n);
         parts = z.parts;
         SNAPBEAM_LOOP
-        for (int i = 0; i < n; ++i) q[i] = value(z.q[i]), p[i] = value(z.p[i]), a[i] = value(z.k[i]), change[i] = value(z.k1[i]);
+        for (int i = 0; i < n; ++i) q[i] = as<Cell>(z.q[i]), p[i] = as<Cell>(z.p[i]), a[i] = as<Cell>(z.k[i]), change[i] = as<Cell>(z.k1[i]);
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
             if (!c.active || c.law == AXIAL_LOAD) continue;
-            const Plain first = Plain(value(c.first_f)), last = Plain(value(c.f));
+            const Cell first = Cell(as<Number>(c.first_f)), last = Cell(as<Number>(c.f));
             SNAPBEAM_LOOP
-            for (int i = 0; i < n; ++i) a[i] = fma(first, value(c.row[i]), a[i]), change[i] = fma(last, value(c.row[i]), change[i]);
+            for (int i = 0; i < n; ++i) a[i] = fma(first, as<Cell>(c.row[i]), a[i]), change[i] = fma(last, as<Cell>(c.row[i]), change[i]);
         }
         const Real per = Real(1.0) / parts;
-        part = value(z.h) * per, half = Real(0.5) * part, share = Real(0.0);
+        part = as<Number>(z.h) * per, half = Number(0.5) * part, share = Real(0.0);
         SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) {
-            change[i] = Plain(per) * (change[i] - a[i]);
-            set_flow(Plain(part), Plain(s.sigma[i]), Plain(s.omega[i]), flow + 4 * i);
+            change[i] = Cell(per) * (change[i] - a[i]);
+            set_flow(Plain(value(part)), Plain(s.sigma[i]), Plain(s.omega[i]), flow + 4 * i);
         }
     }
     SNAPBEAM_FN void advance(const Structure<L> &s) {  // half a kick, a flow, half a kick
-        const Plain first = Plain(half * share);
+        const Cell first = Cell(half * share);
         share += Real(1.0);
-        const Plain last = Plain(half * share), h = Plain(half);
+        const Cell last = Cell(half * share), h = Cell(half);
         SNAPBEAM_LOOP
         for (int i = 0; i < s.size(); ++i) {
-            const Plain x = q[i], y = fma(h, a[i], fma(first, change[i], p[i]));
+            const Cell x = q[i], y = fma(h, a[i], fma(first, change[i], p[i]));
             const Plain *f = flow + 4 * i;
-            q[i] = x + fma(f[0], x, f[1] * y);
-            p[i] = fma(h, a[i], fma(last, change[i], y + fma(f[3], y, f[2] * x)));
+            q[i] = x + fma(Cell(f[0]), x, Cell(f[1]) * y);
+            p[i] = y + fma(Cell(f[3]), y, Cell(f[2]) * x);
+            if constexpr (requires { part.d; }) lengthen(q[i], p[i], part - Number(value(part)), s.omega[i], s.sigma[i]);
+            p[i] = fma(h, a[i], fma(last, change[i], p[i]));
         }
     }
     // Acceleration along a row.
-    template <class Row> SNAPBEAM_FN Real bend(const Structure<L> &s, const Row &row) const {
-        Plain sum = Plain(0.0);
+    template <class Row> SNAPBEAM_FN Number bend(const Structure<L> &s, const Row &row) const {
+        Cell sum = Cell(0.0);
         SNAPBEAM_LOOP
         for (int i = 0; i < s.size(); ++i) {
             const Plain omega = Plain(s.omega[i]), sigma = Plain(s.sigma[i]);
-            const Plain own = fma(Plain(share), change[i], a[i]) - omega * omega * q[i] - Plain(2.0) * sigma * p[i];
-            sum = fma(Plain(value(row[i])), own, sum);
+            const Cell own = fma(Cell(share), change[i], a[i]) - Cell(omega * omega) * q[i] - Cell(Plain(2.0) * sigma) * p[i];
+            sum = fma(as<Cell>(row[i]), own, sum);
         }
         return L::total(sum);
     }
 };
 
 // Acceleration along a row at the beginning (*last* false) or the end of a step.
-template <class L, class Row> SNAPBEAM_CALLED typename L::Real bend_at(const Runs<L> &z, const Row &row, bool last) {
-    typedef typename L::Plain Plain;
+template <class L, class Row> SNAPBEAM_CALLED typename L::Number bend_at(const Runs<L> &z, const Row &row, bool last) {
+    typedef typename L::Cell Cell;
     const Structure<L> &s = *z.s;
-    const typename L::Cell *q = last ? z.q1 : z.q, *p = last ? z.p1 : z.p, *k = last ? z.k1 : z.k;
-    Plain sum = Plain(0.0);
+    const Cell *q = last ? z.q1 : z.q, *p = last ? z.p1 : z.p, *k = last ? z.k1 : z.k;
+    Cell sum = Cell(0.0);
     SNAPBEAM_LOOP
     for (int i = 0; i < s.size(); ++i) {
-        const Plain omega = Plain(s.omega[i]), sigma = Plain(s.sigma[i]);
-        Plain own = value(k[i]) - omega * omega * value(q[i]) - Plain(2.0) * sigma * value(p[i]);
+        const Cell omega = Cell(s.omega[i]), sigma = Cell(s.sigma[i]);
+        Cell own = k[i] - omega * omega * q[i] - Cell(2.0) * sigma * p[i];
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
-            if (c.active && c.law != AXIAL_LOAD) own = fma(Plain(value(last ? c.f : c.first_f)), value(c.row[i]), own);
+            if (c.active && c.law != AXIAL_LOAD) own = fma(Cell(last ? c.f : c.first_f), c.row[i], own);
         }
-        sum = fma(Plain(value(row[i])), own, sum);
+        sum = fma(Cell(row[i]), own, sum);
     }
     return L::total(sum);
 }

@@ -39,7 +39,8 @@ template <int K> void move_in_time(Group<Tangents<K>> &runs, Dual<K> later) {
     typedef Tangents<K> L;
     Runs<L> &z = runs.z;
     const Structure<L> &s = *z.s;
-    double *rate = runs.scratch;
+    double *rate = reinterpret_cast<double *>(static_cast<Dual<K> *>(runs.scratch));
+    runs.totals.move_in_time(z, later);
     for (int i = 0; i < s.size(); ++i) rate[i] = z.k[i].v - s.omega[i] * s.omega[i] * z.q[i].v - 2.0 * s.sigma[i] * z.p[i].v;
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
@@ -51,6 +52,7 @@ template <int K> void move_in_time(Group<Tangents<K>> &runs, Dual<K> later) {
     for (int i = 0; i < z.signals; ++i) z.signal[i].move_in_time(later);
     z.drift += later;
     tension_at(z, z.q, z.k);
+    runs.totals.look_again(z, !(z.t < runs.end));
 }
 
 // Impacts of contact *number*, where its gap closes at the rate r0.
@@ -93,6 +95,7 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
         if (any(parts)) runs.close_impact(other, j, parts), other.closed = other.closed & (!parts), other.pressing = other.closed;
     }
     assign(stays, c.onset, z.t);
+    if constexpr (L::directions > 0) assign(stays, c.begun, z.drift);
     c.closed = c.closed | stays, c.pressing = c.closed;
     c.f = select(stays, pressed_by(z, c, z.q, z.p, z.k) / M, c.f);
 }
@@ -113,9 +116,9 @@ template <class L> void jumped_velocity(Group<L> &runs, typename L::Marks which)
     }
     auto &totals = runs.totals;
     assign(which, totals.point.v, dot<L>(totals.row, z.p, n)), assign(which, totals.center.v, dot<L>(z.s->center, z.p, n));
-    assign(which, totals.sum[PEAK_VELOCITY], max(totals.sum[PEAK_VELOCITY], Real(abs(value(totals.point.v)))));
-    assign(which, totals.sum[PEAK_CENTER_VELOCITY], max(totals.sum[PEAK_CENTER_VELOCITY], Real(abs(value(totals.center.v)))));
-    assign(which, runs.energy, totals.energy(z, true, true));
+    assign(which, totals.sum[PEAK_VELOCITY], max(totals.sum[PEAK_VELOCITY], abs(totals.point.v)));
+    assign(which, totals.sum[PEAK_CENTER_VELOCITY], max(totals.sum[PEAK_CENTER_VELOCITY], abs(totals.center.v)));
+    assign(which, runs.energy, value(totals.energy(z, true, true)));
     totals.enter_well(z, which);
 }
 

@@ -356,12 +356,14 @@ static void integrate_tangents(nb::dict problem, nb::dict batch, nb::dict tangen
     Tangent t{};
     t.q = a.array<double>("q", {runs, K, n}), t.p = a.array<double>("p", {runs, K, n});
     t.numbers = a.array<double>("numbers", {runs, K, channels, size_t(p.law_numbers)});
-    t.offset = a.array<double>("offset", {runs, K, channels}), t.rest = a.array<double>("rest", {runs, K, channels});
+    t.offset = a.array<double>("offset", {runs, K, channels}), t.rest = a.array<double>("rest", {runs, K, channels + 1});
     t.laws = a.array<double>("laws", {runs, K, channels});
-    t.rows = a.array<double>("rows", {runs, K, channels, n});
+    t.rows = a.array<double>("rows", {runs, K, channels + 1, n});
     t.signals = a.array<double>("signals", {runs, K, size_t(p.signals), SIGNAL_NUMBERS});
     t.end = a.array<double>("end", {runs, K});
     t.states = a.array<double, true>("states", {runs, size_t(b.outputs), K, 2 * n + channels}, false);
+    t.statistics = a.array<double, true>("statistics", {runs, K, STATISTICS}, false);
+    t.of_channels = a.array<double, true>("of_channels", {runs, K, channels, OF_CHANNEL}, false);
     b.tangent = &t;
     const std::vector<Set> have = sets();
     const Kernel kernel = set_named(set, have).tangents;

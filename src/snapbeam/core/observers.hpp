@@ -32,10 +32,10 @@ template <class L> void write_sample(Group<L> &run, double time, bool within) {
     }
     z.q.swap(z.q1), z.p.swap(z.p1);
     values[SAMPLE_TIME] = time;
-    values[BEAM_ENERGY] = lane(run.totals.energy(z, false), 0);
+    values[BEAM_ENERGY] = lane(value(run.totals.energy(z, false)), 0);
     z.q.swap(z.q1), z.p.swap(z.p1);
     const double share = within ? 1.0 : 0.0;
-    values[SAMPLE_DISSIPATED] = lane(run.totals.sum[DISSIPATED], 0) + share * lane(value(z.dissipated), 0);
+    values[SAMPLE_DISSIPATED] = lane(value(run.totals.sum[DISSIPATED]), 0) + share * lane(value(z.dissipated), 0);
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         double *own = values + OF_SAMPLE + CHANNEL_SAMPLE * j;

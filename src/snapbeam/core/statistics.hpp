@@ -34,11 +34,13 @@ template <class L> struct Totals {
     bool shared;               // it is that of the first contact
     Number rest;
     Observed<L> point, center;
-    Real sum[snapbeam::STATISTICS];
+    Number sum[snapbeam::STATISTICS];
     Real late, decide_energy, decide_reach, decide_crossings;
     Held<Plain, CELLS> swing_u, swing_v;  // weights of squared amplitudes, whose sums bound the errors of the cubics in a flight step
-    Real modal_energy, high_energy, most_u, most_v;  // energies and those sums, where they were evaluated last
-    Real length;               // of the last step, s
+    Number modal_energy, high_energy;  // and those sums, where they were evaluated last
+    Real most_u, most_v;
+    Number length;             // of the last step, s
+    Number later;              // of the beginning of the last quarter, s: 0, and derivatives where it moves
 
     void lay_out(const Structure<L> &structure, const Runs<L> &, Arena &arena) {
         s = &structure;
@@ -48,14 +50,14 @@ template <class L> struct Totals {
         shared = of_contact;
         for (int i = 0; i < s->cells; ++i) row[i] = Cell(0.0), swing_u[i] = swing_v[i] = Plain(0.0);
         rest = point.u = point.v = center.u = center.v = Number(0.0);
-        for (Real &x : sum) x = Real(0.0);
+        for (Number &x : sum) x = Number(0.0);
         late = decide_energy = decide_reach = decide_crossings = Real(0.0);
-        modal_energy = high_energy = most_u = most_v = length = Real(0.0);
+        modal_energy = high_energy = length = later = Number(0.0), most_u = most_v = Real(0.0);
     }
     template <class F> void visit(F number) {
         number(point.u), number(point.v), number(center.u), number(center.v);
         number(modal_energy), number(high_energy), number(most_u), number(most_v), number(length);
-        for (Real &x : sum) number(x);
+        for (Number &x : sum) number(x);
     }
     void load(const Batch &batch, int i, int l, const double *observed, double at_rest) {
         using namespace snapbeam;
@@ -72,7 +74,7 @@ template <class L> struct Totals {
         set_lane(rest, l, at_rest), set_lane(late, l, run[LAST_QUARTER]);
         set_lane(decide_energy, l, run[DECIDE_ENERGY]), set_lane(decide_reach, l, run[DECIDE_REACH]);
         set_lane(decide_crossings, l, run[DECIDE_CROSSINGS]);
-        for (Real &x : sum) set_lane(x, l, 0.0);
+        for (Number &x : sum) set_lane(x, l, 0.0);
         set_lane(length, l, 0.0);
         set_lane(sum[LAST_CROSSING], l, NAN), set_lane(sum[EARLY_STOP_TIME], l, NAN);
     }
@@ -80,22 +82,22 @@ template <class L> struct Totals {
     SNAPBEAM_FN Number center_height(const Runs<L> &z, const Cell *q) const {
         return fma(z.sign, Number(s->problem->center_rest), dot<L>(s->center, q, s->size()));
     }
-    SNAPBEAM_SELDOM void start(Runs<L> &z, Marks which, Real energy_now) {
+    SNAPBEAM_SELDOM void start(Runs<L> &z, Marks which, Number energy_now) {
         using namespace snapbeam;
         const int n = s->size();
         assign(which, point.u, height(z, z.q)), assign(which, point.v, dot<L>(row, z.p, n));
         assign(which, center.u, center_height(z, z.q)), assign(which, center.v, dot<L>(s->center, z.p, n));
-        assign(which, sum[MIN_DISPLACEMENT], Real(value(point.u))), assign(which, sum[MAX_DISPLACEMENT], Real(value(point.u)));
-        assign(which, sum[MIN_CENTER], Real(value(center.u))), assign(which, sum[MAX_CENTER], Real(value(center.u)));
-        assign(which, sum[PEAK_VELOCITY], abs(value(point.v))), assign(which, sum[PEAK_CENTER_VELOCITY], abs(value(center.v)));
+        assign(which, sum[MIN_DISPLACEMENT], point.u), assign(which, sum[MAX_DISPLACEMENT], point.u);
+        assign(which, sum[MIN_CENTER], center.u), assign(which, sum[MAX_CENTER], center.u);
+        assign(which, sum[PEAK_VELOCITY], abs(point.v)), assign(which, sum[PEAK_CENTER_VELOCITY], abs(center.v));
         const Real from = value(center.u) - Real(s->problem->dividing_height);
-        assign(which, sum[SIDE], select(from > Real(0.0), Real(1.0), Real(-1.0)));
+        assign(which, sum[SIDE], select(from > Real(0.0), Number(1.0), Number(-1.0)));
         assign(which, sum[FIRST_ENERGY], energy_now);
         enter_well(z, which);
     }
 
     // Energy of the state q, p; with what contacts store, or of the beam alone, without its strikers and local forces.
-    SNAPBEAM_SELDOM Real energy(Runs<L> &z, bool contacts, bool beam = false) {
+    SNAPBEAM_SELDOM Number energy(Runs<L> &z, bool contacts, bool beam = false) {
         const int n = s->size();
         Cell sum_of = Cell(0.0);
         SNAPBEAM_LOOP
@@ -116,13 +118,13 @@ template <class L> struct Totals {
             const Number stored = with_law(c.law, [&](auto law) { return law.potential(x, c.numbers()); });
             all += c.contact ? select(acting(c), stored, Number(0.0)) : stored;
         }
-        return value(all);
+        return all;
     }
 
     // The well on whose side the centre is, as z.sign: until the next step begins, q may still be about the other one.
     SNAPBEAM_FN Real well(const Runs<L> &z) const {
         const Real first = Real(s->problem->center_rest > s->problem->dividing_height ? 1.0 : -1.0);
-        return s->problem->shift ? first * sum[snapbeam::SIDE] : z.sign;
+        return s->problem->shift ? first * value(sum[snapbeam::SIDE]) : z.sign;
     }
     // A well in mode i, as q.
     SNAPBEAM_FN Plain origin(const Runs<L> &z, Real well, int i) const {
@@ -131,153 +133,149 @@ template <class L> struct Totals {
     }
     // Energies of the modes of the beam about the nearest well and of the high ones, and the sums that bound the errors of the cubics:
     // by the inequality of Cauchy and Schwarz (sum_i c_i A_i)^2 <= N sum_i c_i^2 A_i^2.
-    SNAPBEAM_SELDOM void modal(const Runs<L> &z, Real *found) {
-        Plain whole = Plain(0.0), high = Plain(0.0), u = Plain(0.0), v = Plain(0.0);
+    SNAPBEAM_SELDOM void modal(const Runs<L> &z, Number *found, Real *most) {
+        Cell whole = Cell(0.0), high = Cell(0.0);
+        Plain u = Plain(0.0), v = Plain(0.0);
         const Real near = well(z);
         const bool apart = s->problem->second || any(differ(near, z.sign));
         SNAPBEAM_LOOP
         for (int i = 0; i < s->size(); ++i) {
-            const Plain p = value(z.p[i]), oq = s->omega[i] * value(z.q[i]), square = fma(p, p, oq * oq);
-            u = fma(swing_u[i], square, u), v = fma(swing_v[i], square, v);
+            const Cell p = z.p[i], oq = s->omega[i] * z.q[i], square = fma(p, p, oq * oq);
+            u = fma(swing_u[i], value(square), u), v = fma(swing_v[i], value(square), v);
             if (!s->problem->high) continue;
-            Plain own = square;
+            Cell own = square;
             if (apart) {
-                const Plain from = s->omega[i] * (value(z.q[i]) - origin(z, near, i));
+                const Cell from = s->omega[i] * (z.q[i] - Cell(origin(z, near, i)));
                 own = fma(p, p, from * from);
             }
-            own = Plain(s->beam[i]) * own;
-            whole += own, high = fma(Plain(s->high[i]), own, high);
+            own = Cell(s->beam[i]) * own;
+            whole += own, high = fma(Cell(s->high[i]), own, high);
         }
-        L::totals(whole, high, found[0], found[1]), L::totals(u, v, found[2], found[3]);
-        found[0] = Real(0.5) * found[0], found[1] = Real(0.5) * found[1];
+        L::totals(whole, high, found[0], found[1]), L::totals(u, v, most[0], most[1]);
+        found[0] = Number(0.5) * found[0], found[1] = Number(0.5) * found[1];
     }
     // A step in which the centre is on the other side from a fraction of it *until* another: the energies there are about the other
     // well.  Their difference -sum_i omega_i^2 (b_i - a_i) (q_i - (a_i + b_i)/2), of a well b to a well a, is linear in q, and a cubic
     // in time.  From a step that ends on the other side (*once*) the rule of trapezoids gets the energy about the first well at its
     // end, and its correction h^2/12 by the rates there, which does not cancel where the wells change.
-    SNAPBEAM_SELDOM void change_well(const Runs<L> &z, Marks found, Marks once, Real from, Real until) {
+    SNAPBEAM_SELDOM void change_well(const Runs<L> &z, Marks found, Marks once, Number from, Number until) {
         using namespace snapbeam;
-        const Real here = well(z), h = value(z.h);
-        Plain energy[4], high[4];  // at the beginning and its rate, at the end and its rate
-        for (int k = 0; k < 4; ++k) energy[k] = high[k] = Plain(0.0);
+        const Real here = well(z);
+        const Number h = z.h;
+        Cell energy[4], high[4];  // at the beginning and its rate, at the end and its rate
+        for (int k = 0; k < 4; ++k) energy[k] = high[k] = Cell(0.0);
         for (int i = 0; i < s->size(); ++i) {
             const Plain a = origin(z, here, i), b = origin(z, -here, i), middle = Plain(0.5) * (a + b);
             const Plain slope = Plain(s->beam[i]) * Plain(s->omega[i]) * Plain(s->omega[i]) * (a - b), high_slope = Plain(s->high[i]) * slope;
-            const Plain at[] = {value(z.q[i]) - middle, value(z.p[i]), value(z.q1[i]) - middle, value(z.p1[i])};
-            for (int k = 0; k < 4; ++k) energy[k] = fma(slope, at[k], energy[k]), high[k] = fma(high_slope, at[k], high[k]);
+            const Cell at[] = {z.q[i] - Cell(middle), z.p[i], z.q1[i] - Cell(middle), z.p1[i]};
+            for (int k = 0; k < 4; ++k) energy[k] = fma(Cell(slope), at[k], energy[k]), high[k] = fma(Cell(high_slope), at[k], high[k]);
         }
-        Real e[4], high_e[4];
+        Number e[4], high_e[4];
         for (int k = 0; k < 4; ++k) L::totals(energy[k], high[k], e[k], high_e[k]);
-        sum[ENERGY_TIME] += select(found, of_other_well(e, once, from, until, h), Real(0.0));
-        sum[HIGH_ENERGY_TIME] += select(found, of_other_well(high_e, once, from, until, h), Real(0.0));
+        sum[ENERGY_TIME] += select(found, of_other_well(e, once, from, until, h), Number(0.0));
+        sum[HIGH_ENERGY_TIME] += select(found, of_other_well(high_e, once, from, until, h), Number(0.0));
     }
-    SNAPBEAM_FN static Real of_other_well(const Real *e, Marks once, Real from, Real until, Real h) {
-        const Cubic<Real> path(e[0], e[1], e[2], e[3], h);
-        const auto integral = [&](Real x) {
-            return x * fma(x, fma(x, fma(x, Real(0.25) * path.c3, Real(1.0 / 3.0) * path.c2), Real(0.5) * path.c1), path.c0);
+    SNAPBEAM_FN static Number of_other_well(const Number *e, Marks once, Number from, Number until, Number h) {
+        const Cubic<Number> path(e[0], e[1], e[2], e[3], h);
+        const auto integral = [&](Number x) {
+            return x * fma(x, fma(x, fma(x, Number(0.25) * path.c3, Number(1.0 / 3.0) * path.c2), Number(0.5) * path.c1), path.c0);
         };
-        return h * (integral(until) - integral(from) + select(once, Real(1.0 / 12.0) * h * e[3] - Real(0.5) * e[2], Real(0.0)));
+        return h * (integral(until) - integral(from) + select(once, Number(1.0 / 12.0) * h * e[3] - Number(0.5) * e[2], Number(0.0)));
     }
     SNAPBEAM_SELDOM void enter_well(const Runs<L> &z, Marks which) {
-        Real now[4];
-        modal(z, now);
-        assign(which, modal_energy, now[0]), assign(which, high_energy, now[1]), assign(which, most_u, now[2]), assign(which, most_v, now[3]);
+        Number now[2];
+        Real most[2];
+        modal(z, now, most);
+        assign(which, modal_energy, now[0]), assign(which, high_energy, now[1]), assign(which, most_u, most[0]), assign(which, most_v, most[1]);
     }
     // By the rule of trapezoids with its correction h^2/12 (E_0' - E_1'), which cancels between steps of equal length.
-    SNAPBEAM_SELDOM void correct(const Runs<L> &z, Marks which, Real h, bool last) {
+    SNAPBEAM_SELDOM void correct(const Runs<L> &z, Marks which, Number h, bool last) {
         using namespace snapbeam;
-        Plain whole = Plain(0.0), high = Plain(0.0);
+        Cell whole = Cell(0.0), high = Cell(0.0);
         const Real near = well(z);
         for (int i = 0; i < s->size(); ++i) {
-            const Plain p = value(z.p[i]), omega = Plain(s->omega[i]);
-            Plain own = value(z.k[i]) - Plain(2.0) * Plain(s->sigma[i]) * p - omega * omega * origin(z, near, i);
+            const Plain omega = Plain(s->omega[i]);
+            const Cell p = z.p[i];
+            Cell own = z.k[i] - Cell(2.0) * Cell(s->sigma[i]) * p - Cell(omega * omega * origin(z, near, i));
             for (int j = 0; j < z.channels; ++j) {
                 const Channel<L> &c = z.channel[j];
-                if (c.active && c.law != AXIAL_LOAD) own = fma(Plain(value(last ? c.f : c.first_f)), value(c.row[i]), own);
+                if (c.active && c.law != AXIAL_LOAD) own = fma(Cell(last ? c.f : c.first_f), c.row[i], own);
             }
-            own = Plain(s->beam[i]) * own * p;
-            whole += own, high = fma(Plain(s->high[i]), own, high);
+            own = Cell(s->beam[i]) * own * p;
+            whole += own, high = fma(Cell(s->high[i]), own, high);
         }
-        Real rate, high_rate;
+        Number rate, high_rate;
         L::totals(whole, high, rate, high_rate);
-        const Real weight = select(which, Real(1.0 / 12.0) * (h * h - length * length), Real(0.0));
+        const Number weight = select(which, Number(1.0 / 12.0) * (h * h - length * length), Number(0.0));
         sum[ENERGY_TIME] = fma(weight, rate, sum[ENERGY_TIME]), sum[HIGH_ENERGY_TIME] = fma(weight, high_rate, sum[HIGH_ENERGY_TIME]);
         length = select(which, h, length);
     }
-    void add_modes(const Runs<L> &z, Marks ok, Real h) {
+    void add_modes(const Runs<L> &z, Marks ok, Number h) {
         using namespace snapbeam;
-        Real now[4];
-        modal(z, now);
-        const Real half = select(ok, Real(0.5) * h, Real(0.0));
-        sum[ENERGY_TIME] = fma(half, modal_energy + now[0], sum[ENERGY_TIME]), sum[HIGH_ENERGY_TIME] = fma(half, high_energy + now[1], sum[HIGH_ENERGY_TIME]);
-        assign(ok, modal_energy, now[0]), assign(ok, high_energy, now[1]), assign(ok, most_u, now[2]), assign(ok, most_v, now[3]);
+        const Number half = select(ok, Number(0.5) * h, Number(0.0)), energy = modal_energy, high = high_energy;
+        enter_well(z, ok);
+        sum[ENERGY_TIME] = fma(half, energy + modal_energy, sum[ENERGY_TIME]), sum[HIGH_ENERGY_TIME] = fma(half, high + high_energy, sum[HIGH_ENERGY_TIME]);
     }
 
-    SNAPBEAM_FN void widen(Marks ok, snapbeam::Statistic low, snapbeam::Statistic high, Real u0, Real v0, Real u1, Real v1, Real h) {
-        const Cubic<Real> up(u0, v0, u1, v1, h), down(-u0, -v0, -u1, -v1, h);
+    SNAPBEAM_FN void widen(Marks ok, snapbeam::Statistic low, snapbeam::Statistic high, Number u0, Number v0, Number u1, Number v1, Number h) {
+        const Cubic<Number> up(u0, v0, u1, v1, h), down(-u0, -v0, -u1, -v1, h);
         assign(ok, sum[high], max(sum[high], crest(up, v0, v1)));
         assign(ok, sum[low], min(sum[low], -crest(down, -v0, -v1)));
     }
     // Largest speed on a cubic: at the ends, or where its slope has an extreme inside.
-    SNAPBEAM_FN Real fastest(Real u0, Real v0, Real u1, Real v1, Real h) {
-        const Cubic<Real> path(u0, v0, u1, v1, h);
-        const Real at = -path.c2 / (Real(3.0) * path.c3), inside = abs(path.slope(at)) / h;
-        return max(max(abs(v0), abs(v1)), select((at > Real(0.0)) & (at < Real(1.0)) & (h > Real(0.0)), inside, Real(0.0)));
+    SNAPBEAM_FN Number fastest(Number u0, Number v0, Number u1, Number v1, Number h) {
+        const Cubic<Number> path(u0, v0, u1, v1, h);
+        const Number at = -path.c2 / (Number(3.0) * path.c3), inside = abs(path.slope(at)) / h;
+        return max(max(abs(v0), abs(v1)), select((at > Number(0.0)) & (at < Number(1.0)) & (h > Number(0.0)), inside, Number(0.0)));
     }
 
     // Zero crossings of the centre, from values relative to the height that divides the wells.
-    SNAPBEAM_FN void count_crossings(const Runs<L> &z, Marks ok, Real c0, Real v0, Real c1, Real v1) {
+    SNAPBEAM_FN void count_crossings(const Runs<L> &z, Marks ok, Number c0, Number v0, Number c1, Number v1) {
         using namespace snapbeam;
-        const Real side = sum[SIDE], zero = Real(0.0), h = value(z.h);
+        const Number side = sum[SIDE], zero = Number(0.0), one = Number(1.0), h = z.h;
         const Marks once = ok & (side * c1 < zero);
         const Marks dips = ok & (!once) & (side * v0 < zero) & (side * v1 > zero);
         if (!any(once | dips)) return;
-        const Cubic<Real> away(-side * c0, -side * v0, -side * c1, -side * v1, h);
+        const Cubic<Number> away(-side * c0, -side * v0, -side * c1, -side * v1, h);
         const Marks twice = dips & (crest(away, -side * v0, -side * v1) > zero);
         const Marks found = once | twice;
         if (!any(found)) return;
-        const Cubic<Real> back(-side * c1, side * v1, -side * c0, side * v0, h);  // from the end: its last crossing is the first
-        const Real share = select(once, root(away, Real(1.0)), Real(1.0) - root(back, min(back.summit(), Real(1.0))));
-        const Real count = select(once, Real(1.0), Real(2.0)), when = fma(share, h, z.t * z.tick);
+        const Cubic<Number> back(-side * c1, side * v1, -side * c0, side * v0, h);  // from the end: its last crossing is the first
+        const Number share = select(once, root(away, one), one - root(back, min(back.summit(), one)));
+        const Number count = select(once, one, Number(2.0)), when = fma(share, h, Number(z.t * z.tick));
         sum[CROSSINGS] += select(found, count, zero);
-        sum[LATE_CROSSINGS] += select(found & (when > late * z.tick), count, zero);
+        sum[LATE_CROSSINGS] += select(found & (value(when) > late * z.tick), count, zero);
         assign(found, sum[LAST_CROSSING], when);
         if (s->problem->high && s->problem->shift)
-            change_well(z, found, once, select(once, share, root(away, min(away.summit(), Real(1.0)))), select(once, Real(1.0), share));
+            change_well(z, found, once, select(once, share, root(away, min(away.summit(), one))), select(once, one, share));
         assign(once, sum[SIDE], -side);
     }
 
     // The extremes of what is observed, followed inside the step.
-    SNAPBEAM_SELDOM void follow(const Runs<L> &z, Marks near, Plain *memory) {
+    SNAPBEAM_SELDOM void follow(const Runs<L> &z, Marks near, Cell *memory) {
         using namespace snapbeam;
-        Inside<L> inside;
+        Inside<L, Cell, Number> inside;
         inside.begin(z, memory);
         const int n = s->size();
-        Real u = value(point.u), v = value(point.v), a = inside.bend(*s, row), c = value(center.u), cv = value(center.v), ca = inside.bend(*s, s->center);
-        const Real point_rest = z.sign * value(rest), center_rest = z.sign * Real(s->problem->center_rest);
+        Number u = point.u, v = point.v, a = inside.bend(*s, row), c = center.u, cv = center.v, ca = inside.bend(*s, s->center);
+        const Number point_rest = z.sign * rest, center_rest = Number(z.sign * Real(s->problem->center_rest));
         for (;;) {
             const Marks within = near & (inside.share < inside.parts);
             if (!any(within)) break;
             inside.advance(*s);
-            const Real h = inside.part;
-            const Real u1 = point_rest + L::total(plain_dot(row, inside.q, n)), v1 = L::total(plain_dot(row, inside.p, n)), a1 = inside.bend(*s, row);
-            const Real c1 = center_rest + L::total(plain_dot(s->center, inside.q, n)), cv1 = L::total(plain_dot(s->center, inside.p, n)), ca1 = inside.bend(*s, s->center);
+            const Number h = inside.part;
+            const Number u1 = point_rest + dot<L>(row, inside.q, n), v1 = dot<L>(row, inside.p, n), a1 = inside.bend(*s, row);
+            const Number c1 = center_rest + dot<L>(s->center, inside.q, n), cv1 = dot<L>(s->center, inside.p, n), ca1 = inside.bend(*s, s->center);
             widen(within, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u, v, u1, v1, h), widen(within, MIN_CENTER, MAX_CENTER, c, cv, c1, cv1, h);
             speed_peak(within, PEAK_VELOCITY, v, a, v1, a1, h), speed_peak(within, PEAK_CENTER_VELOCITY, cv, ca, cv1, ca1, h);
             u = u1, v = v1, a = a1, c = c1, cv = cv1, ca = ca1;
         }
     }
-    template <class Row> static SNAPBEAM_FN Plain plain_dot(const Row &one, const Plain *other, int n) {
-        Plain x = Plain(value(one[0])) * other[0];
-        SNAPBEAM_LOOP
-        for (int i = 1; i < n; ++i) x = fma(Plain(value(one[i])), other[i], x);
-        return x;
-    }
-    static SNAPBEAM_CALLED Real speed_on(Real v0, Real a0, Real v1, Real a1, Real h) {
-        const Cubic<Real> up(v0, a0, v1, a1, h), down(-v0, -a0, -v1, -a1, h);
+    static SNAPBEAM_CALLED Number speed_on(Number v0, Number a0, Number v1, Number a1, Number h) {
+        const Cubic<Number> up(v0, a0, v1, a1, h), down(-v0, -a0, -v1, -a1, h);
         return max(crest(up, a0, a1), crest(down, -a0, -a1));
     }
-    SNAPBEAM_FN void speed_peak(Marks which, snapbeam::Statistic k, Real v0, Real a0, Real v1, Real a1, Real h) {
+    SNAPBEAM_FN void speed_peak(Marks which, snapbeam::Statistic k, Number v0, Number a0, Number v1, Number a1, Number h) {
         assign(which, sum[k], max(sum[k], speed_on(v0, a0, v1, a1, h)));
     }
 
@@ -303,11 +301,12 @@ template <class L> struct Totals {
         }
     }
 
-    SNAPBEAM_FN void add_step(Runs<L> &z, Marks ok, Plain *amplitude, Plain *memory) {
+    SNAPBEAM_FN Real so_far(snapbeam::Statistic k) const { return value(sum[k]); }
+    SNAPBEAM_FN void add_step(Runs<L> &z, Marks ok, Plain *amplitude, Cell *memory) {
         using namespace snapbeam;
         const int n = s->size();
-        const Real h = value(z.h), zero = Real(0.0);
-        sum[STEPS] += select(ok, Real(1.0), zero);
+        const Number h = z.h, zero = Number(0.0);
+        sum[STEPS] += select(ok, Number(1.0), zero);
         Number end_u, end_v;
         if (shared) {  // from its penetration
             const Channel<L> &c = z.channel[0];
@@ -316,32 +315,32 @@ template <class L> struct Totals {
             end_u = height(z, z.q1), end_v = dot<L>(row, z.p1, n);
         }
         const Number end_c = center_height(z, z.q1), end_cv = dot<L>(s->center, z.p1, n);
-        const Real u0 = value(point.u), v0 = value(point.v), u1 = value(end_u), v1 = value(end_v);
-        const Real c0 = value(center.u), cv0 = value(center.v), c1 = value(end_c), cv1 = value(end_cv);
-        const Real level = Real(s->problem->dividing_height);
+        const Number u0 = point.u, v0 = point.v, u1 = end_u, v1 = end_v, c0 = center.u, cv0 = center.v, c1 = end_c, cv1 = end_cv;
+        const Number level = Number(s->problem->dividing_height);
         const Marks changed = ok & differ(h, length);
         if (s->problem->high && any(changed)) correct(z, changed, h, false);
         count_crossings(z, ok, c0 - level, cv0, c1 - level, cv1);
         widen(ok, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u0, v0, u1, v1, h), widen(ok, MIN_CENTER, MAX_CENTER, c0, cv0, c1, cv1, h);
-        Real speed = fastest(u0, v0, u1, v1, h), center_speed = fastest(c0, cv0, c1, cv1, h);
+        Number speed = fastest(u0, v0, u1, v1, h), center_speed = fastest(c0, cv0, c1, cv1, h);
         const Real slack = Real(1e-5), wider = Real(1.05), bound_u = sqrt(most_u), bound_v = sqrt(most_v);
-        Marks near = ok & ((fma(wider, speed, bound_v) > sum[PEAK_VELOCITY]) | (fma(wider, center_speed, bound_v) > sum[PEAK_CENTER_VELOCITY]) |
-                           (max(u0, u1) + bound_u > sum[MAX_DISPLACEMENT]) | (min(u0, u1) - bound_u < sum[MIN_DISPLACEMENT]) |
-                           (max(c0, c1) + bound_u > sum[MAX_CENTER]) | (min(c0, c1) - bound_u < sum[MIN_CENTER]));
+        const Real high = value(max(u0, u1)), low = value(min(u0, u1)), center_high = value(max(c0, c1)), center_low = value(min(c0, c1));
+        Marks near = ok & ((fma(wider, value(speed), bound_v) > so_far(PEAK_VELOCITY)) | (fma(wider, value(center_speed), bound_v) > so_far(PEAK_CENTER_VELOCITY)) |
+                           (high + bound_u > so_far(MAX_DISPLACEMENT)) | (low - bound_u < so_far(MIN_DISPLACEMENT)) |
+                           (center_high + bound_u > so_far(MAX_CENTER)) | (center_low - bound_u < so_far(MIN_CENTER)));
         if (any(near)) {
             const Marks asked = near;
             Real doubt, speed_doubt, center_doubt, center_speed_doubt;
             doubts(z, amplitude, doubt, speed_doubt, center_doubt, center_speed_doubt);
-            const Marks higher = asked & ((fma(wider, speed, speed_doubt) > sum[PEAK_VELOCITY]) | (fma(wider, center_speed, center_speed_doubt) > sum[PEAK_CENTER_VELOCITY]));
+            const Marks higher = asked & ((fma(wider, value(speed), speed_doubt) > so_far(PEAK_VELOCITY)) | (fma(wider, value(center_speed), center_speed_doubt) > so_far(PEAK_CENTER_VELOCITY)));
             if (any(higher)) {  // with the accelerations at both ends the error of a speed is of fourth order
                 assign(higher, speed, speed_on(v0, bend_at(z, row, false), v1, bend_at(z, row, true), h));
                 assign(higher, center_speed, speed_on(cv0, bend_at(z, s->center, false), cv1, bend_at(z, s->center, true), h));
             }
-            const Real span = sum[MAX_DISPLACEMENT] - sum[MIN_DISPLACEMENT], center_span = sum[MAX_CENTER] - sum[MIN_CENTER];
-            near = (speed + speed_doubt > sum[PEAK_VELOCITY]) & (speed_doubt > slack * sum[PEAK_VELOCITY]);
-            near = near | ((center_speed + center_speed_doubt > sum[PEAK_CENTER_VELOCITY]) & (center_speed_doubt > slack * sum[PEAK_CENTER_VELOCITY]));
-            near = near | ((doubt > slack * span) & ((max(u0, u1) + doubt > sum[MAX_DISPLACEMENT]) | (min(u0, u1) - doubt < sum[MIN_DISPLACEMENT])));
-            near = near | ((center_doubt > slack * center_span) & ((max(c0, c1) + center_doubt > sum[MAX_CENTER]) | (min(c0, c1) - center_doubt < sum[MIN_CENTER])));
+            const Real span = so_far(MAX_DISPLACEMENT) - so_far(MIN_DISPLACEMENT), center_span = so_far(MAX_CENTER) - so_far(MIN_CENTER);
+            near = (value(speed) + speed_doubt > so_far(PEAK_VELOCITY)) & (speed_doubt > slack * so_far(PEAK_VELOCITY));
+            near = near | ((value(center_speed) + center_speed_doubt > so_far(PEAK_CENTER_VELOCITY)) & (center_speed_doubt > slack * so_far(PEAK_CENTER_VELOCITY)));
+            near = near | ((doubt > slack * span) & ((high + doubt > so_far(MAX_DISPLACEMENT)) | (low - doubt < so_far(MIN_DISPLACEMENT))));
+            near = near | ((center_doubt > slack * center_span) & ((center_high + center_doubt > so_far(MAX_CENTER)) | (center_low - center_doubt < so_far(MIN_CENTER))));
             near = near & asked;
         }
         assign(ok & (!near), sum[PEAK_VELOCITY], max(sum[PEAK_VELOCITY], speed));
@@ -354,16 +353,16 @@ template <class L> struct Totals {
         sum[SQUARE_DISPLACEMENT] += select(ok, square(u0, v0, u1, v1, h), zero), sum[SQUARE_CENTER] += select(ok, square(c0, cv0, c1, cv1, h), zero);
         sum[SQUARE_VELOCITY] += select(ok, square_of_rate(u0, v0, u1, v1, h), zero);
         sum[SQUARE_CENTER_VELOCITY] += select(ok, square_of_rate(c0, cv0, c1, cv1, h), zero);
-        if (z.account) sum[DISSIPATED] += select(ok, value(z.dissipated), zero);
+        if (z.account) sum[DISSIPATED] += select(ok, z.dissipated, zero);
         for (int j = 0; j < z.channels; ++j) add_channel(z, z.channel[j], ok);
         assign(ok, point.u, end_u), assign(ok, point.v, end_v), assign(ok, center.u, end_c), assign(ok, center.v, end_cv);
     }
-    SNAPBEAM_FN static Real square(Real u0, Real v0, Real u1, Real v1, Real h) {
-        return fma(Real(0.5) * h, fma(u0, u0, u1 * u1), h * h * Real(1.0 / 6.0) * (u0 * v0 - u1 * v1));
+    SNAPBEAM_FN static Number square(Number u0, Number v0, Number u1, Number v1, Number h) {
+        return fma(Number(0.5) * h, fma(u0, u0, u1 * u1), h * h * Number(1.0 / 6.0) * (u0 * v0 - u1 * v1));
     }
-    SNAPBEAM_FN static Real square_of_rate(Real u0, Real v0, Real u1, Real v1, Real h) {
-        const Real mean = select(h > Real(0.0), (u1 - u0) / h, Real(0.0)), a = Real(0.5) * (v1 - v0), b = Real(0.5) * (v0 + v1) - mean;
-        return h * fma(mean, mean, fma(Real(1.0 / 3.0) * a, a, Real(0.6) * b * b));
+    SNAPBEAM_FN static Number square_of_rate(Number u0, Number v0, Number u1, Number v1, Number h) {
+        const Number mean = select(h > Number(0.0), (u1 - u0) / h, Number(0.0)), a = Number(0.5) * (v1 - v0), b = Number(0.5) * (v0 + v1) - mean;
+        return h * fma(mean, mean, fma(Number(1.0 / 3.0) * a, a, Number(0.6) * b * b));
     }
     // Errors of the cubics over a step of h, by the amplitude of a mode.
     template <class T> static SNAPBEAM_FN void doubts_of_mode(T h, T omega, T &of_u, T &of_v) {
@@ -402,21 +401,81 @@ template <class L> struct Totals {
         }
         c.sums[WORK] += select(acts, c.work, zero), c.sums[GROSS_WORK] += select(acts, abs(c.work), zero), c.sums[LOST] += select(acts, c.lost, zero);
         if (!c.harvests) return;
-        const Real ends = z.t + z.ticks, after = min(max((ends - late) / max(z.ticks, Real(1.0)), Real(0.0)), Real(1.0));
-        c.sums[LATE_LOST] += select(acts, Number(after) * c.lost, zero);
+        c.sums[LATE_LOST] += select(acts, late_share(z) * c.lost, zero);
         Number most;
         if (c.circuit) {
             const Number before = c.P[c.state];
             const Cubic<Number> up(before, c.r0, c.z, c.r1, z.h), down(-before, -c.r0, -c.z, -c.r1, z.h);
             most = max(max(abs(before), abs(c.z)), select(c.follows, zero, max(crest(up, c.r0, c.r1), crest(down, -c.r0, -c.r1))));
         } else {  // in proportion to a velocity
-            const Real v0 = value(dot<L>(c.row, z.p, s->size())), v1 = value(dot<L>(c.row, z.p1, s->size()));
-            Real speed = max(abs(v0), abs(v1));
-            const Marks higher = acts & (Real(1.3) * speed * value(c.P[0]) > value(c.sums[PEAK_FORCE]));
-            if (any(higher)) assign(higher, speed, speed_on(v0, bend_at(z, c.row, false), v1, bend_at(z, c.row, true), value(z.h)));
-            most = c.P[0] * Number(speed);
+            const Number v0 = dot<L>(c.row, z.p, s->size()), v1 = dot<L>(c.row, z.p1, s->size());
+            Number speed = max(abs(v0), abs(v1));
+            const Marks higher = acts & (Real(1.3) * value(speed) * value(c.P[0]) > value(c.sums[PEAK_FORCE]));
+            if (any(higher)) assign(higher, speed, speed_on(v0, bend_at(z, c.row, false), v1, bend_at(z, c.row, true), z.h));
+            most = c.P[0] * speed;
         }
         assign(acts, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], most));
+    }
+
+    // Part of the step in the last quarter of the run.
+    SNAPBEAM_FN Number late_share(const Runs<L> &z) const {
+        const Real raw = (z.t + z.ticks - late) / max(z.ticks, Real(1.0)), after = min(max(raw, Real(0.0)), Real(1.0));
+        if constexpr (L::directions > 0)
+            if (raw > 0.0 && raw <= 1.0) return Number(after) + (z.drift - later) / Number(value(z.h)) - Number(after) * (z.h / Number(value(z.h)) - Number(1.0));
+        return Number(after);
+    }
+
+    // The sums become those of a time so much later, at the state in q, p; extremes that are taken there go along.
+    void move_in_time(Runs<L> &z, Number by) requires(L::directions > 0) {
+        using namespace snapbeam;
+        const int n = s->size();
+        const Number u = Number(value(point.u)), v = Number(value(point.v)), c = Number(value(center.u)), cv = Number(value(center.v));
+        sum[SQUARE_DISPLACEMENT] += u * u * by, sum[SQUARE_VELOCITY] += v * v * by;
+        sum[SQUARE_CENTER] += c * c * by, sum[SQUARE_CENTER_VELOCITY] += cv * cv * by;
+        sum[ENERGY_TIME] += Number(value(modal_energy)) * by, sum[HIGH_ENERGY_TIME] += Number(value(high_energy)) * by;
+        for (int i = 0; i < n && z.account; ++i) sum[DISSIPATED] += Number(2.0 * s->sigma[i] * z.p[i].v * z.p[i].v) * by;
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &one = z.channel[j];
+            if (one.contact && !one.closed) continue;
+            const Number f = Number(value(one.law == AXIAL_LOAD ? signal_of(z, one) : force_of(z, one, z.q, z.p)));
+            Number y = dot<L>(one.row, z.p, n), work = Number(0.0), lost = Number(0.0);
+            if (one.contact) {
+                y = signal_slope(z, one) - y, work = f * signal_slope(z, one);
+                if (one.lossy && !one.impulsive) lost = (f - force_at(one, penetration(z, one, z.q), Number(0.0))) * y;
+                one.own_impulse += f * by;
+            } else if (one.timed) {
+                if (one.law == AXIAL_LOAD) tension(z, z.q, dot_cells<L>(s->g, z.q, n)), y = fma(z.sign, dot<L>(s->g, z.p, n), dot<L>(z.r, z.p, n));
+                work = f * y;
+            } else if (one.circuit) {
+                lost = one.P[0] * f * f;
+            } else if (one.lossy) {
+                lost = power_lost(one, along(z, one, z.q), y, f, f);
+            }
+            one.sums[WORK] += Number(value(work)) * by, one.sums[GROSS_WORK] += Number(abs(value(work))) * by, one.sums[LOST] += Number(value(lost)) * by;
+            if (one.harvests && !(z.t < late)) one.sums[LATE_LOST] += Number(value(lost)) * by;
+        }
+    }
+    // After the state has moved: what is observed, and at the end of the run what is largest there.
+    void look_again(Runs<L> &z, bool at_end) requires(L::directions > 0) {
+        using namespace snapbeam;
+        const auto follow = [&](Number &to, Number moved) { to.d = moved.d; };
+        const auto end = [&](Statistic k, Number x) { if (at_end && sum[k].v == x.v) sum[k].d = x.d; };
+        follow(point.u, height(z, z.q)), follow(point.v, dot<L>(row, z.p, s->size()));
+        follow(center.u, center_height(z, z.q)), follow(center.v, dot<L>(s->center, z.p, s->size()));
+        end(MIN_DISPLACEMENT, point.u), end(MAX_DISPLACEMENT, point.u), end(MIN_CENTER, center.u), end(MAX_CENTER, center.u);
+        end(PEAK_VELOCITY, abs(point.v)), end(PEAK_CENTER_VELOCITY, abs(center.v));
+        for (int j = 0; j < z.channels; ++j) {
+            Channel<L> &c = z.channel[j];
+            if (!c.contact) continue;
+            follow(c.d0, penetration(z, c, z.q)), follow(c.r0, signal_slope(z, c) - dot<L>(c.row, z.p, s->size()));
+            c.d1.d = c.d0.d, c.r1.d = c.r0.d;
+            if (!at_end || !c.closed || c.impulsive) continue;
+            if (c.deepest.v == c.d0.v) c.deepest.d = c.d0.d;
+            if (!c.lossy) continue;
+            const Number f = force_at(c, max(c.d0, Number(0.0)), c.r0);
+            if (c.hardest.v == f.v) c.hardest.d = f.d;
+        }
+        enter_well(z, true);
     }
 
     // Largest penetration and force of a contact so far.
@@ -442,7 +501,7 @@ template <class L> struct Totals {
 
     // Largest penetration in a step in which it turns: where the rate, a cubic by its values and slopes, is zero.
     SNAPBEAM_SELDOM Number summit(const Runs<L> &z, const Channel<L> &c) {
-        Number a0 = Number(-bend_at(z, c.row, false)), a1 = signal_bend(z, c) - Number(bend_at(z, c.row, true));
+        Number a0 = -bend_at(z, c.row, false), a1 = signal_bend(z, c) - bend_at(z, c.row, true);
         SNAPBEAM_LOOP
         for (int i = 0; i < c.uses; ++i) a0 = fma(Number(c.factor[i]), z.signal[c.signal[i]].acceleration_at_begin(), a0);
         const Cubic<Number> fall(-c.r0, -a0, -c.r1, -a1, z.h);
@@ -454,20 +513,20 @@ template <class L> struct Totals {
     // Runs whose class is certain: too many crossings in the last quarter, or too little energy to leave the other well.
     SNAPBEAM_FN Marks decided(Runs<L> &z) {
         using namespace snapbeam;
-        Marks found = (decide_crossings >= Real(0.0)) & (sum[LATE_CROSSINGS] > decide_crossings);
-        const Real steps = sum[STEPS], sixteenth = nearest(steps * Real(1.0 / 16.0)) * Real(16.0);
+        Marks found = (decide_crossings >= Real(0.0)) & (so_far(LATE_CROSSINGS) > decide_crossings);
+        const Real steps = so_far(STEPS), sixteenth = nearest(steps * Real(1.0 / 16.0)) * Real(16.0);
         Marks asks = (decide_energy > Real(-1e300)) & (z.sign < Real(0.0)) & (!differ(steps, sixteenth));
         asks = asks & (value(point.u) > decide_reach) & (value(center.u) > Real(s->problem->dividing_height));
         for (int j = 0; j < z.channels; ++j)
             if (z.channel[j].contact) asks = asks & (!z.channel[j].closed);
-        if (any(asks)) found = found | (asks & (energy(z, false) < decide_energy));
+        if (any(asks)) found = found | (asks & (value(energy(z, false)) < decide_energy));
         return found;
     }
     SNAPBEAM_SELDOM void finish(Runs<L> &z, Marks which) {
         using namespace snapbeam;
-        if (s->problem->high) correct(z, which, Real(0.0), true);
+        if (s->problem->high) correct(z, which, Number(0.0), true);
         assign(which, sum[ENERGY], energy(z, true));
-        assign(which, sum[DISPLACEMENT], Real(value(point.u))), assign(which, sum[CENTER], Real(value(center.u)));
+        assign(which, sum[DISPLACEMENT], point.u), assign(which, sum[CENTER], center.u);
     }
 };
 

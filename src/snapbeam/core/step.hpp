@@ -66,6 +66,7 @@ template <class L> struct Channel {
     Number tip, tip_slope;       // of a contact, its signals at the end of the step
     typename L::Marks closed, pressing;  // pressing: of one with memory, beyond its yield and deeper ever
     Real onset, safe;            // tick of the onset; time until which the contact cannot close, ticks
+    Number begun;                // of the onset the derivatives, s
     // increments of the step, and sums of the run
     Number impulse, work, lost;
     Number own_impulse, deepest, hardest;
@@ -441,6 +442,12 @@ template <class L> SNAPBEAM_FN typename L::Marks follows(const Channel<L> &c, in
     return (value(decay) > typename L::Real(FOLLOWS)) & (value(c.along_M[j]) < typename L::Real(0.5) * value(c.P[0]));
 }
 
+// The end of a flow that lasts longer; the values are those without.
+template <class Cell> SNAPBEAM_FN void lengthen(Cell &q, Cell &p, Cell longer, double omega, double sigma) {
+    const double rate = -omega * omega * q.v - 2.0 * sigma * p.v;
+    q += Cell(p.v) * longer, p += Cell(rate) * longer;
+}
+
 // A flow after the kick by the tension, of the modes (MODES) and with them of some circuits.
 template <class L> struct Flow {
     typedef typename L::Cell Cell;
@@ -462,8 +469,8 @@ template <class L> struct Flow {
             const Cell q = from_q[i], p = first ? fma(weight, from_k[i], from_p[i]) : fma(by_g, s.g[i], fma(by_r, z.r[i], from_p[i]));
             Cell dq = fma(a[0], q, a[1] * p), dp = fma(a[3], p, a[2] * q), q1 = q + dq, p1 = p + dp;
             if constexpr (L::directions > 0) {  // of a flow that lasts longer
-                const Cell more_q = Cell(p1.v) * longer, more_p = Cell(-s.omega[i] * s.omega[i] * q1.v - 2.0 * s.sigma[i] * p1.v) * longer;
-                dq += more_q, dp += more_p, q1 += more_q, p1 += more_p;
+                lengthen(q1, p1, longer, s.omega[i], s.sigma[i]);
+                dq = q1 - q, dp = p1 - p;
             }
             for (int k = 0; k < CIRCUITS; ++k) {
                 const Cell by_q = circuit[k]->along_q[i], by_p = circuit[k]->along_p[i];

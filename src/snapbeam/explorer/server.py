@@ -28,6 +28,8 @@ from snapbeam.explorer.shared import Shared
 _LOG = logging.getLogger("snapbeam.explorer")
 _ICON = "/favicon.ico"
 _PORT, _PORTS = 8760, 20
+UNUSED, CHECKED = 15_000, 5_000
+"""Time after which a session without a browser ends, and between two looks at it, ms."""
 """The port by default, and how many are tried."""
 _COOKIE = "snapbeam_token"
 _TEMPLATE = """
@@ -137,7 +139,8 @@ class Gate(Router):
         if not (self._in_address(request) or self._in_cookie(request)):
             return 403, "this page needs its token; open the address that snapbeam explore printed"
         if request.path != f"{self._prefix}/ws" and self._shared.pages >= SESSIONS:
-            return 503, f"{SESSIONS} pages are open, which is the limit; close one of them, and wait 20 s"
+            wait = (UNUSED + CHECKED) // 1000
+            return 503, f"{SESSIONS} pages are open, which is the limit; close one of them, and wait {wait} s"
         return None
 
     def _in_address(self, request: HTTPServerRequest) -> bool:
@@ -236,8 +239,8 @@ def make_server(
         server = pn.io.server.get_server(
             {"/": _factory(shared)}, port=taken, address=address, websocket_origin=list(hosts), show=False,
             start=False, title="snapbeam explorer", prefix=prefix, websocket_max_message_size=BODY,
-            http_server_kwargs={"max_body_size": BODY}, check_unused_sessions_milliseconds=5000,
-            unused_session_lifetime_milliseconds=15000,
+            http_server_kwargs={"max_body_size": BODY}, check_unused_sessions_milliseconds=CHECKED,
+            unused_session_lifetime_milliseconds=UNUSED,
         )  # fmt: skip
     except OSError as error:
         raise InputError(f"port = {port}: cannot be used, {error.strerror or error}") from None

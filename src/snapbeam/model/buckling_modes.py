@@ -8,11 +8,16 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.equilibria import landscape_of
-from snapbeam.model.matrix_pairs import eigenpairs, fixed_coordinates, is_positive_definite, symmetric
+from snapbeam.model.matrix_pairs import (
+    eigenpairs,
+    fixed_coordinates,
+    is_positive_definite,
+    is_sparse,
+    symmetric,
+)
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import InputError, finite_array, integer, nonnegative, positive, shown, within
@@ -468,7 +473,7 @@ def _pair(given: StructureMatrices) -> tuple[Any, Any]:
         _require_shape("stiffness", stiffness, (count, count), "as large as the mass matrix")
     else:
         _require_shape("stiffness", stiffness, (count,), "a diagonal (N,) or a matrix (N, N)")
-    sparse = sp.issparse(mass) and sp.issparse(stiffness)
+    sparse = is_sparse(mass) and is_sparse(stiffness)
     if count >= _MINUTE and sparse and given.modes is None:
         raise InputError(
             f"mass of shape {mass.shape}: sparse matrices of {_MINUTE} coordinates or more need modes, the number of lowest "
@@ -493,21 +498,23 @@ def _pair(given: StructureMatrices) -> tuple[Any, Any]:
 
 def _matrix(name: str, value: Any) -> Any:
     """A finite array, or a sparse one by rows."""
-    if not sp.issparse(value):
+    if not is_sparse(value):
         return finite_array(name, value)
-    matrix = sp.csr_array(value)
-    return sp.csr_array((finite_array(name, matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+    from scipy.sparse import csr_array
+
+    matrix = csr_array(value)
+    return csr_array((finite_array(name, matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _dense(matrix: Any) -> Any:
     """A sparse matrix of SciPy as an array; anything else as it is."""
-    return matrix.toarray() if sp.issparse(matrix) else matrix
+    return matrix.toarray() if is_sparse(matrix) else matrix
 
 
 def _require_mass(mass: Any) -> None:
     if is_positive_definite(mass):
         return
-    lowest = "" if sp.issparse(mass) else f", but its lowest eigenvalue is {np.linalg.eigvalsh(mass)[0]:g}"
+    lowest = "" if is_sparse(mass) else f", but its lowest eigenvalue is {np.linalg.eigvalsh(mass)[0]:g}"
     raise InputError(
         f"mass: must be positive definite{lowest}; leave out fixed coordinates, and condense those without mass"
     )
@@ -544,7 +551,12 @@ def _release(rows: dict[str, _Array | None], fixed: NDArray[np.bool_], mass: Any
         free = np.flatnonzero(~fixed)
         across = mass[free][:, np.flatnonzero(fixed)] @ base[fixed]
         own = mass[free][:, free]
-        solved = sp.linalg.spsolve(own.tocsc(), across) if sp.issparse(own) else np.linalg.solve(own, across)
+        if is_sparse(own):
+            from scipy.sparse.linalg import spsolve
+
+            solved = spsolve(own.tocsc(), across)
+        else:
+            solved = np.linalg.solve(own, across)
         rows["base_shape"] = base[free] + solved
 
 

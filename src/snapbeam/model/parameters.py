@@ -183,13 +183,17 @@ def _of_class(section: str, kind: type) -> Iterable[Parameter]:
         yield Parameter(f"{section}.{name}", item.short or name, item, None if default is _NONE else default)
 
 
+_REGISTERED: tuple[Mapping[str, type], ...] = (LAWS, DRIVES, LOADS, FORCES, LOCAL_FORCES, HARVESTERS)
+
+
 def parameters() -> dict[str, Parameter]:
     """Every parameter by its dotted name, those of registered laws and drives included."""
-    return dict(
-        _table(
-            tuple(tuple(known.items()) for known in (LAWS, DRIVES, LOADS, FORCES, LOCAL_FORCES, HARVESTERS))
-        )
-    )
+    return dict(_known())
+
+
+def _known() -> dict[str, Parameter]:
+    """The table of :func:`parameters`, which nobody may change."""
+    return _table(tuple(tuple(known.items()) for known in _REGISTERED))
 
 
 @lru_cache(maxsize=4)
@@ -210,7 +214,7 @@ _OF_TERM = re.compile(r"(.+)_([1-4])")
 
 def row_of(name: str) -> Parameter | None:
     """The row of a dotted name, of a second contact or force too (``contact.2.gap``); None if there is none."""
-    table, (section, field) = parameters(), split_name(name)
+    table, (section, field) = _known(), split_name(name)
     kind, number = numbered(section)
     row = table.get(f"{kind}.{field}")
     found = _OF_TERM.fullmatch(field)
@@ -245,7 +249,7 @@ def _by_short(name: str, shorts: Mapping[str, str]) -> Parameter | None:
 
 def short_names() -> dict[str, str]:
     """Dotted names by the names that datasets use."""
-    return {row.short: name for name, row in parameters().items()}
+    return {row.short: name for name, row in _known().items()}
 
 
 def lookup(name: str) -> Parameter:
@@ -256,7 +260,6 @@ def lookup(name: str) -> Parameter:
     """
     if not isinstance(name, str):
         raise InputError(f"parameter {shown(name)}: must be a name, such as 'drive.frequency_ratio'")
-    table = parameters()
     row = _row_in_unit(name) if name in PHYSICAL else row_of(name)
     if row is not None:
         return row
@@ -275,7 +278,7 @@ def lookup(name: str) -> Parameter:
             "initial_state_striker_position",
             ParameterField("m", words, scope=RUN),
         )
-    shorts = short_names()
+    shorts, table = short_names(), _known()
     if name in shorts:
         return table[shorts[name]]
     row = _by_short(name, shorts)

@@ -35,6 +35,10 @@ _DESCENT_STEP, _DESCENT_STEPS = 0.02, 2000
 """Largest step of a descent, over the largest amplitude, and the maximum number of steps."""
 _TOWARDS, _BESIDE = 40, 1e-9
 """Starting points on the way to the end of the range of a law, up to 1e-6 of it and then to that distance of one end."""
+_SETTLINGS = 40
+"""Newton's steps of the structure alone towards places that are given."""
+_DISTANCES = np.geomspace(1e-9, 1.0, 200)
+"""Distances from an end among which the force of a law is looked for, over the displacement of the end."""
 _WEAK = 100.0
 """Attraction at that distance, over the forces of the structure, up to which it may have no equilibrium there."""
 _SINGULAR = 1e3
@@ -275,19 +279,13 @@ class Potential:
         from scipy.optimize import linprog
 
         structure = Potential(self.model, self.constant, ())
-        ranges = np.array([law.displacement_range(law.numbers) for law in self.local_forces])
-        faces, weak = [], []
-        for j, law in enumerate(self.local_forces):
-            for end, sign in zip(ranges[j], (-1.0, 1.0), strict=True):
-                if math.isfinite(end):
-                    beside = end - sign * _BESIDE * max(abs(end), self._length)
-                    pull = sign * law.force_at(beside)
-                    if pull > 0.0:
-                        faces.append((j, end / self._length))
-                        row = self.rows[j]
-                        terms = structure._terms(end * row / float(row @ row))
-                        if pull * float(np.abs(row).max()) < _WEAK * float(np.abs(terms).max()):
-                            weak.append(faces[-1])
+        ranges, faces, weak = self._ranges, [], []
+        for j, end, pull in self._pulls:
+            faces.append((j, end / self._length))
+            row = self.rows[j]
+            terms = structure._terms(end * row / float(row @ row))
+            if pull * float(np.abs(row).max()) < _WEAK * float(np.abs(terms).max()):
+                weak.append(faces[-1])
         above = np.concatenate((self.rows, -self.rows))
         bounds = np.concatenate((ranges[:, 1], -ranges[:, 0]))
         limited = np.isfinite(bounds)
@@ -317,6 +315,24 @@ class Potential:
         total = sum((-1) ** each.unstable_directions for each in found)
         groups = [faces, [each for each in faces if each not in weak]] if weak else [faces]
         return total in [1 - characteristic(among, reach) for among in groups for reach in (None, _FAR)]
+
+    @cached_property
+    def _ranges(self) -> _Array:
+        """Least and greatest displacements of the laws, shape (J, 2)."""
+        found = [law.displacement_range(law.numbers) for law in self.local_forces]
+        return np.array(found, dtype=np.float64).reshape(-1, 2)
+
+    @cached_property
+    def _pulls(self) -> list[tuple[int, float, float]]:
+        """The ends beyond which laws pull: number of the law, displacement, and the force towards it beside it."""
+        found = []
+        for j, law in enumerate(self.local_forces):
+            for end, sign in zip(self._ranges[j].tolist(), (-1.0, 1.0), strict=True):
+                if math.isfinite(end):
+                    pull = sign * law.force_at(end - sign * _BESIDE * max(abs(end), self._length))
+                    if pull > 0.0:
+                        found.append((j, end, float(pull)))
+        return found
 
     def _is_same(self, one: _Array, other: _Array) -> bool:
         return bool(np.abs(one - other).max() <= _SAME * np.abs(self.size).max())
@@ -365,25 +381,66 @@ class Potential:
         """Starting points ever nearer to the ends of the ranges of laws, where a force that grows has its equilibria."""
         stiffness = self.model.stiffness
         compliance = 1.0 / np.abs(stiffness) if stiffness.ndim == 1 and stiffness.all() else 1.0
-        ends = [
-            (j, end)
-            for j, law in enumerate(self.local_forces)
-            for end in law.displacement_range(law.numbers)
-            if math.isfinite(end)
-        ]
+        ends = [(j, float(end)) for j, both in enumerate(self._ranges) for end in both if math.isfinite(end)]
+        pulling = [(j, end) for j, end, _ in self._pulls]
+        # towards one end, and towards several at once, where an equilibrium with as many unstable directions can be
+        groups = [*combinations(ends, 1), *combinations(ends, 2)]
+        groups += [each for count in range(3, 1 + len(pulling)) for each in combinations(pulling, count)]
         found = []
         near, nearer = np.geomspace(1.0, 1e-6, _TOWARDS), np.geomspace(1e-6, _BESIDE, _TOWARDS // 2)
-        # towards one end, and towards two at once, where an equilibrium with two unstable directions can be
-        for group in [*combinations(ends, 1), *combinations(ends, 2)]:
+        for group in groups:
+            places = np.array([end for _, end in group])
             rows = self.rows[[j for j, _ in group]]
             product = rows @ (compliance * rows).T
             if np.linalg.matrix_rank(product) < len(group):
                 continue
             for alpha in known:
-                away = np.linalg.solve(product, np.array([end for _, end in group]) - rows @ alpha)
+                away = np.linalg.solve(product, places - rows @ alpha) @ (compliance * rows)
                 distances = np.append(near, nearer) if len(group) == 1 else near
-                found += [alpha + share * (away @ (compliance * rows)) for share in 1.0 - distances]
+                found += [alpha + share * away for share in 1.0 - distances]
+                found += self._balanced(alpha + away, dict(group))
         return found
+
+    def _balanced(self, alpha: _Array, ends: dict[int, float]) -> list[_Array]:
+        """The point next to ends of laws, by number, where their forces hold the structure; none if they cannot.
+
+        A law whose range the structure would leave there is held at its end, too, such as a body that repels between two
+        that attract.
+        """
+        alone = Potential(self.model, self.constant, ())
+
+        def settled(alpha: _Array, places: dict[int, float]) -> tuple[_Array, _Array]:
+            """The structure at rest with laws at given displacements, by Newton's method, and the forces of the laws."""
+            rows, zero = self.rows[list(places)], np.zeros((len(places), len(places)))
+            pushed, ends = np.zeros(len(places)), np.array(list(places.values()))
+            for _ in range(_SETTLINGS):
+                matrix = np.block([[alone._tangent(alpha), rows.T], [rows, zero]])
+                missing = np.concatenate((-alone._gradient(alpha), ends - rows @ alpha))
+                step = _solved(matrix[None], missing[None])[0]
+                alpha, pushed = alpha + step[: alpha.size], -step[alpha.size :]
+            return alpha, pushed
+
+        for _ in self.local_forces:
+            alpha, pushed = settled(alpha, ends)
+            u = self.rows @ alpha
+            beyond = np.maximum(self._ranges[:, 0] - u, u - self._ranges[:, 1])
+            beyond[list(ends)] = -math.inf
+            worst = int(np.argmax(beyond))
+            if not beyond[worst] > 0.0:
+                break
+            ends = {**ends, worst: float(self._ranges[worst, int(u[worst] >= self._ranges[worst, 1])])}
+        places = {}
+        for (j, end), force in zip(ends.items(), pushed, strict=True):
+            law, sign = self.local_forces[j], 1.0 if end == self._ranges[j, 1] else -1.0
+            beside = end - sign * _DISTANCES * max(abs(end), self._length)
+            beside = beside[(self._ranges[j, 0] < beside) & (beside < self._ranges[j, 1])]
+            with np.errstate(all="ignore"):
+                off = np.abs(np.log(law.force_at(beside) / force))
+            if not np.isfinite(off).any():
+                return []
+            places[j] = float(beside[np.nanargmin(off)])
+        alpha = settled(alpha, places)[0]
+        return [alpha] if np.isfinite(alpha).all() else []
 
     def holds(self, alpha: ArrayLike) -> NDArray[np.bool_]:
         """Return whether the displacement of every local force is within the range of its law, for shape (..., N).

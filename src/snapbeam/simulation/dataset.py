@@ -121,7 +121,7 @@ def trajectory_dataset(
         Dataset with the dimensions ``time`` and, if there are modal amplitudes, ``mode`` counted from 1; every variable
         carries ``units`` and ``long_name``.
     """
-    from snapbeam.util.datasets import xr
+    from snapbeam.util.datasets import variable, xr
 
     require_texts("attrs", attrs)
     coords: dict[str, Any] = {"time": _labelled("time", axis("time", time, -np.inf, np.inf, closed="both"))}
@@ -145,7 +145,8 @@ def trajectory_dataset(
             raise InputError(
                 f"{name} of shape {values.shape}: must have dimensions {dims}, with time of {length}"
             )
-    dataset = xr.Dataset(data, coords, dict(attrs or {}))
+    series, axes = ({name: variable(name, *each) for name, each in part.items()} for part in (data, coords))
+    dataset = xr.Dataset(series, axes, dict(attrs or {}))
     check_trajectory(dataset, require=())
     return dataset
 
@@ -188,18 +189,18 @@ def check_trajectory(
     for name, quantity in SCHEMA.items():
         if name not in dataset.variables:
             continue
-        variable = dataset[name]
-        if variable.dims != quantity.dims:
-            raise InputError(f"{name} with dimensions {variable.dims}: must have dimensions {quantity.dims}")
-        units = variable.attrs.get("units")
+        found = dataset.variables[name]
+        if found.dims != quantity.dims:
+            raise InputError(f"{name} with dimensions {found.dims}: must have dimensions {quantity.dims}")
+        units = found.attrs.get("units")
         if units != quantity.unit:
             raise InputError(f"{name} in units {shown(units)}: must be in {quantity.unit!r}")
-        good = np.isfinite(variable.values)
+        good = np.isfinite(found.values)
         if valid is not None and name not in _COORDINATES:
             good = good | ~(valid if good.ndim == 1 else valid[:, None])
         if not good.all():
             at = tuple(int(i) for i in np.argwhere(~good)[0])
-            raise InputError(f"{name}{list(at)} = {float(variable.values[at])!r}: must be finite")
+            raise InputError(f"{name}{list(at)} = {float(found.values[at])!r}: must be finite")
     steps = np.diff(dataset["time"].values)
     if (steps <= 0.0).any():
         late = int(np.argmax(steps <= 0.0)) + 1
@@ -422,15 +423,15 @@ def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Arr
 
 def impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
     """Return the table of the impacts of a run."""
-    from snapbeam.util.datasets import xr
+    from snapbeam.util.datasets import variable, xr
 
-    data = {
+    columns = {
         name: (
-            "impact",
             table[:, i].astype(np.int64) if name == "striker" else table[:, i],
             {"units": units, "long_name": words},
         )
         for i, (name, units, words) in enumerate(IMPACT_COLUMNS[: table.shape[1]])
     }
-    number = ("impact", np.arange(1, len(table) + 1), {"units": "1", "long_name": "number of the impact"})
-    return xr.Dataset(data, {"impact": number}, attrs)
+    columns["impact"] = (np.arange(1, len(table) + 1), {"units": "1", "long_name": "number of the impact"})
+    data = {name: variable(name, ("impact",), *each) for name, each in columns.items()}
+    return xr.Dataset(data, attrs=attrs)

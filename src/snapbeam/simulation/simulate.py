@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from typing import Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,9 +31,12 @@ from snapbeam.solver.step_size import SUBDIVISION, Plan, long_run
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, counting, sharing, tell
 from snapbeam.util.interrupts import raise_held
-from snapbeam.util.provenance import array_hash, made_by
+from snapbeam.util.provenance import array_hash, created_now, made_by
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 CONVENTIONS = "CF-1.11"
 _LONGEST = 1024
@@ -209,7 +212,7 @@ def _causes(system: System, integration: Integration) -> str:
 
 
 def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any) -> dict[str, Any]:
-    """Return the attributes of a run that ended; reports an energy-balance error."""
+    """Return the attributes of a run that ended."""
     lasted = run.end / run.period
     more: dict[str, Any] = _own_attributes(run.system, run.integration, lasted)
     more["response_class"] = summary.response_class.label_of(2 if run.system.model.is_bistable else 1)
@@ -217,10 +220,20 @@ def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any
     attrs = attributes_of("run of a struck bistable beam", run.system, run.integration, run.plan, more)
     attrs["gross_work"] = float(accumulators_of_runs["gross_work"][0])
     missed, scale = _energy_balance(accumulators_of_runs)
-    ended = summary.status is not RunStatus.INTERRUPTED  # the balance is closed at the end of a run alone
-    attrs["energy_error"] = missed / scale if ended else math.nan
+    # the balance is closed at the end of a run alone
+    attrs["energy_error"] = math.nan if summary.status is RunStatus.INTERRUPTED else missed / scale
+    if run.accuracy is not None:
+        attrs |= run.accuracy.attributes()
+    return attrs
+
+
+def tell_imbalance(run: Prepared, summary: RunSummary, accumulators_of_runs: Any) -> None:
+    """Report an energy-balance error of a run that ended."""
+    if summary.status in (RunStatus.INTERRUPTED, RunStatus.DIVERGED):
+        return
+    missed, scale = _energy_balance(accumulators_of_runs)
     rounding = float(rounding_energy(run.ensemble, accumulators_of_runs)[0])
-    if ended and summary.status is not RunStatus.DIVERGED and abs(missed) > _ENERGY_ERROR * scale + rounding:
+    if abs(missed) > _ENERGY_ERROR * scale + rounding:
         tell(
             [
                 Diagnostic(
@@ -231,9 +244,6 @@ def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any
                 )
             ]
         )
-    if run.accuracy is not None:
-        attrs |= run.accuracy.attributes()
-    return attrs
 
 
 def _own_attributes(system: System, integration: Integration, lasted: float) -> dict[str, Any]:
@@ -241,7 +251,7 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
     striker = system.striker
     attrs: dict[str, Any] = {
         "cycles": round(lasted, 9),
-        "engine": "native" if integration.engine == "auto" else integration.engine,
+        "engine": "python" if integration.engine == "python" else "native",
     }
     if striker is not None and striker.drive.harmonic:
         attrs |= {
@@ -439,12 +449,18 @@ def simulate(
         )
         if recorded.times.size == 0:
             times = np.zeros(1)  # the run failed before its first sample
-    attrs = run_attributes(run, summary, recorded.accumulators_of_runs)
-    return Run.of(
-        lambda: (
+    tell_imbalance(run, summary, recorded.accumulators_of_runs)
+    created = {"created": created_now()}
+
+    def tables() -> tuple[xr.Dataset, xr.Dataset]:
+        attrs = run_attributes(run, summary, recorded.accumulators_of_runs) | created
+        return (
             run_dataset(ensemble, system, recorded, times, run.period, attrs),
             impact_table(recorded.impacts, attrs),
-        ),
+        )
+
+    return Run.of(
+        tables,
         summary=summary,
         system=system,
         integration=integration,

@@ -21,6 +21,7 @@ from snapbeam.simulation.simulate import (
     prepared,
     reached_by,
     run_attributes,
+    tell_imbalance,
 )
 from snapbeam.simulation.summary import RunSummary
 from snapbeam.solver.engines import engine_of
@@ -171,7 +172,7 @@ class _Writer:
 
     def finish(self) -> RunSummary:
         """Write the remaining samples, the impacts, the summary and the attributes."""
-        from xarray.backends import H5NetCDFStore
+        from snapbeam.util.datasets import NetCDFStore
 
         run, last = self.run, self.waiting
         assert last is not None  # an engine yields at least one piece
@@ -180,6 +181,7 @@ class _Writer:
             last = reached_by(
                 last, float(last.accumulators_of_runs["time"][0] * run.ensemble.runs["tick"][0])
             )
+        tell_imbalance(run, summary, last.accumulators_of_runs)
         attrs = run_attributes(run, summary, last.accumulators_of_runs)
         self.append(last, np.zeros(1) if self.written + last.times.size == 0 else None)
         end = end_state(run.ensemble, last, summary)
@@ -189,21 +191,19 @@ class _Writer:
             "summary": summary_dataset(summary),
         }
         for name, table in tables.items():
-            table.dump_to_store(H5NetCDFStore(self.file.create_group(name)), encoding=compressed(table))
+            table.dump_to_store(NetCDFStore(self.file.create_group(name)), encoding=compressed(table))
         return summary
 
     def append(self, samples: Recorded, times: Any = None) -> None:
         """Append samples to the file; *times* are times that were not reached."""
-        from xarray.backends import H5NetCDFStore
+        from snapbeam.util.datasets import NetCDFStore
 
         if samples.times.size == 0 and times is None:
             return
         dataset = run_dataset(self.run.ensemble, self.run.system, samples, times, self.run.period, {})
         begin, end = self.written, self.written + dataset.sizes["time"]
         if begin == 0:
-            dataset.dump_to_store(
-                H5NetCDFStore(self.file), encoding=_chunked(dataset), unlimited_dims={"time"}
-            )
+            dataset.dump_to_store(NetCDFStore(self.file), encoding=_chunked(dataset), unlimited_dims={"time"})
         else:
             self.file.resize_dimension("time", end)
             for name, variable in _over_time(dataset):
@@ -222,5 +222,5 @@ def _chunked(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
     for name, variable in _over_time(dataset):
         beside = variable.size // variable.sizes["time"]
         rows = max(1, _CHUNK // beside)
-        encoding[name] = {**encoding[name], "chunksizes": (rows, *variable.shape[1:])}
+        encoding[name] = {**encoding.get(name, {}), "chunksizes": (rows, *variable.shape[1:])}
     return encoding

@@ -312,7 +312,9 @@ def make_ensemble(
     )
     if integration.engine == "python":
         return dataclasses.replace(ensemble, systems=_systems(system, points or {}, runs))
-    return dataclasses.replace(ensemble, channels=channels_of(system, ensemble, columns))
+    return dataclasses.replace(
+        ensemble, channels=channels_of(system, ensemble, columns), on_gpu=integration.engine == "cuda"
+    )
 
 
 def _systems(system: System, points: Mapping[str, _Array], runs: int) -> tuple[System, ...]:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from snapbeam import _core
-from snapbeam.util.packages import needing
+from snapbeam.util.packages import needing, needs
+from snapbeam.util.validation import InputError
 
 Progress = Callable[[int, int], object]
 
@@ -71,12 +72,16 @@ def compiled(architecture: str, defined: dict[str, str]) -> Any:
     with needing("engine = 'cuda'", "cuda"):
         from cuda.core import Program, ProgramOptions
         from cuda.core.utils import FileStreamProgramCache
+        from cuda.pathfinder import DynamicLibNotFoundError
     options = ProgramOptions(
         std="c++20", arch=architecture, fma=False, device_as_default_execution_space=True, disable_warnings=True,
         define_macro=list(defined.items()),
     )  # fmt: skip
-    with FileStreamProgramCache() as stored:
-        return Program(source(), "c++", options).compile("cubin", cache=stored)
+    try:
+        with FileStreamProgramCache() as stored:
+            return Program(source(), "c++", options).compile("cubin", cache=stored)
+    except DynamicLibNotFoundError as error:
+        raise InputError(needs("engine = 'cuda'", "the compiler NVRTC", "cuda")) from error
 
 
 @cache
@@ -84,8 +89,13 @@ def _device() -> Any:
     """The card."""
     with needing("engine = 'cuda'", "cuda"):
         from cuda.core import Device
-    found = Device()
-    found.set_current()
+    try:
+        found = Device()
+        found.set_current()
+    except Exception as error:  # of the driver, or that there is none
+        raise InputError(
+            f"engine = 'cuda': no GPU of NVIDIA answers ({error}); use engine = 'native'"
+        ) from error
     return found
 
 
@@ -142,7 +152,9 @@ def integrate(problem: dict[str, Any], batch: dict[str, Any], progress: Progress
         memory.close()
 
 
-def _integrate(memory: _Memory, problem: dict[str, Any], batch: dict[str, Any], progress: Progress | None) -> None:
+def _integrate(
+    memory: _Memory, problem: dict[str, Any], batch: dict[str, Any], progress: Progress | None
+) -> None:
     arrays = [each for each in (problem | batch).values() if isinstance(each, np.ndarray)]
     places = {each.ctypes.data: memory.put(each) for each in arrays}
     arguments = _core.moved_arguments(problem, batch, places)
@@ -164,7 +176,9 @@ def _integrate(memory: _Memory, problem: dict[str, Any], batch: dict[str, Any], 
     counters, budget, begins = np.zeros(2, dtype=np.int32), 64, True  # next, done
     while counters[1] < runs:
         begun = time.perf_counter()
-        memory.launch(go_on, blocks, threads, np.uint64(shared), np.uint64(aside), np.int32(budget), np.int32(begins))
+        memory.launch(
+            go_on, blocks, threads, np.uint64(shared), np.uint64(aside), np.int32(budget), np.int32(begins)
+        )
         took, begins = time.perf_counter() - begun, False
         memory.get(shared, counters)
         if progress is not None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from snapbeam import _core
+from snapbeam.model.matrix_pairs import coupled_blocks
 from snapbeam.solver.channels import (
     AXIAL_LOAD,
     BASE,
@@ -106,9 +106,8 @@ class _Arrays:
         first = structure.modes_of_bodies.stop
         states += range(first, first + len(structure.indentations))
         kept = np.setdiff1d(np.arange(structure.omega.size), states)
-        count, label = connected_components(structure.coupling[np.ix_(kept, kept)] != 0.0, directed=False)
-        self.order = kept[np.argsort(label, kind="stable")]
-        sizes = np.bincount(label, minlength=count).astype(np.int32)
+        order, sizes = coupled_blocks(structure.coupling[np.ix_(kept, kept)] != 0.0)
+        self.order = kept[order]
         n, modes = kept.size, structure.equilibrium.size
         halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
         halvings += graded
@@ -215,7 +214,9 @@ class _Arrays:
         """q and p of the structure, of those in the core and of the states of laws, shape (..., channels)."""
         n, structure = self.order.size, self.ensemble.structure
         q, p = np.zeros((2, *states.shape[:-1], structure.omega.size))
-        q[..., self.order], p[..., self.order] = states[..., :n], states[..., n : 2 * n]
+        # a slice is copied several times as fast as columns by their numbers
+        at = slice(n) if np.array_equal(self.order, np.arange(n)) else self.order
+        q[..., at], p[..., at] = states[..., :n], states[..., n : 2 * n]
         for circuit, channel in zip(structure.circuits, self.circuits.tolist(), strict=True):
             if circuit.mode is not None:
                 q[..., circuit.mode] = laws[..., channel] + q @ circuit.row
@@ -227,8 +228,9 @@ class _Arrays:
         """Derivatives of what runs begin with, all of them 0, and room for those of the outputs."""
         batch, channels, n = self.batch, self.channels.laws.size, self.order.size
         shapes: dict[str, tuple[int, ...]] = {
-            "q": (n,), "p": (n,), "numbers": batch["numbers"].shape[1:], "laws": (channels,), "offset": (channels,), "rest": (channels,),
-            "rows": (channels, n), "signals": batch["signals"].shape[1:], "end": (),
+            "q": (n,), "p": (n,), "numbers": batch["numbers"].shape[1:], "laws": (channels,), "offset": (channels,), "rest": (channels + 1,),
+            "rows": (channels + 1, n), "signals": batch["signals"].shape[1:], "end": (), "statistics": (len(STATISTICS),),
+            "of_channels": (channels, len(OF_CHANNEL)),
         }  # fmt: skip
         found = {
             name: np.zeros((self.ensemble.size, _core.DIRECTIONS, *shape)) for name, shape in shapes.items()
@@ -241,11 +243,10 @@ class _Arrays:
         parts = []
         for arrays in (_Arrays(above), _Arrays(below)):
             batch = arrays.batch
-            places = batch["row_of"][:, :-1]
             end = batch["run"][:, RUN.index("end")] * batch["run"][:, RUN.index("tick")]
             parts.append(
-                {"rows": batch["rows"][places], "rest": batch["rest"][:, :-1], "end": end}
-                | {name: batch[name] for name in ("numbers", "offset", "signals")}
+                {"rows": batch["rows"][batch["row_of"]], "end": end}
+                | {name: batch[name] for name in ("q", "p", "numbers", "offset", "rest", "signals")}
             )
         found = {name: (parts[0][name] - parts[1][name]) / distance for name in parts[0]}
         found["signals"][:, self.problem["signal_kinds"] == 0, 4] = 0.0  # periods in ticks of another clock
@@ -325,17 +326,18 @@ def _work_of(law: int) -> str:
 
 
 def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) -> None:
-    layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
     if progress is not None:
         progress(0, arrays.ensemble.size)
-    _core.integrate(
-        arrays.problem,
-        arrays.batch,
-        layout,
-        os.environ.get("SNAPBEAM_SET", ""),
-        1 if arrays.calls_python else threads or usable_cores(),
-        progress,
-    )
+    if arrays.ensemble.on_gpu:
+        from snapbeam.solver import cuda
+
+        cuda.integrate(arrays.problem, arrays.batch, progress)
+    else:
+        layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
+        cores = 1 if arrays.calls_python else threads or usable_cores()
+        _core.integrate(
+            arrays.problem, arrays.batch, layout, os.environ.get("SNAPBEAM_SET", ""), cores, progress
+        )
     arrays.check()
     if progress is not None:
         progress(arrays.ensemble.size, arrays.ensemble.size)
@@ -369,10 +371,16 @@ def integrate_with_output_states(
 
 
 def differentiable(above: Ensemble, below: Ensemble) -> bool:
-    """Return whether two ensembles differ only in numbers of which the core takes derivatives: no other pieces of signals, no jumps that move."""
+    """Return whether two ensembles differ only in numbers of which the core takes derivatives: the same modes, pieces of signals and times of jumps."""
     one, other = above.channels, below.channels
     assert one is not None and other is not None
-    return np.array_equal(one.pieces, other.pieces) and not one.jumps.size and not other.jumps.size
+    if not np.array_equal(one.pieces, other.pieces) or not np.array_equal(one.jumps, other.jumps):
+        return False
+    first, second = (
+        {name: value for name, value in _Arrays(each).problem.items() if name != "levels"}
+        for each in (above, below)
+    )
+    return all(np.array_equal(value, second[name]) for name, value in first.items())
 
 
 def tangents(
@@ -398,11 +406,8 @@ def tangents(
     q, p : array of shape (runs, k, N)
         Changes at the end; NaN where a run did not reach it.
     """
-    arrays = _Arrays(ensemble, _GRADED if ensemble.order == 4 else 0)
-    batch, n, channels, most = arrays.batch, arrays.order.size, arrays.channels.laws.size, _core.DIRECTIONS
-    runs, count = q.shape[:2]
-    batch["outputs"], batch["run"][:, RUN.index("output_interval")] = 1, batch["run"][:, RUN.index("end")]
-    batch["states"] = np.full((runs, 1, 2 * n + 1 + 2 * channels), np.nan)
+    arrays, most = _differentiated(ensemble), _core.DIRECTIONS
+    n, count = arrays.order.size, q.shape[1]
     laws, changes = arrays.laws_of(q), {} if beside is None else arrays.changes(*beside)
     found_q, found_p = np.zeros((2, *q.shape))
     for first in range(0, count, most):
@@ -414,14 +419,79 @@ def tangents(
         seeds["q"][:, :some], seeds["p"][:, :some] = arrays.row(q[:, own]), arrays.row(p[:, own])
         for channel, change in laws.items():
             seeds["laws"][:, :some, channel] = change[:, own]
-        _core.integrate_tangents(
-            arrays.problem, batch, seeds, os.environ.get("SNAPBEAM_SET", ""),
-            1 if arrays.calls_python else threads or usable_cores(), None,
-        )  # fmt: skip
-        arrays.check()
+        _integrate_tangents(arrays, seeds, threads)
         ends = seeds["states"][:, 0, :some]
         found_q[:, own], found_p[:, own] = arrays.modes_of(ends, ends[..., 2 * n :])
     return found_q, found_p
+
+
+def _differentiated(ensemble: Ensemble) -> _Arrays:
+    """Arrays of runs with derivatives, which end with an output."""
+    arrays = _Arrays(ensemble, _GRADED if ensemble.order == 4 else 0)
+    batch, width = arrays.batch, 2 * arrays.order.size + 1 + 2 * arrays.channels.laws.size
+    batch["outputs"], batch["run"][:, RUN.index("output_interval")] = 1, batch["run"][:, RUN.index("end")]
+    batch["states"] = np.full((ensemble.size, 1, width), np.nan)
+    return arrays
+
+
+def _integrate_tangents(arrays: _Arrays, seeds: dict[str, _Array], threads: int | None) -> None:
+    _core.integrate_tangents(
+        arrays.problem, arrays.batch, seeds, os.environ.get("SNAPBEAM_SET", ""),
+        1 if arrays.calls_python else threads or usable_cores(), None,
+    )  # fmt: skip
+    arrays.check()
+
+
+def changed_accumulators(
+    ensemble: Ensemble, beside: Sequence[tuple[Ensemble, Ensemble, float]], threads: int | None = None
+) -> tuple[list[tuple[Records, Records]], _Array, Records]:
+    """Accumulators of runs at a larger and at a smaller value of parameters, by their derivatives.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+    beside : sequence of tuple
+        Of each parameter, the ensembles at the two values and their distance.
+    threads : int, optional
+
+    Returns
+    -------
+    pairs : list of tuple
+        Records at the larger and at the smaller value of each parameter.
+    growth : array of shape (runs, parameters)
+        Norm of the derivative of the state at the end, the square root of twice an energy, J^0.5, per unit of the parameter.
+    accumulators : records
+        Of the runs themselves.
+    """
+    arrays, n = _differentiated(ensemble), ensemble.structure.omega.size
+    batch, pairs, growth = arrays.batch, [], np.empty((ensemble.size, len(beside)))
+    whole = arrays.accumulators()
+    for first in range(0, len(beside), _core.DIRECTIONS):
+        some, seeds = beside[first : first + _core.DIRECTIONS], arrays.no_change()
+        for k, each in enumerate(some):
+            for name, change in arrays.changes(*each).items():
+                seeds[name][:, k] = change
+        _integrate_tangents(arrays, seeds, threads)
+        whole = arrays.accumulators()
+        ends = seeds["states"][:, 0, :]
+        q, p = arrays.modes_of(ends, ends[..., 2 * arrays.order.size :])
+        bodies = slice(0, ensemble.structure.modes_of_bodies.stop or n)
+        rates = ensemble.structure.omega[bodies]
+        size = np.sqrt(((rates * q[..., bodies]) ** 2 + p[..., bodies] ** 2).sum(axis=-1))
+        growth[:, first : first + len(some)] = size[:, : len(some)]
+        kept = {name: batch[name] for name in ("statistics", "of_channels")}
+        for k, (above, below, distance) in enumerate(some):
+            pair = []
+            for near, side in ((above, 0.5), (below, -0.5)):
+                for name, value in kept.items():
+                    batch[name] = value + side * distance * seeds[name][:, k]
+                found = arrays.accumulators()
+                ended = found["time"] == ensemble.runs["end"]
+                found["time"] = np.where(ended, near.runs["end"], found["time"])
+                pair.append(found)
+            pairs.append((pair[0], pair[1]))
+        batch.update(kept)
+    return pairs, growth, whole
 
 
 def record(

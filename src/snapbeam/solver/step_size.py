@@ -9,14 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
-from scipy.sparse.csgraph import connected_components
 
 from snapbeam import _core
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import HORIZON
 from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import ACCURACIES, Integration
+from snapbeam.model.matrix_pairs import coupled_blocks
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
 from snapbeam.solver.ensemble import Records
@@ -177,6 +176,8 @@ def _with_coupled_damping(
     matrix[n:, n:] -= (rows.T * coefficients) @ rows
     fewest, per_decay = PARTS[order]
 
+    from scipy.linalg import expm  # takes a quarter of a second, and few structures have such dampers
+
     def error(h: float) -> float:
         steps, found = math.ceil(period / h), np.eye(2 * n)
         flows = {weight: expm(weight * h * alone) for weight in set(composition[0])}
@@ -295,9 +296,7 @@ class _Bench:
             velocity = impulse_shape / (1.0 + (self.omega * lasting / math.pi) ** 2)
             self.starts.append(velocity * math.sqrt(2.0 * energy * barrier / (velocity @ velocity)))
         # modes that the tension couples follow each other
-        count, block = connected_components(self.coupling != 0.0, directed=False)
-        placed = np.argsort(block, kind="stable")
-        self.blocks = np.bincount(block, minlength=count).astype(np.int32)
+        placed, self.blocks = coupled_blocks(self.coupling != 0.0)
         self.coupling = np.ascontiguousarray(self.coupling[np.ix_(placed, placed)])
         self.omega, self.damping, self.well = self.omega[placed], self.damping[placed], self.well[placed]
         self.rest, self.force, self.rows = self.rest[placed], self.force[placed], self.rows[:, placed]

@@ -31,11 +31,11 @@ def class_coordinate() -> tuple[tuple[str], Any, dict[str, Any]]:
 
 def to_dataset(work: PointWork, points: Points, rows: ResultRows, attrs: dict[str, Any]) -> xr.Dataset:
     """Return the dataset of a sweep."""
-    from snapbeam.util.datasets import xr
+    from snapbeam.util.datasets import variable, xr
 
-    table = rows.read(0, points.size)
+    table, dims = rows.read(0, points.size), points.dims
     variables = {
-        name: ((*points.dims, _CLASS_DIM) if by_class else points.dims, points.arranged(work.values(name, table)), labels)
+        name: variable(name, (*dims, _CLASS_DIM) if by_class else dims, points.arranged(work.values(name, table)), labels)
         for name, (_, by_class, labels) in work.variables().items()
     }  # fmt: skip
     return xr.Dataset(variables, _coordinates(work, points), attrs)

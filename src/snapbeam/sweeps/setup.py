@@ -86,7 +86,7 @@ def _ends(points: Points) -> list[int]:
             tuple(size - 1 if i == at else 0 for i in range(len(points.shape)))
             for at, size in enumerate(points.shape)
         ]
-        return [int(np.ravel_multi_index(corner, points.shape)) for corner in corners]
+        return [int(np.ravel_multi_index(corner, points.shape)) for corner in dict.fromkeys(corners)]
     numbers = [values for values in points.columns.values() if values.dtype.kind in "if"]
     return sorted({int(at) for values in numbers for at in (values.argmin(), values.argmax())})
 
@@ -440,6 +440,8 @@ def announce_long_sweep(setup: SweepSetup, repeats: int = 1, *, by_cluster: bool
     The estimate is that of a run (:func:`~snapbeam.solver.step_size.seconds_of`), averaged over points in all parts of the sweep, or
     over the limits of its axes if each point has a model of its own.
     """
+    if setup.integration.engine == "cuda":
+        return
     size, alike = setup.points.size, all(lookup(name).is_run for name in setup.points.names)
     cycles = setup.integration.cycles  # none given: those of a record may be many
     if cycles is not None and size * repeats * cycles * setup.system.model.modes <= _FEW and alike:

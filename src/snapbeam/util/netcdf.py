@@ -125,9 +125,7 @@ def write_netcdf(
     >>> import xarray as xr
     >>> sb.write_netcdf(xr.Dataset({"gap": ("time", [0.0, 1.0])}), "gap.nc")
     """
-    from xarray.backends import H5NetCDFStore
-
-    from snapbeam.util.datasets import xr
+    from snapbeam.util.datasets import NetCDFStore, xr
 
     target = check_writable(path, "path", (".nc",))
     groups = {None: data} if isinstance(data, xr.Dataset) else mapping("data", data)
@@ -139,7 +137,7 @@ def write_netcdf(
         for name, dataset in groups.items():
             raise_held()
             group = None if name is None else file.create_group(name)
-            store = H5NetCDFStore(file if group is None else group)
+            store = NetCDFStore(file if group is None else group)
             dataset.dump_to_store(
                 store, encoding=dict(mapping(f"encoding[{name!r}]", settings.get(name, {})))
             )

@@ -11,6 +11,7 @@ _EXTRAS = {
     "video": ("imageio_ffmpeg", "PIL"),
     "explorer": ("panel", "bokeh", "tornado", "param"),
     "laws": ("numba",),
+    "cuda": ("cuda",),
 }
 """Modules that each extra of the distribution installs."""
 
