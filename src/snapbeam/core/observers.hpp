@@ -30,10 +30,11 @@ template <class L> void write_sample(Group<L> &run, double time, bool within) {
         row[m] = element<L>(z.q1, run.s->place[m], 0) + (there && problem.shift ? problem.shift[m] : 0.0);
         row[modes + m] = element<L>(z.p1, run.s->place[m], 0);
     }
-    z.q.swap(z.q1), z.p.swap(z.p1);
+    const auto q = z.q, p = z.p;
+    z.q = z.q1, z.p = z.p1;
     values[SAMPLE_TIME] = time;
     values[BEAM_ENERGY] = lane(value(run.totals.energy(z, false)), 0);
-    z.q.swap(z.q1), z.p.swap(z.p1);
+    z.q = q, z.p = p;
     const double share = within ? 1.0 : 0.0;
     values[SAMPLE_DISSIPATED] = lane(value(run.totals.sum[DISSIPATED]), 0) + share * lane(value(z.dissipated), 0);
     for (int j = 0; j < z.channels; ++j) {
