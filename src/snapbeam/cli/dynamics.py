@@ -12,16 +12,7 @@ import typer
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import FAILED, add_json, cli_command, duration, file_line, out, progress
-from snapbeam.cli.parameter_options import (
-    BEAM,
-    CONTACT,
-    DRIVE,
-    MODEL,
-    RUN,
-    STRIKER,
-    configured,
-    with_parameters,
-)
+from snapbeam.cli.parameter_options import BEAM, CONTACT, DRIVE, MODEL, RUN, STRIKER, configured, with_parameters
 from snapbeam.cli.short_help import ShortHelpCommand, ShortHelpGroup
 
 if TYPE_CHECKING:
@@ -45,10 +36,7 @@ class _Analyses(ShortHelpGroup):
     def _near(self, name: str) -> list[str]:
         words = name.lower().replace("_", "-")
         named = [each for each in self.commands if words in each or each in words]
-        first = {
-            each: str(command.help or "").partition("\n")[0].lower()
-            for each, command in self.commands.items()
-        }
+        first = {each: str(command.help or "").partition("\n")[0].lower() for each, command in self.commands.items()}
         described = [each for each, text in first.items() if words.rstrip("s") in text]
         return named or get_close_matches(words, self.commands) or (described if len(words) > 3 else [])
 
@@ -69,13 +57,11 @@ _FEW = 4000
 """Maximum size of a variable in the JSON output."""
 _SETTLING = "16 time constants of the slowest mode, at least 200 and at most 20,000"
 Output = Annotated[
-    Path,
-    typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"),
+    Path, typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE")
 ]
 Parameter = Annotated[str, typer.Option(help="Parameter to vary (velocity_amplitude).", rich_help_panel=_OWN)]
 Values = Annotated[
-    str,
-    typer.Option(help="Values of the parameter, start:stop:count.", rich_help_panel=_OWN, metavar="VALUES"),
+    str, typer.Option(help="Values of the parameter, start:stop:count.", rich_help_panel=_OWN, metavar="VALUES")
 ]
 
 
@@ -96,11 +82,7 @@ def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
     values, name = dataset[statistic], str(dataset.attrs["parameter"])
     lines = []
     for direction in values["sweep"].values:
-        part = (
-            values.sel(sweep=direction).dropna(name)
-            if values.dtype.kind == "f"
-            else values.sel(sweep=direction)
-        )
+        part = values.sel(sweep=direction).dropna(name) if values.dtype.kind == "f" else values.sel(sweep=direction)
         if part.size:
             at = part.isel({name: int(part.values.argmax())})
             where = coordinate_text(dataset, name, at[name].item())
@@ -111,12 +93,8 @@ def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
         one, other = (values.isel(sweep=i).values for i in (0, 1))
         apart = np.abs(one - other) > _BRANCHES * np.nanmax(np.abs(values.values), initial=0.0)
         if apart.any():
-            ends = (
-                coordinate_text(dataset, name, each) for each in values[name].values[apart][[0, -1]].tolist()
-            )
-            lines.append(
-                f"both directions differ by more than 10 % of the maximum between {' and '.join(ends)}"
-            )
+            ends = (coordinate_text(dataset, name, each) for each in values[name].values[apart][[0, -1]].tolist())
+            lines.append(f"both directions differ by more than 10 % of the maximum between {' and '.join(ends)}")
     return lines
 
 
@@ -167,11 +145,7 @@ def lifetimes(
     ] = None,
     checkpoint: Annotated[
         Path | None,
-        typer.Option(
-            help="Checkpoint folder; an existing one is resumed.",
-            rich_help_panel="Output",
-            metavar="DIR",
-        ),
+        typer.Option(help="Checkpoint folder; an existing one is resumed.", rich_help_panel="Output", metavar="DIR"),
     ] = None,
     output: Output = Path("lifetimes.nc"),
     plot: opt.Plot = None,
@@ -190,9 +164,7 @@ def lifetimes(
     settings = configured(given)
     _checked(output, plot)
     sampled = InitialConditions(
-        count=32 if initial_conditions is None else initial_conditions,
-        phase=phase,
-        seed=0 if seed is None else seed,
+        count=32 if initial_conditions is None else initial_conditions, phase=phase, seed=0 if seed is None else seed
     )
     begun = time.monotonic()
     cycles = settings.integration.cycles if given.get("integration.cycles") is not None else 1000
@@ -206,12 +178,9 @@ def lifetimes(
     lines = [f"{runs} runs in {duration(time.monotonic() - begun)}"]
     if dataset["lifetime"].ndim == 0:
         low, value, high = (float(dataset[name]) for name in ("lifetime_low", "lifetime", "lifetime_high"))
-        lines.append(
-            f"lifetime {value:.4g} cycles, {low:.4g} to {high:.4g} at {100 * dataset.attrs['confidence']:g} %"
-        )
+        lines.append(f"lifetime {value:.4g} cycles, {low:.4g} to {high:.4g} at {100 * dataset.attrs['confidence']:g} %")
         ends = ", ".join(
-            f"{name} {float(p):.3g}"
-            for name, p in zip(dataset["well"].values, dataset["end_probability"], strict=True)
+            f"{name} {float(p):.3g}" for name, p in zip(dataset["well"].values, dataset["end_probability"], strict=True)
         )
         lines.append(f"ends in the well: {ends}")
     else:
@@ -228,8 +197,7 @@ def bifurcation_diagram(
     parameter: Parameter = "velocity_amplitude",
     values: Values = "0.01:0.6:200",
     initial_conditions: Annotated[
-        int | None,
-        opt.count_option("Number of initial conditions at each value, in addition to the sweeps (0).", _OWN),
+        int | None, opt.count_option("Number of initial conditions at each value, in addition to the sweeps (0).", _OWN)
     ] = None,
     periods: Annotated[int | None, opt.count_option("Periods to record at each value (32).", _OWN)] = None,
     transient: Annotated[
@@ -271,8 +239,7 @@ def hysteresis(
     parameter: Parameter = "velocity_amplitude",
     values: Values = "0.01:0.6:200",
     statistic: Annotated[
-        str,
-        typer.Option(help="Statistic that --plot draws (peak_midspan_displacement).", rich_help_panel=_OWN),
+        str, typer.Option(help="Statistic that --plot draws (peak_midspan_displacement).", rich_help_panel=_OWN)
     ] = "peak_midspan_displacement",
     output: Output = Path("hysteresis.nc"),
     plot: opt.Plot = None,
@@ -320,19 +287,15 @@ def hysteresis(
 def backbone_curve(
     given: Any,
     well: Annotated[
-        str,
-        typer.Option(help="Motion about the lower or the upper well, or across both.", rich_help_panel=_OWN),
+        str, typer.Option(help="Motion about the lower or the upper well, or across both.", rich_help_panel=_OWN)
     ] = "lower",
     mode: Annotated[
         int | None, opt.count_option("Linear mode in which the motion about a well begins (1).", _OWN)
     ] = None,
     amplitude_limit: Annotated[
-        float | None,
-        opt.number_option("Displacement of the centre, over b, where the curve ends (2.5).", _OWN),
+        float | None, opt.number_option("Displacement of the centre, over b, where the curve ends (2.5).", _OWN)
     ] = None,
-    max_points: Annotated[
-        int | None, opt.count_option("Maximum number of points of the curve (200).", _OWN)
-    ] = None,
+    max_points: Annotated[int | None, opt.count_option("Maximum number of points of the curve (200).", _OWN)] = None,
     output: Output = Path("backbone_curve.nc"),
     plot: opt.Plot = None,
 ) -> None:
@@ -370,13 +333,9 @@ def backbone_curve(
 @with_parameters(*_ALL, axes=_AXES[:3])
 def lyapunov_spectrum(
     given: Any,
-    k: Annotated[
-        int | None, opt.count_option("Number of Lyapunov exponents, largest first (1).", _OWN)
-    ] = None,
+    k: Annotated[int | None, opt.count_option("Number of Lyapunov exponents, largest first (1).", _OWN)] = None,
     periods: Annotated[int | None, opt.count_option("Periods to average over (500).", _OWN)] = None,
-    transient: Annotated[
-        int | None, opt.count_option(f"Transient periods to discard ({_SETTLING}).", _OWN)
-    ] = None,
+    transient: Annotated[int | None, opt.count_option(f"Transient periods to discard ({_SETTLING}).", _OWN)] = None,
     output: Output = Path("lyapunov_spectrum.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
@@ -420,9 +379,7 @@ def poincare_section(
         str, typer.Option(help="Section: stroboscopic or impact.", rich_help_panel=_OWN, metavar="KIND")
     ] = "stroboscopic",
     periods: Annotated[int | None, opt.count_option("Periods to record (1000).", _OWN)] = None,
-    transient: Annotated[
-        int | None, opt.count_option(f"Transient periods to discard ({_SETTLING}).", _OWN)
-    ] = None,
+    transient: Annotated[int | None, opt.count_option(f"Transient periods to discard ({_SETTLING}).", _OWN)] = None,
     output: Output = Path("poincare_section.nc"),
     plot: opt.Plot = None,
 ) -> None:
@@ -448,15 +405,9 @@ def poincare_section(
 def branch(
     given: Any,
     parameter: Parameter = "velocity_amplitude",
-    bounds: Annotated[
-        str, typer.Option(help="Bounds of the parameter, low:high.", rich_help_panel=_OWN)
-    ] = "0.005:0.3",
-    direction: Annotated[
-        str, typer.Option(help="Initial direction: up or down.", rich_help_panel=_OWN)
-    ] = "up",
-    period: Annotated[
-        int | None, opt.count_option("Period of the orbit in periods of the drive (1).", _OWN)
-    ] = None,
+    bounds: Annotated[str, typer.Option(help="Bounds of the parameter, low:high.", rich_help_panel=_OWN)] = "0.005:0.3",
+    direction: Annotated[str, typer.Option(help="Initial direction: up or down.", rich_help_panel=_OWN)] = "up",
+    period: Annotated[int | None, opt.count_option("Period of the orbit in periods of the drive (1).", _OWN)] = None,
     transient: Annotated[
         int | None, opt.count_option("Transient periods to integrate before the search (500).", _OWN)
     ] = None,
@@ -501,9 +452,7 @@ def manifold(
     stability: Annotated[
         str, typer.Option(help="Manifold: unstable or stable.", rich_help_panel=_OWN, metavar="KIND")
     ] = "unstable",
-    period: Annotated[
-        int | None, opt.count_option("Period of the saddle in periods of the drive (1).", _OWN)
-    ] = None,
+    period: Annotated[int | None, opt.count_option("Period of the saddle in periods of the drive (1).", _OWN)] = None,
     max_arclength: Annotated[
         float | None, opt.number_option("Length of each branch, in units of the well's amplitude (10).", _OWN)
     ] = None,
@@ -528,9 +477,7 @@ def manifold(
     options = None if given.get("integration.accuracy") is None else settings.integration
     straight = np.zeros(2 * settings.system.model.modes)
     try:
-        saddle = periodic_orbit(
-            settings.system, straight, 1 if period is None else period, integration=options
-        )
+        saddle = periodic_orbit(settings.system, straight, 1 if period is None else period, integration=options)
     except OrbitNotFoundError as error:
         raise InputError(f"no saddle near the straight beam: {error}") from None
     with progress(None, "manifold", "percent of the length") as report:
@@ -552,9 +499,7 @@ def manifold(
 def bifurcation_curve(
     given: Any,
     parameter: Parameter = "velocity_amplitude",
-    bounds: Annotated[
-        str, typer.Option(help="Bounds of the parameter, low:high.", rich_help_panel=_OWN)
-    ] = "0.005:0.3",
+    bounds: Annotated[str, typer.Option(help="Bounds of the parameter, low:high.", rich_help_panel=_OWN)] = "0.005:0.3",
     second: Annotated[
         str, typer.Option(help="Second parameter of the curve.", rich_help_panel=_OWN)
     ] = "frequency_ratio",
@@ -563,19 +508,13 @@ def bifurcation_curve(
     ] = "0.5:3",
     number: Annotated[
         int | None,
-        opt.count_option(
-            "Number of the fold, flip, Neimark-Sacker point or grazing of the branch (1).", _OWN
-        ),
+        opt.count_option("Number of the fold, flip, Neimark-Sacker point or grazing of the branch (1).", _OWN),
     ] = None,
-    period: Annotated[
-        int | None, opt.count_option("Period of the orbit in periods of the drive (1).", _OWN)
-    ] = None,
+    period: Annotated[int | None, opt.count_option("Period of the orbit in periods of the drive (1).", _OWN)] = None,
     transient: Annotated[
         int | None, opt.count_option("Transient periods to integrate before the search (500).", _OWN)
     ] = None,
-    max_points: Annotated[
-        int | None, opt.count_option("Maximum number of points to either side (200).", _OWN)
-    ] = None,
+    max_points: Annotated[int | None, opt.count_option("Maximum number of points to either side (200).", _OWN)] = None,
     output: Output = Path("bifurcation_curve.nc"),
     plot: opt.Plot = None,
 ) -> None:
@@ -623,8 +562,7 @@ def bifurcation_curve(
     lines = [
         f"{_plain(found[wanted - 1])}: {curve.sizes['point']} points in {duration(time.monotonic() - begun)}",
         *(
-            f"{kind} at "
-            + ", ".join(f"{name} = {float(curve[f'special_point_{name}'][k]):.8g}" for name in names)
+            f"{kind} at " + ", ".join(f"{name} = {float(curve[f'special_point_{name}'][k]):.8g}" for name in names)
             for k, kind in enumerate(curve["special_point_kind"].values)
         ),
         f"The curve ends: {curve.attrs['termination_reason']}",
@@ -651,9 +589,7 @@ def basins(
             _OWN,
         ),
     ] = None,
-    states: Annotated[
-        int | None, opt.count_option("Initial states of the search for attractors (200).", _OWN)
-    ] = None,
+    states: Annotated[int | None, opt.count_option("Initial states of the search for attractors (200).", _OWN)] = None,
     output: Output = Path("basins.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
@@ -673,14 +609,9 @@ def basins(
     settings = configured(given)
     _checked(output, plot)
     begun = time.monotonic()
-    grid = {
-        "amplitude[1]": parse_axis("amplitudes", amplitudes),
-        "velocity[1]": parse_axis("velocities", velocities),
-    }
+    grid = {"amplitude[1]": parse_axis("amplitudes", amplitudes), "velocity[1]": parse_axis("velocities", velocities)}
     found = find_attractors(
-        settings.system,
-        200 if states is None else states,
-        integration=settings.integration.replace(threads=threads),
+        settings.system, 200 if states is None else states, integration=settings.integration.replace(threads=threads)
     )
     with progress(None, "basins", "periods") as report:
         dataset = basins_of(found, grid, periods=periods, progress=report)
@@ -751,15 +682,11 @@ def edge(
     ahead = 40 if horizon is None else horizon
     how = settings.integration
     flow = Stroboscope(
-        settings.system,
-        how if given.get("integration.accuracy") is not None else how.replace(accuracy="reference"),
+        settings.system, how if given.get("integration.accuracy") is not None else how.replace(accuracy="reference")
     )
     begun = time.monotonic()
     found = edge_tracking(
-        flow,
-        *kicked(flow, initial_velocity, ahead),
-        periods=60 if periods is None else periods,
-        horizon=ahead,
+        flow, *kicked(flow, initial_velocity, ahead), periods=60 if periods is None else periods, horizon=ahead
     )
     lines = [_plain(found), f"in {duration(time.monotonic() - begun)}"]
     _finish(found.to_dataset(), output, plot, lines)

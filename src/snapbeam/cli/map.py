@@ -10,16 +10,7 @@ import typer
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import FAILED, add_json, cli_command, out
-from snapbeam.cli.parameter_options import (
-    BEAM,
-    CONTACT,
-    DRIVE,
-    MODEL,
-    RUN,
-    STRIKER,
-    configured,
-    with_parameters,
-)
+from snapbeam.cli.parameter_options import BEAM, CONTACT, DRIVE, MODEL, RUN, STRIKER, configured, with_parameters
 
 _AXES = (
     "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
@@ -34,10 +25,7 @@ def compute_map(
     given: Any,
     keeping: Any,
     output: Annotated[
-        Path,
-        typer.Option(
-            "--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"
-        ),
+        Path, typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE")
     ] = Path("map.nc"),
     plot: opt.Plot = None,
     variable: Annotated[
@@ -117,14 +105,7 @@ def compute_map(
             else draw_computed(dataset, plot, output, "response_class", **overlays)
         )
     add_json(**map_facts(dataset), seconds=elapsed, files=files)
-    out().print(
-        map_summary(
-            dataset,
-            files,
-            None if opt.is_long(keeping) else elapsed,
-            variable,
-        )
-    )
+    out().print(map_summary(dataset, files, None if opt.is_long(keeping) else elapsed, variable))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
     if counts.failed:
         raise typer.Exit(FAILED)

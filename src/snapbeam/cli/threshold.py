@@ -11,16 +11,7 @@ import typer
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
-from snapbeam.cli.parameter_options import (
-    BEAM,
-    CONTACT,
-    DRIVE,
-    MODEL,
-    RUN,
-    STRIKER,
-    configured,
-    with_parameters,
-)
+from snapbeam.cli.parameter_options import BEAM, CONTACT, DRIVE, MODEL, RUN, STRIKER, configured, with_parameters
 from snapbeam.cli.summary import coordinate_text, initial_well_lines, status_lines, value_text
 from snapbeam.util.status_codes import wells_of
 
@@ -52,10 +43,7 @@ def threshold(
         ),
     ] = None,
     output: Annotated[
-        Path,
-        typer.Option(
-            "--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"
-        ),
+        Path, typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE")
     ] = Path("threshold.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
@@ -83,9 +71,7 @@ def threshold(
     system = settings.system
     start = time.monotonic()
     with progress(None, "threshold", "runs") as report:
-        dataset = find(
-            system, name, chosen, axes, settings.integration.replace(threads=threads), progress=report
-        )
+        dataset = find(system, name, chosen, axes, settings.integration.replace(threads=threads), progress=report)
     elapsed = time.monotonic() - start
     files = [write_map(dataset, output)]
     if plot is not None:
@@ -199,7 +185,5 @@ def _curve(curve: xr.Dataset, parameter: str, across: str | None, chosen: dict[s
         )
     higher = always.notnull() & ~(curve["upper_threshold_max"] == always)
     if bool(higher.any()):
-        lines.append(
-            f"  failed runs leave the top of the band open, at {int(higher.sum())} of {first.size} points"
-        )
+        lines.append(f"  failed runs leave the top of the band open, at {int(higher.sum())} of {first.size} points")
     return lines

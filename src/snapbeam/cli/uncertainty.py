@@ -23,22 +23,14 @@ if TYPE_CHECKING:
     from snapbeam.uncertainty.distributions import ParameterUncertainty
 
 File = Annotated[
-    Path,
-    typer.Argument(
-        help="TOML parameter file with [uncertainty] and the section of the command.", metavar="FILE"
-    ),
+    Path, typer.Argument(help="TOML parameter file with [uncertainty] and the section of the command.", metavar="FILE")
 ]
 Checkpoint = Annotated[
     Path | None,
-    typer.Option(
-        help="Checkpoint folder; an existing one is resumed.",
-        rich_help_panel="Output",
-        metavar="DIR",
-    ),
+    typer.Option(help="Checkpoint folder; an existing one is resumed.", rich_help_panel="Output", metavar="DIR"),
 ]
 Yes = Annotated[
-    bool,
-    typer.Option("--yes", "-y", help="Compute without asking for confirmation.", rich_help_panel="Cost"),
+    bool, typer.Option("--yes", "-y", help="Compute without asking for confirmation.", rich_help_panel="Cost")
 ]
 EstimateCost = Annotated[
     bool,
@@ -48,14 +40,10 @@ EstimateCost = Annotated[
         rich_help_panel="Cost",
     ),
 ]
-Output = typer.Option(
-    "--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"
-)
+Output = typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE")
 
 
-def read(
-    file: Path, section: str, law: list[str] | None = None
-) -> tuple[Config, ParameterUncertainty, dict[str, Any]]:
+def read(file: Path, section: str, law: list[str] | None = None) -> tuple[Config, ParameterUncertainty, dict[str, Any]]:
     """The system, its parameter uncertainty and the section of the command.
 
     Raises
@@ -103,12 +91,7 @@ def agreed(cost: CostEstimate, yes: bool, stop: bool) -> bool:
 
     notes().print(f"{cost}", markup=False)
     add_json(
-        estimated_cost={
-            "runs": cost.runs,
-            "max_runs": cost.max_runs,
-            "seconds": cost.seconds,
-            "disk_bytes": cost.disk,
-        }
+        estimated_cost={"runs": cost.runs, "max_runs": cost.max_runs, "seconds": cost.seconds, "disk_bytes": cost.disk}
     )
     if stop:
         return False
@@ -123,9 +106,7 @@ def finish(dataset: xr.Dataset, output: Path, plot: Path | None, drawn: Any, lin
 
     files = [write_map(dataset, output)]
     if plot is not None:
-        with kept_if_not_drawn(
-            lambda file: plot_command(file, plot), output, functools.partial(write_map, dataset)
-        ):
+        with kept_if_not_drawn(lambda file: plot_command(file, plot), output, functools.partial(write_map, dataset)):
             import matplotlib
 
             matplotlib.use("Agg")
@@ -176,11 +157,7 @@ def design(
     begun = time.monotonic()
     with progress(None, "design", "generations") as report:
         dataset = optimize_design(*arguments, integration=how, checkpoint=checkpoint, progress=report)
-    add_json(
-        designs={
-            str(name): each.values for name, each in dataset.data_vars.items() if "tried" not in each.dims
-        }
-    )
+    add_json(designs={str(name): each.values for name, each in dataset.data_vars.items() if "tried" not in each.dims})
     finish(dataset, output, plot, plot_designs, _lines(dataset, time.monotonic() - begun))
 
 
@@ -213,10 +190,7 @@ def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
 
 def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
     runs, count = int(dataset.attrs["runs_made"]), dataset.sizes["design"]
-    lines = [
-        f"{runs} runs of {dataset.sizes['tried']} designs in {duration(elapsed)}",
-        *initial_well_lines(dataset),
-    ]
+    lines = [f"{runs} runs of {dataset.sizes['tried']} designs in {duration(elapsed)}", *initial_well_lines(dataset)]
     from snapbeam.cli.summary import coordinate_text, statistic_text, value_text
 
     words = str(dataset["constraints_satisfied"].attrs["flag_meanings"]).split()
@@ -232,11 +206,7 @@ def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
             kind, _, of = name.partition("_")
             ends = [value_text(one, name, float(one[f"{name}{end}"])) for end in ("_low", "_high")]
             value = statistic_text(one, name, float(one[name]))
-            value = (
-                f"satisfied: {of.replace('_', ' ')} {value.rpartition(': ')[2]}"
-                if kind == "satisfied"
-                else value
-            )
+            value = f"satisfied: {of.replace('_', ' ')} {value.rpartition(': ')[2]}" if kind == "satisfied" else value
             lines.append(f"  {value} ({' to '.join(ends)} at {share:g} %)")
             if kind == "satisfied":
                 lines.append(f"  {_distance(one, of)}")
@@ -291,13 +261,7 @@ def probability(
     axes = settings.axes() or _default_axes(settings.system)
     how = settings.integration.replace(threads=threads)
     cost = cost_of(
-        probability_map,
-        settings.system,
-        axes,
-        uncertainty,
-        runs,
-        integration=how,
-        trial=10.0 if estimate_cost else 2.0,
+        probability_map, settings.system, axes, uncertainty, runs, integration=how, trial=10.0 if estimate_cost else 2.0
     )
     if not agreed(cost, yes, estimate_cost):
         return
@@ -329,13 +293,9 @@ def _default_axes(system: System) -> dict[str, Any]:
 
     if DEFAULT_AXES.keys() <= system.parameters.keys():
         return {name: parsed_axis(name, text) for name, text in DEFAULT_AXES.items()}
-    numbers = [
-        name for name, each in system.parameters.items() if isinstance(each, float) and lookup(name).is_run
-    ]
+    numbers = [name for name, each in system.parameters.items() if isinstance(each, float) and lookup(name).is_run]
     if not numbers:
-        raise InputError(
-            "[contact]: missing, as is any other excitation; add one, and name the axes in [sweep]"
-        )
+        raise InputError("[contact]: missing, as is any other excitation; add one, and name the axes in [sweep]")
     return {numbers[0]: np.array([system.get(numbers[0])])}
 
 
@@ -357,9 +317,7 @@ def _probabilities(one: xr.Dataset) -> list[str]:
         values = {dim: point[dim].values.item() for dim in found.dims if dim in point.coords}
         where = ", ".join(coordinate_text(one, str(dim), value) for dim, value in values.items())
         low, high = float(point["probability_low"]), float(point["probability_high"])
-        lines.append(
-            f"  {where or 'probability'}: {float(point['probability']):.4g} ({low:.4g} to {high:.4g})"
-        )
+        lines.append(f"  {where or 'probability'}: {float(point['probability']):.4g} ({low:.4g} to {high:.4g})")
     return lines
 
 

@@ -17,13 +17,7 @@ from snapbeam.dynamics.flow import AdvancedStates, Flow, minimal_period
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot
 from snapbeam.dynamics.results import coordinate_names, fixed_parameters, in_unit, labelled
-from snapbeam.dynamics.shooting import (
-    Family,
-    OrbitNotFoundError,
-    jacobian,
-    orbit_tolerance,
-    require_isolated_orbits,
-)
+from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, jacobian, orbit_tolerance, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -369,10 +363,7 @@ def find_attractors(
         if transient is None
         else (integer("transient", transient, 1, 10**7), "as given")
     )
-    most, lasts = (
-        integer("max_periods", max_periods, 1, 512),
-        integer("check_periods", check_periods, 20, 10**7),
-    )
+    most, lasts = (integer("max_periods", max_periods, 1, 512), integer("check_periods", check_periods, 20, 10**7))
     rows = _states_of(flow, states, seed_of(rng))
     allowed = orbit_tolerance(tolerance)
 
@@ -488,9 +479,7 @@ def _verify(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:
 
 
 def _is_same(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
-    return (
-        one.period == other.period and float(np.abs(other.points - one.coordinates).max(axis=1).min()) < _SAME
-    )
+    return one.period == other.period and float(np.abs(other.points - one.coordinates).max(axis=1).min()) < _SAME
 
 
 def _nearest(orbits: list[PeriodicOrbit], x: _Array) -> int:
@@ -527,9 +516,7 @@ def _chaotic(
     for group in _groups(later.every):
         if left[group].any():
             continue
-        exponents = lyapunov_spectrum(
-            flow, 1, max(lasts // 2, 100), transient=0, states=later.states[group[:_FEW]]
-        )
+        exponents = lyapunov_spectrum(flow, 1, max(lasts // 2, 100), transient=0, states=later.states[group[:_FEW]])
         value = float(exponents["exponent"].mean())
         error = float(exponents["exponent_error"].max())
         if not value > _SIGMAS * error:
@@ -559,8 +546,7 @@ def _mingle(tree_one: Any, tree_other: Any) -> bool:
     """Return whether each run comes as close to the points of the other as to its own."""
     own = max(float(np.median(tree.query(tree.data, 2)[0][:, 1])) for tree in (tree_one, tree_other))
     across = min(
-        float(np.median(tree_one.query(tree_other.data)[0])),
-        float(np.median(tree_other.query(tree_one.data)[0])),
+        float(np.median(tree_one.query(tree_other.data)[0])), float(np.median(tree_other.query(tree_one.data)[0]))
     )
     return across < 3.0 * own
 

@@ -158,10 +158,7 @@ def edge_tracking(
     """
     flow = flow_of(system, integration, "reference")
     total, ahead = integer("periods", periods, 2, 10**6), integer("horizon", horizon, 1, 10**6)
-    near, far = (
-        positive("bisect_threshold", bisect_threshold),
-        positive("diverge_threshold", diverge_threshold),
-    )
+    near, far = (positive("bisect_threshold", bisect_threshold), positive("diverge_threshold", diverge_threshold))
     if not near < far:
         raise InputError(f"bisect_threshold = {near:g}: must be less than diverge_threshold = {far:g}")
     decide = _snaps if outcome is None else outcome
@@ -204,9 +201,7 @@ def edge_tracking(
         states.append(0.5 * (low + high))
         distances.append(size)
         if size == 0.0:
-            stopped = (
-                f"after {period + 1} periods the two states are equal to rounding; increase bisect_threshold"
-            )
+            stopped = f"after {period + 1} periods the two states are equal to rounding; increase bisect_threshold"
             break
         begin = size > far
         if report is not None:

@@ -88,9 +88,7 @@ class LifetimeSettings:
         if self.delay is not None:
             nonnegative("delay", self.delay, "cycles")
         if not nonnegative("settling_cycles", self.settling_cycles, "cycles") > 0.0:
-            raise InputError(
-                f"settling_cycles = {shown(self.settling_cycles)}: must be greater than 0 cycles"
-            )
+            raise InputError(f"settling_cycles = {shown(self.settling_cycles)}: must be greater than 0 cycles")
         within("confidence", self.confidence, 0.0, 1.0)
 
 
@@ -227,9 +225,7 @@ def proportion(hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95) -> tu
 
 def checked_cycles(name: str, values: ArrayLike, most: float) -> NDArray[np.int64]:
     """Whole numbers of cycles in increasing order, at most *most*."""
-    found = [
-        integer(f"{name}[{i}]", value, 0, int(most)) for i, value in enumerate(np.atleast_1d(values).tolist())
-    ]
+    found = [integer(f"{name}[{i}]", value, 0, int(most)) for i, value in enumerate(np.atleast_1d(values).tolist())]
     if not found or (np.diff(found) <= 0).any():
         raise InputError(f"{name} = {found}: must be increasing whole numbers of cycles")
     return np.array(found, dtype=np.int64)
@@ -265,9 +261,7 @@ class LifetimeWork(PointWork):
         kept = list(_PER_START)
         return self.setup.identity() | {"lifetimes": kept, "starts": self.initial_conditions.describe()}
 
-    def compute(
-        self, points: Columns, threads: int | None = None, progress: Progress | None = None
-    ) -> ResultTable:
+    def compute(self, points: Columns, threads: int | None = None, progress: Progress | None = None) -> ResultTable:
         """Integrate every run of *points*."""
         size, count = next(iter(points.values())).size, self.initial_conditions.count
         integers = np.zeros((len(_PER_START), count, size), dtype=np.int32)
@@ -456,9 +450,7 @@ def _after(after: ArrayLike | None, cycles: int, settings: LifetimeSettings) -> 
             f"cycles = {cycles} with settling_cycles = {settings.settling_cycles:g}: must be more than settling_cycles"
         )
     if after is None:
-        after = sorted(
-            {int(part) for part in (cycles / 8, cycles / 4, cycles / 2, observed) if part <= observed}
-        )
+        after = sorted({int(part) for part in (cycles / 8, cycles / 4, cycles / 2, observed) if part <= observed})
     return checked_cycles("after", after, observed)
 
 
@@ -517,9 +509,7 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
     return dataset
 
 
-def refit(
-    dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: ArrayLike | None = None
-) -> xr.Dataset:
+def refit(dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: ArrayLike | None = None) -> xr.Dataset:
     """The lifetimes and probabilities of a lifetime map again, with other settings.
 
     Parameters
@@ -604,7 +594,5 @@ def _enter(
     settings: LifetimeSettings,
 ) -> None:
     parts = proportion(hits, np.broadcast_to(total[..., None], hits.shape), settings.confidence)
-    for ending, values, text in zip(
-        ("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True
-    ):
+    for ending, values, text in zip(("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True):
         result[f"{name}{ending}"] = (dims, values, {"units": "1", "long_name": f"{text}{words}"})

@@ -318,12 +318,7 @@ def state_of(flow: Flow, name: str, given: State | ArrayLike | None) -> _Array:
 
 
 def shoot(
-    flow: Flow,
-    x: _Array,
-    period: int,
-    tolerance: float,
-    iterations: int = 40,
-    deflate: tuple[_Array, ...] = (),
+    flow: Flow, x: _Array, period: int, tolerance: float, iterations: int = 40, deflate: tuple[_Array, ...] = ()
 ) -> PeriodicOrbit:
     """Newton's method for P^m(x) = x."""
     one, family = np.eye(x.size), Family(flow)
@@ -337,6 +332,4 @@ def shoot(
 
     shot = newton(residual, derivative, x, tolerance, iterations, deflate=deflate)
     came = jacobian(family, shot.x, period)
-    return PeriodicOrbit(
-        flow, shot.x, period, came.jacobian, float(np.abs(came.x - shot.x).max()), shot.iterations
-    )
+    return PeriodicOrbit(flow, shot.x, period, came.jacobian, float(np.abs(came.x - shot.x).max()), shot.iterations)

@@ -98,9 +98,7 @@ def poincare_section(
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)
     before, rule = (
-        settling_periods(flow)
-        if transient is None
-        else (integer("transient", transient, 0, 10**7), "as given")
+        settling_periods(flow) if transient is None else (integer("transient", transient, 0, 10**7), "as given")
     )
     begun = flow.coordinates()
     if before:

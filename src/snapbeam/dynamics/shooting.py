@@ -68,9 +68,7 @@ class Family:
 
     def __init__(self, flow: Flow, *names: str) -> None:
         self.flow, self.names = flow, names
-        self._beside = not isinstance(flow, Stroboscope) or all(
-            flow.system.parameter(name).is_run for name in names
-        )
+        self._beside = not isinstance(flow, Stroboscope) or all(flow.system.parameter(name).is_run for name in names)
 
     def advance(
         self, x: _Array, periods: int, values: ArrayLike = (), tangents: _Array | None = None
@@ -92,9 +90,7 @@ class Family:
         """Derivative by the one parameter of where the flow brings one state, shape (d,)."""
         if self._beside and isinstance(self.flow, Stroboscope):
             return self.flow.slope(x, periods, self.names[0], value, step)
-        above, below = (
-            self.advance(x[None], periods, [value + sign * step]).states[0] for sign in (1.0, -1.0)
-        )
+        above, below = (self.advance(x[None], periods, [value + sign * step]).states[0] for sign in (1.0, -1.0))
         change: _Array = (above - below) / (2.0 * step)
         return change
 

@@ -27,15 +27,7 @@ from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
 from snapbeam.model.local_force import LOCAL_FORCES
-from snapbeam.model.quantity import (
-    NUMBERED,
-    RUN,
-    ParameterField,
-    numbered,
-    quantities,
-    section_of,
-    split_name,
-)
+from snapbeam.model.quantity import NUMBERED, RUN, ParameterField, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
 from snapbeam.model.state import START_NAME, checked_well
 from snapbeam.model.striker import Striker
@@ -108,9 +100,7 @@ class Parameter:
         if math.isinf(item.low) and math.isinf(item.high):
             return "any"
         left = "[" if item.closed in ("left", "both") or item.kind is int else "("
-        right = (
-            "]" if item.closed in ("right", "both") or (item.kind is int and item.high < math.inf) else ")"
-        )
+        right = "]" if item.closed in ("right", "both") or (item.kind is int and item.high < math.inf) else ")"
         return f"{left}{item.low:g}, {item.high:g}{right}"
 
 
@@ -155,12 +145,7 @@ def kinds_of(section: str) -> Mapping[str, Any]:
     return known.get(section, {})
 
 
-_AROUND = {
-    "base_excitation": "the base",
-    "axial_load": "",
-    "force": "",
-    "harvester": "",
-}
+_AROUND = {"base_excitation": "the base", "axial_load": "", "force": "", "harvester": ""}
 """Sections of base, axial load and forces, with prefixes for dataset names and long names."""
 
 
@@ -274,9 +259,7 @@ def lookup(name: str) -> Parameter:
     if name in ("initial_state.striker_position", "initial_state_striker_position"):
         words = "mid-position of the striker's tip in space"
         return Parameter(
-            "initial_state.striker_position",
-            "initial_state_striker_position",
-            ParameterField("m", words, scope=RUN),
+            "initial_state.striker_position", "initial_state_striker_position", ParameterField("m", words, scope=RUN)
         )
     shorts, table = short_names(), _known()
     if name in shorts:
@@ -293,11 +276,7 @@ def lookup(name: str) -> Parameter:
     if len(tails.get(name, [])) == 1:
         return table[tails[name][0]]
     close = difflib.get_close_matches(name, [*table, *shorts, *PHYSICAL], 3)
-    hint = (
-        f"; did you mean {' or '.join(map(repr, close))}?"
-        if close
-        else f"; see {', '.join(list(table)[:6])}, ..."
-    )
+    hint = f"; did you mean {' or '.join(map(repr, close))}?" if close else f"; see {', '.join(list(table)[:6])}, ..."
     raise InputError(f"{name}: is not a parameter{hint}")
 
 
@@ -365,9 +344,7 @@ def _in_units() -> Iterable[tuple[str, Physical]]:
         if field not in _IN_UNITS or section not in _OWNERS or row.quantity.unit != "1":
             continue
         own, unit, words = _IN_UNITS[field]
-        of = (
-            f"excitation {words}" if row.name == "drive.frequency_ratio" else f"{words} of {_OWNERS[section]}"
-        )
+        of = f"excitation {words}" if row.name == "drive.frequency_ratio" else f"{words} of {_OWNERS[section]}"
         for number in range(1, 1 + (_MAX_NUMBER if section in NUMBERED else 1)):
             name = section_of(section, number)
             text = of if number == 1 else f"{of} {number}"

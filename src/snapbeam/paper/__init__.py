@@ -75,18 +75,14 @@ si5 = Recipe("si5", "response over location and amplitude as modes are added (an
 
 low_frequency = Recipe("low_frequency", "threshold over the quasi-static one at low frequency", "studies")
 resonance = Recipe("resonance", "the resonance of the intrawell response and the notch of fig6", "studies")
-waveforms = Recipe(
-    "waveforms", "snap-throughs, impacts and modes of runs at random points of fig6", "studies"
-)
+waveforms = Recipe("waveforms", "snap-throughs, impacts and modes of runs at random points of fig6", "studies")
 lifetimes = Recipe("lifetimes", "how long snapping lasts over the plane of fig6 and fig7", "studies")
 transients = Recipe("transients", "what still changes after the cycles of fig7", "studies")
 windows = Recipe("windows", "amplitudes of transient responses near a clamp and near the centre", "studies")
 disturbances = Recipe(
     "disturbances", "start-up transients, starts off the well, impacts without higher modes", "studies"
 )
-harvesting = Recipe(
-    "harvesting", "power of a harvester by impact, and its share at high frequencies", "studies"
-)
+harvesting = Recipe("harvesting", "power of a harvester by impact, and its share at high frequencies", "studies")
 two_tips = Recipe("two_tips", "how high a slow pusher with one tip or two is when the beam snaps", "studies")
 switch = Recipe("switch", "the cheapest burst that switches a beam with a bias", "studies")
 notch = Recipe("notch", "how far each thing left out of the model moves the notch of fig6", "studies")

@@ -132,9 +132,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         shown = ("zero_crossings", "impacts", "peak_force", "striker_work", "contact_time_fraction")
-        rows = [
-            (STATISTICS[name].long_name, f"{self.summary[name]:.5g}", STATISTICS[name].unit) for name in shown
-        ]
+        rows = [(STATISTICS[name].long_name, f"{self.summary[name]:.5g}", STATISTICS[name].unit) for name in shown]
         rows += [(section, line.strip(), "") for section, _, line in _described(self.system)]
         return html_table(f"Run: {self.summary.response_class.label}, {self.summary.status.advice}", rows)
 

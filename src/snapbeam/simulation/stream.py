@@ -123,9 +123,7 @@ def simulate_to_file(
             if full and writer.waiting is not None:
                 break
             writer.take(piece)
-            if (
-                full or stream.trouble is not None
-            ):  # not even the first piece: an error below says where it is
+            if full or stream.trouble is not None:  # not even the first piece: an error below says where it is
                 break
         summary = writer.finish()
     if full and summary.status is RunStatus.INTERRUPTED:
@@ -178,9 +176,7 @@ class _Writer:
         assert last is not None  # an engine yields at least one piece
         summary = RunSummary.from_statistics(statistics_of(run.ensemble, last.accumulators_of_runs))
         if summary.status != RunStatus.OK:
-            last = reached_by(
-                last, float(last.accumulators_of_runs["time"][0] * run.ensemble.runs["tick"][0])
-            )
+            last = reached_by(last, float(last.accumulators_of_runs["time"][0] * run.ensemble.runs["tick"][0]))
         tell_imbalance(run, summary, last.accumulators_of_runs)
         attrs = run_attributes(run, summary, last.accumulators_of_runs)
         self.append(last, np.zeros(1) if self.written + last.times.size == 0 else None)

@@ -142,9 +142,7 @@ def perturbation_growth(
     plan = plans_of(system, integration, run_columns(system, {}))[0]
     ensemble = make_ensemble(system, integration, plan=plan)
     times = _instants(system, ensemble)
-    separation = _apart(
-        _watch(system, ensemble, times), _watch(system, _perturbed(ensemble, system, size), times)
-    )
+    separation = _apart(_watch(system, ensemble, times), _watch(system, _perturbed(ensemble, system, size), times))
     attrs = {
         "title": "perturbation growth of a run",
         "length_scale": system.scale.length,
@@ -178,10 +176,7 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, ErrorEsti
     limit = integration.tolerance
     assert limit is not None
     whole = integration.replace(tolerance=None, early_termination=False)
-    steps = {
-        level: plans_of(system, whole.replace(accuracy=level), run_columns(system, {}))[0]
-        for level in ACCURACIES
-    }
+    steps = {level: plans_of(system, whole.replace(accuracy=level), run_columns(system, {}))[0] for level in ACCURACIES}
     refinements = _FINE if limit < _CHEAP else (*_ROUGH, *_FINE[1:])
     levels = [steps[level].scaled(length) for level, length in refinements]
     times = _instants(system, make_ensemble(system, whole, plan=steps["standard"]))

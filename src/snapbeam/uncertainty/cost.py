@@ -92,9 +92,7 @@ class CostEstimate:
 
 
 @checked
-def estimate_cost(
-    question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **options: Any
-) -> CostEstimate:
+def estimate_cost(question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **options: Any) -> CostEstimate:
     """Estimate the cost of a computation from a trial of some seconds.
 
     Parameters
@@ -187,9 +185,7 @@ def _needed(share: float, allocation: SamplingPlan) -> int:
     return min(n, allocation.max_runs)
 
 
-def _expected(
-    allocation: SamplingPlan, where: NDArray[np.int64], happened: NDArray[np.bool_], points: int
-) -> int:
+def _expected(allocation: SamplingPlan, where: NDArray[np.int64], happened: NDArray[np.bool_], points: int) -> int:
     """Runs of a map, from few runs at few points: those with both outcomes need more."""
     if allocation.half_width is None:
         return points * allocation.initial_runs

@@ -35,9 +35,9 @@ def class_counts(dataset: xr.Dataset) -> NDArray[np.int64]:
     hits = dataset["hits"].transpose(..., "outcome")
     of = {str(name): hits.sel(outcome=name).values for name in hits["outcome"].values}
     intrawell = dataset["runs"].transpose(*hits.dims[:-1]).values - of["snap"]
-    return np.stack(
-        [intrawell, of["first_well"] - intrawell, of["other_well"], of["continuous"]], axis=-1
-    ).astype(np.int64)
+    return np.stack([intrawell, of["first_well"] - intrawell, of["other_well"], of["continuous"]], axis=-1).astype(
+        np.int64
+    )
 
 
 @checked
@@ -157,9 +157,7 @@ def _nearest(
     found = []
     for name in dims:
         if name not in _COORDINATES:
-            raise InputError(
-                f"dataset over {name}: the measurements do not contain it; choose one of its points"
-            )
+            raise InputError(f"dataset over {name}: the measurements do not contain it; choose one of its points")
         axis, values = dataset[name].values, getattr(measurements, name)[known]
         if np.isnan(values).any():
             raise InputError(f"measurements: {name} is not given for all of them, but is an axis of the map")

@@ -92,9 +92,7 @@ class Trials:
     progress: Progress | None = field(default=None, repr=False)
     """Called with the runs of a round, unless the round has a report of its own."""
 
-    def columns(
-        self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None
-    ) -> Columns:
+    def columns(self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None) -> Columns:
         """The parameters of the samples: those of the points, and those that are sampled around them.
 
         Parameters
@@ -172,9 +170,7 @@ class Trials:
     def _nominal(self, name: str) -> float:
         value = self.system.get(name) if ratio_of(name) in self.system.parameters else None
         if value is None or np.ndim(value) != 0:
-            same = [
-                each for each in self.system.parameters if split_name(each)[1] == split_name(name)[1] != ""
-            ]
+            same = [each for each in self.system.parameters if split_name(each)[1] == split_name(name)[1] != ""]
             way = f"; this system has {', '.join(same)}" if value is None and same else ""
             if way and name == "drive.phase":
                 way += ": leave phase = True out, and give it as a UniformRange(0, 2 pi)"
@@ -236,17 +232,13 @@ class Trials:
         """The start of every sample, as columns; one that would press the tip is turned about, so that it leaves it."""
         given = [name for name in columns if name.startswith("initial_state.")]
         if given:
-            raise InputError(
-                f"{given[0]}: is sampled by the displacement of the uncertainty; leave one of the two out"
-            )
+            raise InputError(f"{given[0]}: is sampled by the displacement of the uncertainty; leave one of the two out")
         striker, size = self.system.striker, numbers.size
         modes = self.system.model.modes
         given_place = 0.5 if striker is None else striker.location
         location = columns.get("contact.location", np.full(size, given_place))
         table = np.empty((size, 2, modes))
-        starts = InitialConditions(
-            count=1, displacement=self.uncertainty.displacement, seed=self.uncertainty.seed
-        )
+        starts = InitialConditions(count=1, displacement=self.uncertainty.displacement, seed=self.uncertainty.seed)
         for system, which in self._structures(columns, size):
             scale = amplitude_scale(system.model)
             speed = scale * 2.0 * np.pi * system.model.reference_frequency
@@ -274,9 +266,7 @@ def _folder(path: Path) -> Path:
     if path.exists() and not path.is_dir():
         raise InputError(f"checkpoint = {str(path)!r}: is a file; must be a folder")
     if not path.absolute().parent.is_dir():
-        raise InputError(
-            f"checkpoint = {str(path)!r}: {str(path.absolute().parent)!r} is not an existing folder"
-        )
+        raise InputError(f"checkpoint = {str(path)!r}: {str(path.absolute().parent)!r} is not an existing folder")
     if (path / "map.json").exists():
         raise InputError(f"checkpoint = {str(path)!r}: holds a sweep; give another folder")
     path.mkdir(exist_ok=True)
@@ -288,19 +278,13 @@ def _remedy(name: str, distribution: Distribution | None) -> str:
     others = "make the uncertainty smaller, or use a LogNormal or a UniformRange"
     if not isinstance(distribution, (Normal, UniformTolerance)) or distribution.relative:
         return others
-    width = (
-        distribution.half_width
-        if isinstance(distribution, UniformTolerance)
-        else distribution.standard_deviation
-    )
+    width = distribution.half_width if isinstance(distribution, UniformTolerance) else distribution.standard_deviation
     unit = lookup(name).quantity.unit
     meant = f"{width:g}{'' if unit == '1' else f' {unit}'}"
     return f"{meant} is in the unit of the parameter; for a share of its value set relative = true; {others}"
 
 
-def _require_allowed(
-    name: str, values: NDArray[np.float64], distribution: Distribution | None = None
-) -> None:
+def _require_allowed(name: str, values: NDArray[np.float64], distribution: Distribution | None = None) -> None:
     """Refuse samples that no system can have, with the advice to sample from something else."""
     for value in (values.min(), values.max()):
         try:
@@ -432,8 +416,7 @@ OUTCOMES: dict[str, Event] = {
         "the beam ends about the well it began in", lambda found: np.isin(found["response_class"], _FIRST)
     ),
     "other_well": Event(
-        "the beam ends about the other well",
-        lambda found: found["response_class"] == ResponseClass.TRANSIENT_2,
+        "the beam ends about the other well", lambda found: found["response_class"] == ResponseClass.TRANSIENT_2
     ),
 }
 """Outcomes that every probability map has.  The last three exclude each other and one of them happens."""
@@ -489,12 +472,7 @@ def wilson(hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95) -> tuple[
 
 
 def interval_of(
-    hits: ArrayLike,
-    runs: ArrayLike,
-    failed: ArrayLike = 0,
-    *,
-    confidence: float = 0.95,
-    method: str = "wilson",
+    hits: ArrayLike, runs: ArrayLike, failed: ArrayLike = 0, *, confidence: float = 0.95, method: str = "wilson"
 ) -> tuple[_Array, _Array, _Array]:
     """A probability with its interval; runs that failed may have been hits or not, and widen it both ways.
 

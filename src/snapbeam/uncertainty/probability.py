@@ -289,16 +289,11 @@ def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
 
 
 def _counted(
-    trials: Trials,
-    points: Points,
-    allocation: SamplingPlan,
-    tell: Callable[[int, int], object] | None,
+    trials: Trials, points: Points, allocation: SamplingPlan, tell: Callable[[int, int], object] | None
 ) -> Counts:
     told = [0, 0]
 
-    def ask(
-        which: NDArray[np.int64], numbers: NDArray[np.int64]
-    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def ask(which: NDArray[np.int64], numbers: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         def report(done: int, total: int) -> None:
             if tell is not None:
                 tell(told[0] + done, max(told[1], told[0] + total))
@@ -360,10 +355,7 @@ def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Samp
     dataset["hits"] = ((*points.dims, OUTCOME), hits, labels)
     plain = {
         "runs": (counts.runs, "runs that came to an end"),
-        "runs_failed": (
-            counts.failed,
-            "runs that failed; the intervals hold for whatever they might have done",
-        ),
+        "runs_failed": (counts.failed, "runs that failed; the intervals hold for whatever they might have done"),
         "reached": (~counts.open, "true where the interval has the requested width"),
     }
     for name, (values, text) in plain.items():

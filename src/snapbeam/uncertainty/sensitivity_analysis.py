@@ -24,17 +24,7 @@ from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.singular_values import polyfit
-from snapbeam.util.validation import (
-    InputError,
-    axis,
-    checked,
-    choice,
-    finite_array,
-    integer,
-    seed_of,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, axis, checked, choice, finite_array, integer, seed_of, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -134,9 +124,7 @@ def _check_variation(name: str, values: _Array) -> None:
     """Refuse an output that is constant up to rounding: its variance has no shares."""
     extent = float(np.ptp(values))
     if extent <= _ROUNDING * float(np.abs(values).max()):
-        raise InputError(
-            f"{name}: is constant, {values.flat[0]:.12g} within {extent:.1g}; must vary with the inputs"
-        )
+        raise InputError(f"{name}: is constant, {values.flat[0]:.12g} within {extent:.1g}; must vary with the inputs")
 
 
 def _bins(x: _Array, count: int) -> NDArray[np.int64]:
@@ -256,9 +244,7 @@ def _matrices(inputs: int, size: int, seed: int, number: int) -> _Array:
 def _mean(table: _Array, confidence: float) -> Indices:
     count = len(table)
     middle = table.mean(axis=0)
-    reach = (
-        float(stats.t.ppf(0.5 * (1.0 + confidence), count - 1)) * table.std(axis=0, ddof=1) / np.sqrt(count)
-    )
+    reach = float(stats.t.ppf(0.5 * (1.0 + confidence), count - 1)) * table.std(axis=0, ddof=1) / np.sqrt(count)
     return Indices(middle, middle - reach, middle + reach)
 
 
@@ -374,9 +360,7 @@ class ThresholdQoI:
     def __post_init__(self) -> None:
         row = lookup(self.parameter)
         if not row.is_run or row.quantity.kind is not float:
-            raise InputError(
-                f"parameter = {shown(self.parameter)}: must be a number that may differ between runs"
-            )
+            raise InputError(f"parameter = {shown(self.parameter)}: must be a number that may differ between runs")
         axis("bounds", self.bounds, -np.inf, np.inf)
         integer("values", self.values, 2, 100_000)
         integer("halvings", self.halvings, 0, 40)
@@ -412,9 +396,7 @@ class ThresholdQoI:
             low, high = np.where(up, low, middle), np.where(up, middle, high)
         return np.where(known, 0.5 * (low + high), np.nan)
 
-    def _snaps(
-        self, trials: Trials, scores: _Array, numbers: _Numbers, row: str, values: _Array
-    ) -> NDArray[np.bool_]:
+    def _snaps(self, trials: Trials, scores: _Array, numbers: _Numbers, row: str, values: _Array) -> NDArray[np.bool_]:
         points = {lookup(name).name: np.full(values.size, float(value)) for name, value in self.at.items()}
         found = trials.statistics(points | {row: values}, numbers, scores=scores)
         return np.asarray(found["response_class"] > 0)
@@ -648,9 +630,7 @@ def sensitivity(
     choice("method", method, METHODS)
     within("confidence", confidence, 0.0, 1.0)
     asked = quantity_of_interest(quantity)
-    trials = trials_of(
-        system, uncertainty, integration, checkpoint=checkpoint, early=not isinstance(quantity, str)
-    )
+    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, early=not isinstance(quantity, str))
     trials.progress = counting(progress, "sensitivity", "runs")
     names = trials.uncertainty.parameters
     if not names:
@@ -740,11 +720,7 @@ def _given_data(
     scores = trials.uncertainty.normals(numbers)
     values = _ask(trials, quantity, scores, numbers)
     found = sobol_indices_from_samples(scores, values, confidence=confidence, rng=trials.uncertainty.seed)
-    return {
-        "first_order": found.estimate,
-        "first_order_low": found.low,
-        "first_order_high": found.high,
-    }, values
+    return {"first_order": found.estimate, "first_order_low": found.low, "first_order_high": found.high}, values
 
 
 _WORDS = {

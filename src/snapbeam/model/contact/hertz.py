@@ -62,10 +62,7 @@ class HertzContact(ContactLaw):
 
     @classmethod
     def from_materials(
-        cls,
-        radius: float,
-        young_modulus: tuple[float, float],
-        poisson_ratio: tuple[float, float],
+        cls, radius: float, young_modulus: tuple[float, float], poisson_ratio: tuple[float, float]
     ) -> HertzContact:
         """Contact of a sphere with a flat, both elastic.
 
@@ -101,9 +98,7 @@ class HertzContact(ContactLaw):
         except OverflowError:
             found = math.inf
         if not math.isfinite(found):
-            raise InputError(
-                f"mass = {mass:g} kg, velocity = {velocity:g} m/s: are beyond what a number holds"
-            )
+            raise InputError(f"mass = {mass:g} kg, velocity = {velocity:g} m/s: are beyond what a number holds")
         return found
 
     def impact_duration(self, mass: float, velocity: float) -> float:
@@ -123,9 +118,7 @@ def _pair(name: str, value: tuple[float, float]) -> list[tuple[int, float]]:
     try:
         items = list(value)
     except TypeError:
-        raise InputTypeError(
-            f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat"
-        ) from None
+        raise InputTypeError(f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat") from None
     if len(items) != 2:
         raise InputError(f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat")
     return list(enumerate(items))

@@ -49,9 +49,7 @@ class LayeredHertz(ContactLaw):
         "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
         plausible=(1.0, 1e15, "N/mm^1.5"),
     )  # fmt: skip
-    layer_stiffness: float = quantity(
-        "N/m^2", "stiffness of the layer", low=0.0, scope=RUN, symbol=r"k_\mathrm{l}"
-    )
+    layer_stiffness: float = quantity("N/m^2", "stiffness of the layer", low=0.0, scope=RUN, symbol=r"k_\mathrm{l}")
 
     name = "layer"
 

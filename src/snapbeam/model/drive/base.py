@@ -229,6 +229,4 @@ class Timed(Drive):
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The rate of the phase, and what the subclass needs."""
-        return {"omega": 2.0 * math.pi / (HORIZON * self.cycle(columns, scale))} | self.shape_numbers(
-            columns, scale
-        )
+        return {"omega": 2.0 * math.pi / (HORIZON * self.cycle(columns, scale))} | self.shape_numbers(columns, scale)

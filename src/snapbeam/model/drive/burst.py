@@ -58,9 +58,7 @@ class Burst(Timed):
     )
     duration_cycles: float = quantity("1", "cycles of the burst", low=0.0, scope=RUN)
     ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
-    ramp_down_cycles: float = quantity(
-        "1", "cycles in which the drive falls", default=1.0, low=0.0, scope=RUN
-    )
+    ramp_down_cycles: float = quantity("1", "cycles in which the drive falls", default=1.0, low=0.0, scope=RUN)
     retraction: float = quantity(
         "1", "distance that the tip withdraws after the burst, over b", default=0.0, low=0.0, closed="left", scope=RUN,
     )  # fmt: skip

@@ -65,9 +65,7 @@ class Chirp(Timed):
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """One sweep."""
         found = self.shape_numbers(columns, scale)
-        return [
-            Sweep(found["speed"], found["first"], found["last"], found["duration"], self.sweep_type == "log")
-        ]
+        return [Sweep(found["speed"], found["first"], found["last"], found["duration"], self.sweep_type == "log")]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """The first period."""

@@ -47,11 +47,7 @@ class HalfSine(Timed):
         "1", "displacement amplitude over b", low=0.0, closed="left", scope=RUN, symbol="A/b"
     )
     duration: float = quantity(
-        "1",
-        "duration of the shock over the period of the first mode",
-        low=0.0,
-        scope=RUN,
-        short="shock_duration",
+        "1", "duration of the shock over the period of the first mode", low=0.0, scope=RUN, short="shock_duration"
     )
 
     name = "half_sine"

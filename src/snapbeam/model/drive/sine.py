@@ -68,10 +68,7 @@ class Sine(Drive):
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """Angular frequency (rad/s) and amplitude of the displacement (m)."""
         omega = columns["frequency_ratio"] * scale.omega
-        return {
-            "omega": omega,
-            "amplitude": columns["velocity_amplitude"] * scale.length * scale.omega / omega,
-        }
+        return {"omega": omega, "amplitude": columns["velocity_amplitude"] * scale.length * scale.omega / omega}
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """One period of the sine."""
@@ -125,10 +122,7 @@ class _OwnAmplitude(Drive):
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """Angular frequency (rad/s) and amplitude of the displacement (m)."""
-        return {
-            "omega": columns["frequency_ratio"] * scale.omega,
-            "amplitude": self._amplitude(columns, scale),
-        }
+        return {"omega": columns["frequency_ratio"] * scale.omega, "amplitude": self._amplitude(columns, scale)}
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """One period of the sine."""

@@ -56,13 +56,7 @@ class TwoTone(Timed):
         "1", "velocity amplitude of the second sine over b omega_1", low=0.0, closed="left", scope=RUN
     )
     second_phase: float = quantity(
-        "rad",
-        "phase of the second sine at the start",
-        default=0.0,
-        low=-1e6,
-        high=1e6,
-        closed="both",
-        scope=RUN,
+        "rad", "phase of the second sine at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN
     )
 
     name = "two_tone"
@@ -71,10 +65,7 @@ class TwoTone(Timed):
         """Two tones; the second begins at zero."""
         found = self.shape_numbers(columns, scale)
         a, phase = found["second_amplitude"], found["second_phase"]
-        return [
-            Tone(found["amplitude"], found["rate"]),
-            Tone(a, found["second_rate"], phase, -a * np.sin(phase)),
-        ]
+        return [Tone(found["amplitude"], found["rate"]), Tone(a, found["second_rate"], phase, -a * np.sin(phase))]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """One period of the first."""
@@ -106,9 +97,7 @@ class TwoTone(Timed):
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Both at their depths at once."""
         found = self.shape_numbers(columns, scale)
-        return np.asarray(
-            found["amplitude"] + found["second_amplitude"] * (1.0 + np.sin(found["second_phase"]))
-        )
+        return np.asarray(found["amplitude"] + found["second_amplitude"] * (1.0 + np.sin(found["second_phase"])))
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Both at their hardest at once."""

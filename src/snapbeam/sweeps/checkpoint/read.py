@@ -131,15 +131,11 @@ def _work(described: dict[str, Any], name: str, done: dict[int, TaskRecord]) -> 
     work = PointWork(setup, repeats, metres=setup.length_varies)
     number, record = next(iter(done.items()), (0, None))
     if record is not None and work.task_hash(Stage(BASE, points, chunk).columns(number)) != record.parameters:
-        raise InputError(
-            f"checkpoint = {shown(name)}: its tasks do not match its description; compute it again"
-        )
+        raise InputError(f"checkpoint = {shown(name)}: its tasks do not match its description; compute it again")
     return work
 
 
-def _rows(
-    folder: Path, work: PointWork, stage: Stage, done: dict[int, TaskRecord]
-) -> tuple[ResultTable, int]:
+def _rows(folder: Path, work: PointWork, stage: Stage, done: dict[int, TaskRecord]) -> tuple[ResultTable, int]:
     """Return the rows of all points of a stage, and the number of points that are finished."""
     found = work.unfinished(stage.size)
     points = 0
