@@ -358,21 +358,14 @@ def test_questions_of_dynamics() -> None:
 @SLOW
 def test_a_single_striker_with_two_tones() -> None:
     """A motion of two sines repeats after their common period: the sum of the exponents, and an orbit of a run."""
-    drive = sb.TwoTone(
-        frequency_ratio=1.2,
-        velocity_amplitude=0.05,
-        second_ratio=1.8,
-        second_amplitude=0.02,
-        second_phase=0.4,
-    )
+    first = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.05)
+    drive = first + sb.Sine(frequency_ratio=1.8, velocity_amplitude=0.02, phase=0.4)
     system = sb.System(model(2, 0.05), contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))])
     flow = Stroboscope(system)
     assert flow.clock.cycles_per_period == 2
     found = sb.dynamics.lyapunov_spectrum(system, periods=20, transient=5, k=4)
     assert float(found.exponent.sum()) == pytest.approx(-0.1 * float(system.model.omega.sum()), rel=1e-6)
-    summed = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.05) + sb.Sine(
-        frequency_ratio=1.6, velocity_amplitude=0.02
-    )
+    summed = first + sb.Sine(frequency_ratio=1.6, velocity_amplitude=0.02)
     assert Stroboscope(system.replace(drive=summed)).clock.cycles_per_period == 3
 
 

@@ -201,7 +201,6 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         "band_limited_noise": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
         "random_vibration": sb.RecordedAcceleration.from_psd([(20.0, 0.04), (200.0, 0.04)], duration_s=0.5),
         "shock": sb.Shock(acceleration_g=10.0, duration_ms=11.0),
-        "two_tone": sb.TwoTone(**pair, second_ratio=2.0, second_amplitude=0.1),
         "constant_velocity": sb.ConstantVelocity(speed=0.4),
         "displacement_sine": sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.1),
         "acceleration_sine": sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=0.1),

@@ -243,13 +243,6 @@ OF_OTHERS = {
         sb.RecordedAcceleration.from_psd([(20.0, 0.04), (200.0, 0.04)], duration_s=0.5),
         {"psd": ((20.0, 0.04), (200.0, 0.02)), "duration_s": 0.4, "rms_g": 1.0, "seed": 2, "ramp_up_s": 0.1},
     ),
-    "two_tone": (
-        sb.TwoTone(frequency_ratio=1.0, velocity_amplitude=0.1, second_ratio=2.0, second_amplitude=0.1),
-        {
-            "frequency_ratio": 1.1, "velocity_amplitude": 0.2, "second_ratio": 2.5, "second_amplitude": 0.2,
-            "second_phase": 0.3,
-        },
-    ),
     "constant_velocity": (sb.ConstantVelocity(speed=0.4), {"speed": 0.5}),
     "fixed": (sb.FixedStop(), {}),
     "displacement_sine": (

@@ -212,9 +212,8 @@ def test_refuses_tolerances_out_of_range(tolerance) -> None:
 MOTIONS: dict[str, sb.Drive] = {
     "sine": sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2, phase=0.4),
     "by its displacement": sb.DisplacementSine(frequency_ratio=1.2, displacement_amplitude=0.2),
-    "two sines": sb.TwoTone(
-        frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1
-    ),
+    "two sines": sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)
+    + sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.1),
     "burst": sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.2, duration_cycles=3.0, retraction=0.1),
     "chirp": sb.Chirp(start_ratio=0.8, stop_ratio=1.5, velocity_amplitude=0.2, sweep_cycles=5.0),
     "shock": sb.HalfSine(displacement_amplitude=0.3, duration=0.5),

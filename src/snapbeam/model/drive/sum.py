@@ -35,7 +35,7 @@ class SumDrive(Timed):
 
     See Also
     --------
-    snapbeam.Drive, snapbeam.TwoTone
+    snapbeam.Drive, snapbeam.Sine
 
     Examples
     --------
@@ -160,7 +160,7 @@ class SumDrive(Timed):
         """The same of the mirror image."""
         return np.asarray(
             sum(
-                drive.mirrored_bounds(own, scale) - self._begun(drive, own, scale)
+                drive.mirrored_bounds(own, scale) + self._begun(drive, own, scale)
                 for _, drive, own in self.each_term(columns)
             )
         )
