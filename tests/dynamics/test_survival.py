@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.dynamics.lifetimes import LifetimeSettings, fit_lifetime, proportion
+from snapbeam.dynamics.lifetimes import LifetimeSettings, fit_lifetime
+from snapbeam.util.proportions import proportion
 from snapbeam.util.validation import InputError
 
 LIFETIME, DELAY = 50.0, 8.0

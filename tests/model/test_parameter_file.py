@@ -8,14 +8,7 @@ import pytest
 from snapbeam.model.default_values import BEAM, CONTACT
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameter_axes import from_physical, parse_axis, to_physical
-from snapbeam.model.parameter_file import (
-    DEFAULT_AXES,
-    Config,
-    config_from_mapping,
-    dump_config,
-    load_config,
-    override,
-)
+from snapbeam.model.parameter_file import DEFAULT_AXES, Config, config_from_mapping, dump_config, load_config, override
 from snapbeam.model.parameters import PHYSICAL
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import points_of

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from snapbeam.dynamics.lifetimes import proportion
 from snapbeam.paper.claims.claim_result import Check, ClaimResult, Quantity, above, below, found
+from snapbeam.util.proportions import proportion
 
 __all__ = ["Row", "claims", "table"]
 
@@ -37,7 +37,7 @@ def _all(*checks: Check) -> Check:
 
 
 def _share(hits: int, runs: int) -> Quantity:
-    """With the greater half of Jeffreys' interval of 95 %."""
+    """With the greater half of Wilson's interval of 95 %."""
     value, low, high = (float(part) for part in proportion(hits, runs))
     return Quantity(value, max(high - value, value - low))
 

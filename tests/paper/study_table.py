@@ -16,7 +16,7 @@ import xarray as xr
 from scipy import stats
 
 import snapbeam as sb
-from snapbeam.dynamics.lifetimes import proportion
+from snapbeam.util.proportions import proportion
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
 FILE = DATA / "lifetimes.md"

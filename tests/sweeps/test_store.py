@@ -22,13 +22,7 @@ from snapbeam.cli.app import app
 from snapbeam.sweeps.checkpoint import records as durable
 from snapbeam.sweeps.checkpoint import records as ledger
 from snapbeam.sweeps.checkpoint import store as tables
-from snapbeam.sweeps.checkpoint.records import (
-    CheckpointError,
-    CheckpointLock,
-    TaskLog,
-    TaskRecord,
-    append_line,
-)
+from snapbeam.sweeps.checkpoint.records import CheckpointError, CheckpointLock, TaskLog, TaskRecord, append_line
 from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.compute import SweepReport
 from snapbeam.sweeps.tasks import PointWork, Stage

@@ -18,6 +18,7 @@ from snapbeam.dynamics.lifetimes import fit_lifetime
 from snapbeam.uncertainty.posterior import _population
 from snapbeam.uncertainty.probability import allocate
 from snapbeam.uncertainty.quantiles import crossing, local_crossing, search
+from snapbeam.uncertainty.sensitivity_analysis import first_order
 from snapbeam.util.files import atomic_path
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
@@ -40,7 +41,7 @@ class Counted(NamedTuple):
         return float(np.mean(list(self.shares.values())))
 
 
-def proportions(method: str) -> Counted:
+def proportions() -> Counted:
     """Runs of a point stop once its interval is narrow; probabilities are spread evenly over (0, 1)."""
     truth = (np.arange(10 * TRIALS) + 0.5) / (10 * TRIALS)
     ranks = np.random.default_rng(5)
@@ -49,7 +50,7 @@ def proportions(method: str) -> Counted:
         hits = ranks.random(which.size) < truth[which]
         return np.stack([hits] * 4), np.zeros(which.size, dtype=bool)
 
-    allocation = sb.uncertainty.SamplingPlan(half_width=0.05, interval=method)
+    allocation = sb.uncertainty.SamplingPlan(half_width=0.05)
     _, low, high = allocate(ask, truth.size, allocation).limits(allocation, 0)
     return Counted(truth.size, {"probability": float(((low <= truth) & (truth <= high)).mean())})
 
@@ -84,7 +85,7 @@ def _indices(given: bool) -> Counted:
     for seed in range(TRIALS):
         if given:
             ranks = np.random.default_rng(seed).random((2000, 3))
-            one = sb.uncertainty.sobol_indices_from_samples(ranks, ishigami(ranks.T), rng=seed)
+            one = first_order(ranks, ishigami(ranks.T), 0.95, seed)
             held.append(np.concatenate([(one.low <= FIRST) & (FIRST <= one.high)]))
             continue
         both = sb.uncertainty.sobol_indices(ishigami, 3, 64, rng=seed)
@@ -176,8 +177,7 @@ def waveforms(trials: int = TRIALS) -> Counted:
 
 
 KINDS: dict[str, tuple[str, Callable[[], Counted]]] = {
-    "wilson": ("probability, runs stop early (Wilson)", lambda: proportions("wilson")),
-    "jeffreys": ("probability, runs stop early (Jeffreys)", lambda: proportions("jeffreys")),
+    "wilson": ("probability, runs stop early (Wilson)", proportions),
     "thresholds": ("quantile thresholds", thresholds),
     "sobol": ("Sobol's indices of Ishigami's function", lambda: _indices(False)),
     "given": ("indices of given data", lambda: _indices(True)),

@@ -150,15 +150,15 @@ def test_refinement_is_bisection_towards_better_designs() -> None:
         def estimate(x, numbers, confidence):
             share = 1.0 / (1.0 + np.exp(-20.0 * (x[0] - 0.4)))
             hits = int(np.round(share * numbers.size))
-            _, low, high = (float(each) for each in wilson(hits, numbers.size, confidence))
+            _, low, high = (float(each) for each in proportion(hits, numbers.size, confidence))
             return optimization.Estimate(
                 np.array([[x[0]] * 3]), np.array([[share, low, high]]), numbers.size, 0
             )
 
-    from snapbeam.uncertainty.monte_carlo import wilson
+    from snapbeam.util.proportions import proportion
 
     needed = optimization._share_for(0.8, 400)
-    assert wilson(int(needed * 400) - 1, 400)[1] < 0.8 <= wilson(round(needed * 400), 400)[1]
+    assert proportion(int(needed * 400) - 1, 400)[1] < 0.8 <= proportion(round(needed * 400), 400)[1]
     exact = 0.4 + np.log(needed / (1.0 - needed)) / 20.0
     effort = sb.uncertainty.OptimizerSettings(refinements=14)
     # the search found a design that is too dear; the others violate the constraint

@@ -10,8 +10,9 @@ from small import small_system
 import snapbeam as sb
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.uncertainty.measured_classes import class_counts
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, interval_of, wilson
+from snapbeam.uncertainty.monte_carlo import OUTCOMES
 from snapbeam.uncertainty.probability import allocate
+from snapbeam.util.proportions import proportion
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError
 
@@ -38,15 +39,14 @@ def coin(probability, seed: int = 0):
 def test_wilson_is_scipys() -> None:
     for hits, runs in ((0, 10), (3, 17), (50, 50), (120, 400)):
         low, high = stats.binomtest(hits, runs).proportion_ci(0.95, method="wilson")
-        _, mine, more = wilson(hits, runs)
+        _, mine, more = proportion(hits, runs)
         assert float(mine) == pytest.approx(low, abs=1e-12) and float(more) == pytest.approx(high, abs=1e-12)
 
 
-@pytest.mark.parametrize("method", ["wilson", "jeffreys"])
-def test_sequential_intervals_cover(method: str) -> None:
+def test_sequential_intervals_cover() -> None:
     """400 points of probabilities spread over (0, 1): 93 to 97 % of the intervals hold them though runs stop early."""
     truth = (np.arange(400) + 0.5) / 400.0
-    allocation = sb.uncertainty.SamplingPlan(half_width=0.1, interval=method)
+    allocation = sb.uncertainty.SamplingPlan(half_width=0.1)
     counts = allocate(coin(truth), 400, allocation)
     _, low, high = counts.limits(allocation, 0)
     assert 0.93 <= ((low <= truth) & (truth <= high)).mean() <= 0.97
@@ -63,7 +63,7 @@ def test_half_the_runs_of_a_uniform_map() -> None:
     _, low, high = counts.limits(sequential, 0)
     assert (0.5 * (high - low)).max() <= 0.05
     needed = 8
-    while np.diff(np.ravel(wilson(needed // 2, needed)[1:]))[0] > 0.1:
+    while np.diff(np.ravel(proportion(needed // 2, needed)[1:]))[0] > 0.1:
         needed += 1
     assert counts.runs.sum() <= 0.5 * needed * truth.size
     uniform = sb.uncertainty.SamplingPlan(half_width=None, initial_runs=needed)
@@ -82,10 +82,10 @@ def test_a_total_is_kept_and_told() -> None:
 
 
 def test_failed_runs_widen_the_interval() -> None:
-    share, low, high = interval_of(5, 10, 10)
+    share, low, high = proportion(5, 10, failed=10)
     assert float(share) == 0.5
-    assert float(low) == pytest.approx(float(wilson(5, 20)[1])) and float(high) == pytest.approx(
-        float(wilson(15, 20)[2])
+    assert float(low) == pytest.approx(float(proportion(5, 20)[1])) and float(high) == pytest.approx(
+        float(proportion(15, 20)[2])
     )
 
 

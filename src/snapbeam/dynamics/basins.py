@@ -11,12 +11,12 @@ from scipy import ndimage, stats
 
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
 from snapbeam.dynamics.flow import Flow
-from snapbeam.dynamics.lifetimes import proportion
 from snapbeam.dynamics.periodic_orbits import state_of
 from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
 from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.state import State
 from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
+from snapbeam.util.proportions import proportion
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, integer, shown
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def basins_of_attraction(
     Near a fractal border the error of the integration changes labels.  Every state with a neighbour of another
     label, and a random sample of 300 others, is therefore integrated at half the step too.  ``sensitive`` marks
     the states whose label changes; the attribute ``sensitive_share`` is the share of such states of the plane,
-    with its interval at 95 % (Jeffreys, for the sampled part).  If it exceeds 1 %, a warning is given.
+    with its interval at 95 % (Wilson, for the sampled part).  If it exceeds 1 %, a warning is given.
 
     Parameters
     ----------

@@ -24,6 +24,7 @@ from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
 from snapbeam.sweeps.tasks import PointWork, ResultTable
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.proportions import proportion
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, checked, integer, nonnegative, shown, within
 
@@ -202,25 +203,6 @@ def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
         steps = np.arange(marks.size + 1) / marks.size
         distance = max(float((steps[1:] - marks).max()), float((marks - steps[:-1]).max()))
     return count, lasting, exposure, distance, marks.size
-
-
-def proportion(hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:
-    """A probability from counts, with Jeffreys' interval (Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101).
-
-    Returns
-    -------
-    share, low, high : arrays
-        NaN, 0 and 1 where there are no runs.
-    """
-    good, total = np.broadcast_arrays(np.asarray(hits, dtype=np.float64), np.asarray(runs, dtype=np.float64))
-    if (good < 0).any() or (good > total).any():
-        raise InputError("hits: must be between 0 and the number of runs")
-    tail = 0.5 * (1.0 - within("confidence", confidence, 0.0, 1.0))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(total > 0, good / total, np.nan)
-    low = np.where(good > 0, stats.beta.ppf(tail, good + 0.5, total - good + 0.5), 0.0)
-    high = np.where(good < total, stats.beta.ppf(1.0 - tail, good + 0.5, total - good + 0.5), 1.0)
-    return share, low, high
 
 
 def checked_cycles(name: str, values: ArrayLike, most: float) -> NDArray[np.int64]:

@@ -12,14 +12,7 @@ from numpy.typing import NDArray
 
 from snapbeam import _core
 from snapbeam.model.matrix_pairs import coupled_blocks
-from snapbeam.solver.channels import (
-    AXIAL_LOAD,
-    BASE,
-    EXTERNAL_FORCE,
-    LINEAR_DAMPING,
-    STEEP,
-    Channels,
-)
+from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP, Channels
 from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.solver.statistics import (
     CIRCUIT_LATE_LOSS,

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from snapbeam.model.integration import Integration
 from snapbeam.sweeps.points import Columns, PointList, points_of
 from snapbeam.sweeps.sweep import sweep
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, trials_of, wilson
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, trials_of
 from snapbeam.uncertainty.optimization import OptimizerSettings, optimize_design
 from snapbeam.uncertainty.probability import SamplingPlan, allocation_of, probability_map
 from snapbeam.uncertainty.quantiles import QuantileSearchSettings, quantile_threshold
+from snapbeam.util.proportions import proportion
 from snapbeam.util.validation import InputError, checked, within
 
 LONG = 600.0
@@ -178,7 +179,7 @@ def _needed(share: float, allocation: SamplingPlan) -> int:
     assert allocation.half_width is not None
     n = allocation.initial_runs
     while n < allocation.max_runs:
-        _, low, high = wilson(share * n, n, allocation.confidence)
+        _, low, high = proportion(share * n, n, allocation.confidence)
         if 0.5 * float(high - low) <= allocation.half_width:
             break
         n = int(n * 1.05) + 1

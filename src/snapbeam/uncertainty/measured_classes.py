@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.simulation.save import code_flags
-from snapbeam.uncertainty.monte_carlo import interval_of
+from snapbeam.util.proportions import proportion
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, InputTypeError, checked, integer, seed_of
 
@@ -112,7 +112,7 @@ def score_measurements(
     share = (mine + PSEUDOCOUNT) / (total + PSEUDOCOUNT * len(KNOWN_CLASSES))[:, None]
     kind = np.searchsorted(KNOWN_CLASSES, measurements.response_class[known])
     rows = np.arange(kind.size)
-    _, low, high = interval_of(mine[rows, kind], total, method="jeffreys")
+    _, low, high = proportion(mine[rows, kind], total)
     generator = np.random.Generator(np.random.Philox(key=[seed, 0]))
     ranks = generator.random((samples, kind.size))
     drawn = (ranks[..., None] > np.cumsum(share, axis=-1)[None, :, :-1]).sum(axis=-1)

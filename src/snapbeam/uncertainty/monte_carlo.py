@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import special
+from numpy.typing import NDArray
 
 from snapbeam.dynamics.flow import InitialConditions, held_in_space
-from snapbeam.dynamics.lifetimes import proportion as jeffreys
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameter_axes import unit_of
 from snapbeam.model.parameters import PHYSICAL, lookup, physical_names, ratio_of, row_of
@@ -29,13 +27,12 @@ from snapbeam.sweeps.tasks import PointWork
 from snapbeam.uncertainty.distributions import Distribution, Normal, ParameterUncertainty, UniformTolerance
 from snapbeam.util.diagnostics import DiagnosticWarning
 from snapbeam.util.status_codes import ResponseClass, RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, checked, choice, integer, shown, within
+from snapbeam.util.validation import InputError, InputTypeError, checked, integer, shown
 
 Statistics = dict[str, NDArray[Any]]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 _FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)
 _Array = NDArray[np.float64]
-INTERVALS = ("wilson", "jeffreys")
 
 
 _Numbers = NDArray[np.int64]
@@ -442,49 +439,3 @@ def require_held(names: Iterable[str], system: System) -> None:
                 f"{name}: the system has {strikers} striker{'s' * (strikers != 1)}; each has its own "
                 "statistics where there are several"
             )
-
-
-# A probability from counts, with its interval.
-
-
-def wilson(hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:
-    """A probability from counts, with Wilson's score interval (J. Am. Stat. Assoc. 22 (1927) 209).
-
-    With z the normal quantile of (1 + confidence)/2, the limits solve |h/n - p| = z sqrt(p(1 - p)/n).
-
-    Returns
-    -------
-    share, low, high : arrays
-        NaN, 0 and 1 where there are no runs.
-    """
-    good, total = np.broadcast_arrays(np.asarray(hits, dtype=np.float64), np.asarray(runs, dtype=np.float64))
-    if (good < 0).any() or (good > total).any():
-        raise InputError("hits: must be between 0 and the number of runs")
-    z = float(special.ndtri(0.5 * (1.0 + within("confidence", confidence, 0.0, 1.0))))
-    n = np.maximum(total, 1.0)
-    share = good / n
-    middle = (good + 0.5 * z * z) / (n + z * z)
-    half = z * np.sqrt(share * (1.0 - share) * n + 0.25 * z * z) / (n + z * z)
-    # at no and at all hits a limit is 0 and 1, to the last digit
-    low = np.where((good == 0) | (total == 0), 0.0, middle - half)
-    high = np.where((good == total) | (total == 0), 1.0, middle + half)
-    return np.where(total > 0, share, np.nan), low, high
-
-
-def interval_of(
-    hits: ArrayLike, runs: ArrayLike, failed: ArrayLike = 0, *, confidence: float = 0.95, method: str = "wilson"
-) -> tuple[_Array, _Array, _Array]:
-    """A probability with its interval; runs that failed may have been hits or not, and widen it both ways.
-
-    Returns
-    -------
-    share, low, high : arrays
-    """
-    choice("interval", method, INTERVALS)
-    of = wilson if method == "wilson" else jeffreys
-    share = of(hits, runs, confidence)[0]
-    lost = np.asarray(failed)
-    total = np.asarray(runs) + lost
-    low = of(hits, total, confidence)[1]
-    high = of(np.asarray(hits) + lost, total, confidence)[2]
-    return share, low, high

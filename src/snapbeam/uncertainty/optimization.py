@@ -19,8 +19,9 @@ from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Columns
 from snapbeam.uncertainty.differential_evolution import DifferentialEvolution, front_of
 from snapbeam.uncertainty.distributions import ParameterUncertainty
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, interval_of, reached, require_held, trials_of, wilson
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, trials_of
 from snapbeam.util.diagnostics import Diagnostic, counting, tell
+from snapbeam.util.proportions import proportion
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import (
     InputError,
@@ -203,7 +204,7 @@ class Objective:
         """
         n = values.size
         if self._quantity.kind == "outcome":
-            found = interval_of(int(values.sum()), n, failed, confidence=confidence)
+            found = proportion(int(values.sum()), n, confidence, failed)
             return float(found[0]), float(found[1]), float(found[2])
         if n < 2 or failed:  # a run that failed might have been anything
             middle = float(np.mean(values)) if n else float("nan")
@@ -464,8 +465,8 @@ class DesignProblem:
                 continue
             kept = self._kept(constraint, found)
             row[0] = kept.sum() / max(int(good.sum()), 1)
-            row[1] = float(wilson(int(kept.sum()), good.size, confidence)[1])
-            row[2] = float(wilson(int(kept.sum()) + failed, good.size, confidence)[2])
+            row[1] = float(proportion(int(kept.sum()), good.size, confidence)[1])
+            row[2] = float(proportion(int(kept.sum()) + failed, good.size, confidence)[2])
         return Estimate(objectives, constraints, int(good.size), failed)
 
     def runs_of(self, x: _Array, numbers: NDArray[np.int64]) -> list[dict[str, NDArray[Any]]]:
@@ -561,14 +562,14 @@ class DesignProblem:
             share = float(kept.mean())
             wanted = _share_for(constraint.required, self.validation_samples)
             if hopeful:
-                share, wanted = float(wilson(int(kept.sum()), kept.size, _SURE)[2]), constraint.required
+                share, wanted = float(proportion(int(kept.sum()), kept.size, _SURE)[2]), constraint.required
             total += max(0.0, wanted - share)
         return total
 
 
 def _share_for(required: float, runs: int, confidence: float = 0.95) -> float:
     """The smallest share of *runs* whose lower limit is at least *required*; 1 if there is none."""
-    low = np.asarray(wilson(np.arange(runs + 1), np.full(runs + 1, runs), confidence)[1])
+    low = np.asarray(proportion(np.arange(runs + 1), np.full(runs + 1, runs), confidence)[1])
     enough = np.flatnonzero(low >= required)
     return float(enough[0] / runs) if enough.size else 1.0
 

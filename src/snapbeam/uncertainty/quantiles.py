@@ -18,8 +18,9 @@ from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Grid, PointList, points_of
 from snapbeam.sweeps.setup import sweep_setup
 from snapbeam.uncertainty.distributions import ParameterUncertainty
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, trials_of, wilson
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, trials_of
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.proportions import proportion
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import InputError, InputTypeError, checked, choice, finite_array, integer, shown, within
 
@@ -160,7 +161,7 @@ def spans(
     parts = np.array_split(order, min(bins, max(order.size // 8, 1)))
     v, h = np.asarray(values, dtype=np.float64), np.asarray(hits, dtype=np.float64)
     sure = 1.0 - (1.0 - confidence) / len(parts)
-    _, low, high = wilson([h[part].sum() for part in parts], [part.size for part in parts], sure)
+    _, low, high = proportion([h[part].sum() for part in parts], [part.size for part in parts], sure)
     first = [float(v[part].min()) for part, top in zip(parts, high, strict=True) if top >= probability]
     last = [float(v[part].max()) for part, bottom in zip(parts, low, strict=True) if bottom <= probability]
     return min(first, default=np.inf), max(last, default=-np.inf)
