@@ -37,9 +37,7 @@ class OrbitNotFoundError(RuntimeError):
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> try:
     ...     sb.dynamics.periodic_orbit(system, [5.0, 3.0], iterations=2)
     ... except sb.dynamics.OrbitNotFoundError as error:

@@ -3,6 +3,7 @@
 A recipe computes its data by the public interface alone and draws them:
 
 >>> from snapbeam import paper
+>>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
 >>> figure = paper.fig2()  # doctest: +SKIP
 >>> paper.fig6.write("out", size="quick")  # doctest: +SKIP
 
@@ -23,6 +24,7 @@ from snapbeam.model.default_values import (
     STRAIGHT_BEAM,
 )
 from snapbeam.paper.recipe import Recipe, Results, shared_results
+from snapbeam.paper.system import struck_beam
 
 __all__ = [
     "BEAM",
@@ -54,6 +56,7 @@ __all__ = [
     "sensitivity",
     "shared_results",
     "si5",
+    "struck_beam",
     "switch",
     "transients",
     "two_tips",

@@ -31,6 +31,27 @@ def paper_model(modes: int, damping_ratio: ArrayLike = DAMPING_RATIO) -> sb.Redu
     return sb.ReducedModel.from_beam(BEAM, modes=modes, damping_ratio=damping_ratio)
 
 
+def struck_beam(
+    frequency_ratio: float = 1.2,
+    velocity_amplitude: float = 0.18,
+    *,
+    modes: int = 1,
+    damping_ratio: float = DAMPING_RATIO,
+    location: float = LOCATION,
+) -> sb.System:
+    """Return the paper's beam on its first *modes* buckling modes, struck by the paper's shaker.
+
+    Examples
+    --------
+    >>> from snapbeam import paper
+    >>> system = paper.struck_beam(frequency_ratio=1.4, velocity_amplitude=0.1, modes=8)
+    >>> system.model.modes
+    8
+    """
+    shaker = sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location)
+    return sb.System(paper_model(modes, damping_ratio), contacts=[sb.Contact(CONTACT, shaker.striker())])
+
+
 def paper_run(modes: int, frequency_ratio: float, velocity_amplitude: float, cycles: int, **more: Any) -> sb.Run:
     """Simulate the paper's beam and shaker.
 

@@ -55,9 +55,7 @@ def plot_threshold(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> dataset = sb.threshold(
     ...     system, "drive.velocity_amplitude", [0.02, 0.08, 0.14, 0.2],
     ...     {"drive.frequency_ratio": [1.0, 1.2]}, sb.Integration(cycles=20),

@@ -57,10 +57,7 @@ class Run:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> run.summary.response_class.label
     'continuous interwell'
@@ -108,11 +105,7 @@ class Run:
         --------
         >>> import snapbeam as sb
         >>> from snapbeam import paper
-        >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
-        >>> system = sb.System(
-        ...     model,
-        ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-        ... )
+        >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18, modes=2)
         >>> frame = sb.simulate(system, sb.Integration(cycles=2)).to_dataframe()
         >>> "modal_amplitude_2" in frame
         True

@@ -69,10 +69,7 @@ def load(path: str | os.PathLike[str]) -> Run:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> sb.simulate(system, sb.Integration(cycles=2)).save("run.nc")
     >>> run = sb.load("run.nc")
     >>> run.system == system

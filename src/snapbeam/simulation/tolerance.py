@@ -58,10 +58,7 @@ class ErrorEstimate:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.05))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.05)
     >>> run = sb.simulate(system, sb.Integration(cycles=5, tolerance=1e-6))
     >>> run.accuracy.reached, run.accuracy.estimated_error < 1e-6
     (True, True)
@@ -127,10 +124,7 @@ def perturbation_growth(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> growth = sb.perturbation_growth(system, sb.Integration(cycles=5))
     """
     from snapbeam.util.datasets import xr

@@ -110,10 +110,7 @@ def threshold(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> found = sb.threshold(
     ...     system, "drive.velocity_amplitude", [0.02, 0.08, 0.14, 0.2],
     ...     {"drive.frequency_ratio": [1.0, 1.2]}, sb.Integration(cycles=20),

@@ -360,9 +360,7 @@ def sample_systems(system: System, uncertainty: ParameterUncertainty, count: int
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> thickness = sb.uncertainty.Normal(0.01, relative=True)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(of={"beam.thickness": thickness})
     >>> systems = sb.uncertainty.sample_systems(system, uncertainty, 20)

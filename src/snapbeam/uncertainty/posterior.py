@@ -174,9 +174,7 @@ class Waveform:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=5))
     >>> displacement = run.dataset.displacement_at_striker.values * system.scale.length  # m, here of a simulation
     >>> waveform = sb.uncertainty.Waveform(
@@ -319,7 +317,6 @@ class Posterior:
     >>> import snapbeam as sb
     >>> from snapbeam import paper
     >>> from snapbeam.lab import Measurements
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
     >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
     >>> posterior = sb.uncertainty.estimate_posterior(
     ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
@@ -486,7 +483,6 @@ def estimate_posterior(
     >>> import snapbeam as sb
     >>> from snapbeam import paper
     >>> from snapbeam.lab import Measurements
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
     >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
     >>> posterior = sb.uncertainty.estimate_posterior(
     ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
@@ -696,13 +692,11 @@ def class_likelihood(
     >>> import snapbeam as sb
     >>> from snapbeam import paper
     >>> from snapbeam.lab import Measurements
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
     >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
     >>> posterior = sb.uncertainty.estimate_posterior(
     ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
     ... )
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18, modes=2)
     >>> measurements = sb.MeasuredPoints(
     ...     frequency_ratio=[1.2], velocity_amplitude=[0.2], location=[0.4762], response_class=[3]
     ... )

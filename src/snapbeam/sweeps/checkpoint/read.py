@@ -57,10 +57,7 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> found = sb.sweep(
     ...     system, {"drive.velocity_amplitude": [0.05, 0.2]}, sb.Integration(cycles=2),
     ...     checkpoint=sb.CheckpointOptions("sweep.checkpoint"),
