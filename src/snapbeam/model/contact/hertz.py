@@ -15,6 +15,14 @@ from snapbeam.util.validation import InputError, InputTypeError, nonnegative, po
 _DURATION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
 
 
+def hertz_stiffness() -> Any:
+    """Return the field of the contact stiffness k_c."""
+    return quantity(
+        "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
+        plausible=(1.0, 1e15, "N/mm^1.5"),
+    )  # fmt: skip
+
+
 @dataclass(frozen=True)
 class HertzContact(ContactLaw):
     """Hertz's law of a sphere on a flat, f = k_c d^(3/2) for a penetration d > 0 (Eqs. 17-18).
@@ -38,10 +46,7 @@ class HertzContact(ContactLaw):
     '9.73e+09 N/m^1.5'
     """
 
-    stiffness: float = quantity(
-        "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
-        plausible=(1.0, 1e15, "N/mm^1.5"),
-    )  # fmt: skip
+    stiffness: float = hertz_stiffness()
 
     name = "hertz"
 
