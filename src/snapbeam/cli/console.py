@@ -404,6 +404,19 @@ def check_pictures(*pictures: tuple[str, Path | None]) -> None:
             require_room(path, least_picture_size(path), name)
 
 
+def check_outputs(output: Path, plot: Path | None) -> None:
+    """Raise an error, before any computation, if the NetCDF file or the figure cannot be written."""
+    from snapbeam.util.files import check_writable
+
+    check_writable(output, "output", (".nc",))
+    check_pictures(("plot", plot))
+
+
+def print_written(lines: Iterable[str], files: Iterable[Path]) -> None:
+    """Print the lines of a result, and the files that were written."""
+    out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
+
+
 _LEAST_SIZES = {".png": 35e3, ".pdf": 10e3, ".svg": 8e3, ".gif": 300e3, ".mp4": 50e3}
 """Half of the sizes of the smallest figures and animations of the commands, bytes."""
 

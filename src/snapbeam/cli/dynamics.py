@@ -16,8 +16,8 @@ import typer
 
 from snapbeam import dynamics as library
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import FAILED, add_json, cli_command, duration, file_line, out, progress
-from snapbeam.cli.parameter_options import BEAM, CONTACT, DRIVE, MODEL, RUN, STRIKER, configured, with_parameters
+from snapbeam.cli.console import FAILED, add_json, check_outputs, cli_command, duration, print_written, progress
+from snapbeam.cli.parameter_options import ALL, BEAM, MODEL, configured, with_parameters
 from snapbeam.cli.short_help import ShortHelpCommand, ShortHelpGroup
 from snapbeam.util.validation import InputError, choice
 
@@ -58,7 +58,6 @@ dynamics = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )
-_ALL = (*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN)
 _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location", "model.modes")
 _OWN = "Analysis"
 _BRANCHES = 0.1
@@ -108,21 +107,12 @@ _BOUNDS = _text("Bounds of the parameter, low:high", "0.005:0.3")
 _PERIOD = _count("Period of the orbit in periods of the drive", 1)
 _SEARCHED = _count("Transient periods to integrate before the search", 500)
 _DISCARDED = _count(f"Transient periods to discard ({_SETTLING})")
-_CHECKPOINT = _Option(
-    Annotated[
-        Path | None,
-        typer.Option(help="Checkpoint folder; an existing one is resumed.", rich_help_panel="Output", metavar="DIR"),
-    ],
-    None,
-)
+_CHECKPOINT = _Option(opt.CheckpointFolder, None)
 _PHASE = _Option(
     Annotated[bool, typer.Option("--phase", help="Sample the initial phase of the drive too.", rich_help_panel=_OWN)],
     False,
     False,
 )
-_OUTPUT = Annotated[
-    Path, typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE")
-]
 
 
 class _Request(SimpleNamespace):
@@ -179,14 +169,10 @@ def _analysis(
 
     def decorate(compute: Callable[[_Request], _Found]) -> Callable[[_Request], _Found]:
         def command(given: Any, output: Path, plot: Path | None, **chosen: Any) -> None:
-            from snapbeam.cli.console import check_pictures
-            from snapbeam.util.files import check_writable
-
             for name, option in options.items():
                 chosen[name] = option.default if chosen[name] is None else chosen[name]
             request = _Request(settings=configured(given), given=given, failed=False, **chosen)
-            check_writable(output, "output", (".nc",))
-            check_pictures(("plot", plot))
+            check_outputs(output, plot)
             request.begun = time.monotonic()
             dataset, lines = compute(request)
             _finish(dataset, output, plot, lines, chosen.get("statistic"))
@@ -194,7 +180,7 @@ def _analysis(
                 raise typer.Exit(FAILED)
 
         rows = {name: (each.kind, each.shown) for name, each in options.items()}
-        rows |= {"output": (_OUTPUT, Path(f"{compute.__name__}.nc")), "plot": (opt.Plot, None)}
+        rows |= {"output": (opt.Output, Path(f"{compute.__name__}.nc")), "plot": (opt.Plot, None)}
         rows |= {"threads": (opt.Threads, None)} if threads else {}
         keyword = inspect.Parameter.KEYWORD_ONLY
         command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
@@ -225,7 +211,7 @@ def _finish(
         files.append(draw_computed(dataset, plot, output, statistic))
     small = {str(name): each.values for name, each in dataset.data_vars.items() if each.size <= _FEW}
     add_json(results=small, summary=lines, files=files)
-    out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
+    print_written(lines, files)
 
 
 def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
@@ -273,7 +259,7 @@ def _orbit(request: _Request, words: str, start: Any = None, **settings: Any) ->
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     axes=_AXES,
     threads=True,
     initial_conditions=_count("Number of initial conditions at each point", 32),
@@ -316,7 +302,7 @@ def lifetimes(request: _Request) -> _Found:
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     threads=True,
     parameter=_PARAMETER,
     values=_VALUES,
@@ -349,7 +335,7 @@ def bifurcation_diagram(request: _Request) -> _Found:
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     parameter=_PARAMETER,
     values=_VALUES,
     statistic=_text("Statistic that --plot draws (peak_midspan_displacement)", "peak_midspan_displacement"),
@@ -399,7 +385,7 @@ def backbone_curve(request: _Request) -> _Found:
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     axes=_AXES[:3],
     threads=True,
     k=_count("Number of Lyapunov exponents, largest first", 1),
@@ -436,7 +422,7 @@ def lyapunov_spectrum(request: _Request) -> _Found:
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     at=_text("Section: stroboscopic or impact", "stroboscopic", "KIND"),
     periods=_count("Periods to record", 1000),
     transient=_DISCARDED,
@@ -454,7 +440,7 @@ def poincare_section(request: _Request) -> _Found:
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     parameter=_PARAMETER,
     bounds=_BOUNDS,
     direction=_text("Initial direction: up or down", "up"),
@@ -476,7 +462,7 @@ def branch(request: _Request) -> _Found:
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     stability=_text("Manifold: unstable or stable", "unstable", "KIND"),
     period=_count("Period of the saddle in periods of the drive", 1),
     max_arclength=_number("Length of each branch, in units of the well's amplitude", 10.0),
@@ -505,7 +491,7 @@ def manifold(request: _Request) -> _Found:
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     parameter=_PARAMETER,
     bounds=_BOUNDS,
     second=_text("Second parameter of the curve", "frequency_ratio"),
@@ -548,7 +534,7 @@ def bifurcation_curve(request: _Request) -> _Found:
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     threads=True,
     amplitudes=_text("Values of amplitude[1], start:stop:count", "-1.6:1.6:200"),
     velocities=_text("Values of velocity[1], start:stop:count", "-1:1:200"),
@@ -609,7 +595,7 @@ def _entropy_lines(entropy: BasinEntropy) -> list[str]:
 
 
 @_analysis(
-    *_ALL,
+    *ALL,
     initial_velocity=_number(
         "Initial velocity of the first mode, divided by omega_1 times the amplitude of the well, that makes the beam "
         "snap through (doubled from 0.1 until it does)"

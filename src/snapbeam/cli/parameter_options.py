@@ -49,6 +49,14 @@ RUN = (
     "initial_state.initial_well",
 )
 
+ALL = (*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN)
+"""Parameters of the commands that compute runs."""
+AXES = (
+    "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
+    "contact.location", "contact.location_m", "model.modes",
+)  # fmt: skip
+"""Those of them that may be axes of a map."""
+
 _PANELS = {
     "beam": "Beam (default: the paper's)",
     "boundary": "Boundary conditions (default: clamped)",
@@ -480,6 +488,13 @@ Threads = Annotated[int | None, count_option("Number of processor cores; all by 
 Plot = Annotated[
     Path | None,
     typer.Option("--plot", help="Figure file to write: .png, .pdf or .svg.", rich_help_panel=_OUTPUT, metavar="FILE"),
+]
+Output = Annotated[
+    Path, typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel=_OUTPUT, metavar="FILE")
+]
+CheckpointFolder = Annotated[
+    Path | None,
+    typer.Option(help="Checkpoint folder; an existing one is resumed.", rich_help_panel=_OUTPUT, metavar="DIR"),
 ]
 Measurements = Annotated[
     Path | None,

@@ -47,6 +47,10 @@ class Indices(NamedTuple):
     low: _Array
     high: _Array
 
+    def variables(self, name: str) -> dict[str, _Array]:
+        """Return the variables of a dataset: the estimate and its limits."""
+        return {name: self.estimate, f"{name}_low": self.low, f"{name}_high": self.high}
+
 
 def first_order(x: _Array, y: _Array, confidence: float, seed: int) -> Indices:
     """First-order indices Var(E[y | x_j])/Var(y) of a sample, however it was sampled, of correlated inputs too.
@@ -543,8 +547,8 @@ def _local(
     half = 0.5 * (both[:, 1] - both[:, 0])
     width = np.array([_width(trials, name) for name in uncertainty.of])
     table = {"quantity_minus": both[:, 0].mean(axis=1), "quantity_plus": both[:, 1].mean(axis=1)}
-    table |= _limits("effect", half, confidence) | {"step": width}
-    table |= _limits("derivative", half / width[:, None], confidence)
+    table |= _mean(half.T, confidence).variables("effect") | {"step": width}
+    table |= _mean(half.T / width, confidence).variables("derivative")
     return table, values
 
 
@@ -554,13 +558,6 @@ def _width(trials: Trials, name: str) -> float:
     given = system.get(name) if ratio_of(name) in system.parameters else None  # a ratio, or one in its unit
     nominal = np.full(2, 0.0 if given is None else given, dtype=np.float64)
     return 0.5 * float(np.ptp(trials.uncertainty.of[name].at(nominal, np.array([-1.0, 1.0]))))
-
-
-def _limits(name: str, pairs: _Array, confidence: float) -> dict[str, _Array]:
-    count = pairs.shape[1]
-    middle = pairs.mean(axis=1)
-    reach = stats.t.ppf(0.5 * (1.0 + confidence), count - 1) * pairs.std(axis=1, ddof=1) / np.sqrt(count)
-    return {name: middle, f"{name}_low": middle - reach, f"{name}_high": middle + reach}
 
 
 def _sobol(
@@ -576,10 +573,7 @@ def _sobol(
     found = sobol_indices(
         function, len(trials.uncertainty.of), count, replicates=_REPLICATES, confidence=confidence, rng=trials.uncertainty.seed
     )  # fmt: skip
-    table: dict[str, _Array] = {}
-    for name, indices in (("first_order", found.first), ("total_order", found.total)):
-        table |= {name: indices.estimate, f"{name}_low": indices.low, f"{name}_high": indices.high}
-    return table, kept[0]
+    return found.first.variables("first_order") | found.total.variables("total_order"), kept[0]
 
 
 def _given_data(
@@ -588,8 +582,7 @@ def _given_data(
     numbers = np.arange(count)
     scores = trials.uncertainty.normals(numbers)
     values = _ask(trials, quantity, scores, numbers)
-    found = first_order(scores, values, confidence, trials.uncertainty.seed)
-    return {"first_order": found.estimate, "first_order_low": found.low, "first_order_high": found.high}, values
+    return first_order(scores, values, confidence, trials.uncertainty.seed).variables("first_order"), values
 
 
 _WORDS = {
