@@ -134,14 +134,14 @@ def _physical() -> str:
     found: dict[tuple[str, str, str], list[str]] = {}
     for name, row in PHYSICAL.items():
         section, field = split_name(name)
-        if numbered(section)[1] == 1:
+        if numbered(section)[1] == 1 and not field.endswith(tuple("1234")):
             key = field, split_name(row.parameter)[1], row.unit.replace("um", "µm")
             found.setdefault(key, []).append(section)
     rows = [(f"`{one}`", f"`{ratio}`", unit, _listed(own)) for (one, ratio, unit), own in found.items()]
     return (
         "## Names in physical units\n\n"
         "Files, options, axes, uncertainties and Python accept these names in place of the ratios, of every contact and force by "
-        "its number or label too (`drive.2.frequency_hz`). The last part alone names the parameter if one part of the system alone "
+        "its number or label and of every term of a sum too (`drive.2.frequency_hz`, `frequency_hz_2`). The last part alone names the parameter if one part of the system alone "
         "has it.\n\n" + _table(("name", "in place of", "unit", "sections"), rows)
     )
 

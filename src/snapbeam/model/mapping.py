@@ -16,7 +16,7 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions
 from snapbeam.model.external_force import FORCES, ExternalForce
 from snapbeam.model.imperfection import Imperfection
-from snapbeam.model.parameters import SECTIONS, kinds_of, row_of
+from snapbeam.model.parameters import SECTIONS, kind_of, kinds_of, row_of
 from snapbeam.model.quantity import NUMBERED, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
@@ -247,9 +247,9 @@ def _chosen(values: Mapping[str, Any], section: str) -> Any:
         values = read_file(section, values)
     own, known = dict(values), kinds_of(numbered(section)[0])
     name = own.pop("type", None)
-    if not isinstance(name, str) or name not in known:
+    kind = kind_of(numbered(section)[0], name)
+    if kind is None:
         raise InputError(f"[{section}] type = {shown(name)}: must be one of {', '.join(map(repr, known))}")
-    kind = known[name]
     _only(own, section, [item.name for item in dataclasses.fields(kind)])
     _needed(own, section, kind, f" for type = {shown(name)}")
     return kind(**own)

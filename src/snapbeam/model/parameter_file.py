@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
-from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.external_force import FORCES
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, read_file, resolved
@@ -27,6 +26,7 @@ from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physic
 from snapbeam.model.parameters import (
     PHYSICAL,
     Parameter,
+    kind_of,
     kinds_of,
     lookup,
     named_in,
@@ -281,18 +281,11 @@ def _array(name: str, value: Any) -> tuple[str, Any]:
         return f"{name} = {shown(value)}: must be a list of numbers", None
 
 
-def _is_sum(section: str, value: Any) -> bool:
-    """Return whether a type is a sum of drives, such as ``"sine+burst"``, that the section accepts."""
-    if not isinstance(value, str) or "+" not in value or value not in DRIVES:
-        return False
-    return numbered(section)[0] == "drive" or (section == "base_excitation" and DRIVES[value].can_excite_base())
-
-
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     """Check an entry without a row in the table: law, drive type, materials, physical units."""
     if name == "type":
         known = kinds_of(numbered(section)[0])
-        if not isinstance(value, str) or (value not in known and not _is_sum(section, value)):
+        if kind_of(numbered(section)[0], value) is None:
             return f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}", None
         return "", value
     if name == "label":
@@ -802,6 +795,7 @@ def _without_units(sections: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 def _stand_in(name: str, value: Any) -> float:
     """A value that lets the system be made before the physical one is known."""
+    name = name.rstrip("_1234")  # of a term of a sum
     if name.endswith("_ratio"):
         return 2.0 if name in ("high_ratio", "stop_ratio") else 1.0
     return 0.5 if name == "location" else 0.0

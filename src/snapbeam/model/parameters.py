@@ -131,6 +131,15 @@ def _rows() -> Iterable[Parameter]:
 _INITIAL_WELL = ParameterField("1", "well that runs begin in", kind=object, optional=True, parse=checked_well)
 
 
+def kind_of(section: str, name: object) -> Any:
+    """Return the class that the key ``type`` of a section names, a sum of drives such as ``"sine+burst"`` too, or None."""
+    if section == "base_excitation" and isinstance(name, str) and "+" in name:
+        found = DRIVES[name] if name in DRIVES else None
+        return found if found is not None and found.can_excite_base() else None
+    known = kinds_of(section)
+    return known[name] if isinstance(name, str) and name in known else None
+
+
 def kinds_of(section: str) -> Mapping[str, Any]:
     """The classes that a section can describe, by the word that its key ``type`` has; none of a section without it."""
     if section == "base_excitation":
@@ -347,6 +356,9 @@ def _in_units() -> Iterable[tuple[str, Physical]]:
             name = section_of(section, number)
             text = of if number == 1 else f"{of} {number}"
             yield f"{name}.{own}", Physical(f"{name}.{field}", unit, text)
+        if section in ("drive", "base_excitation"):  # the terms of a sum
+            for term in "1234":
+                yield f"{section}.{own}_{term}", Physical(f"{section}.{field}_{term}", unit, f"{of}, of term {term}")
 
 
 PHYSICAL: dict[str, Physical] = dict(_in_units())
