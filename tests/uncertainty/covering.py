@@ -73,9 +73,7 @@ def thresholds() -> Counted:
             held[trial, i] = low <= true[i] <= high
             found = local_crossing(runs.values, runs.hits, level, max(low, 0.0), min(high, 1.0), 3.0)
             off[trial, i] = found - true[i]
-    return Counted(
-        TRIALS, {f"V at P = {p:g}": float(s) for p, s in zip(LEVELS, held.mean(axis=0), strict=True)}
-    )
+    return Counted(TRIALS, {f"V at P = {p:g}": float(s) for p, s in zip(LEVELS, held.mean(axis=0), strict=True)})
 
 
 def _indices(given: bool) -> Counted:
@@ -140,12 +138,8 @@ def posterior() -> Counted:
 
         logs, weights, *_ = _population(terms, np.zeros(2), 400, trial)
         limits = sb.uncertainty.Posterior(("beam.thickness", "beam.buckling_level"), logs, weights).interval()
-        held.append(
-            [low <= value <= high for (_, low, high), value in zip(limits.values(), truth, strict=True)]
-        )
-    return Counted(
-        TRIALS, dict(zip(("thickness", "buckling level"), np.mean(held, axis=0).tolist(), strict=True))
-    )
+        held.append([low <= value <= high for (_, low, high), value in zip(limits.values(), truth, strict=True)])
+    return Counted(TRIALS, dict(zip(("thickness", "buckling level"), np.mean(held, axis=0).tolist(), strict=True)))
 
 
 def waveforms(trials: int = TRIALS) -> Counted:
@@ -196,19 +190,12 @@ def stored() -> dict[str, dict]:
 
 def text() -> str:
     """A table; ± is two standard errors of counting."""
-    lines = [
-        "| 95 % interval | trials | coverage | coverage of each quantity |",
-        "|---|---|---|---|",
-    ]
+    lines = ["| 95 % interval | trials | coverage | coverage of each quantity |", "|---|---|---|---|"]
     for name, one in stored().items():
         shares = one["shares"]
         value = float(np.mean(list(shares.values())))
         error = 2.0 * (value * (1.0 - value) / (one["trials"] * len(shares))) ** 0.5
-        each = (
-            ", ".join(f"{what} {100.0 * share:.1f} %" for what, share in shares.items())
-            if len(shares) > 1
-            else ""
-        )
+        each = ", ".join(f"{what} {100.0 * share:.1f} %" for what, share in shares.items()) if len(shares) > 1 else ""
         told = f"{100.0 * value:.1f} ± {100.0 * error:.1f} %"
         lines.append(f"| {KINDS[name][0]} | {one['trials']} | {told} | {each} |")
     return "\n".join(lines) + "\n"

@@ -74,9 +74,7 @@ def test_half_the_runs_of_a_uniform_map() -> None:
 
 def test_a_total_is_kept_and_told() -> None:
     truth = np.linspace(0.01, 0.99, 50)
-    counts = allocate(
-        coin(truth), 50, sb.uncertainty.SamplingPlan(half_width=0.1, initial_runs=16, total_runs=2000)
-    )
+    counts = allocate(coin(truth), 50, sb.uncertainty.SamplingPlan(half_width=0.1, initial_runs=16, total_runs=2000))
     assert counts.runs.sum() == 2000
     assert counts.open.any() and not counts.open.all()
 
@@ -99,9 +97,7 @@ def test_map_of_a_beam() -> None:
     snap = ds["probability"].sel(outcome="snap")
     assert (snap.isel(velocity_amplitude=-1) == 1.0).all() and (snap.isel(velocity_amplitude=0) < 0.5).all()
     assert ds["reached"].all() and ds.attrs["runs_made"] == int(ds["runs"].sum())
-    two = sb.uncertainty.probability_map(
-        small_system(), AXES, SPREAD, runs, integration=HOW.replace(threads=2)
-    )
+    two = sb.uncertainty.probability_map(small_system(), AXES, SPREAD, runs, integration=HOW.replace(threads=2))
     assert two["hits"].equals(ds["hits"])
 
 
@@ -135,12 +131,7 @@ def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
     assert found["hits"].equals(whole["hits"]) and found["runs"].equals(whole["runs"])
     tally = sb.SweepReport()
     sb.uncertainty.probability_map(
-        small_system(),
-        AXES,
-        SPREAD,
-        runs,
-        integration=HOW,
-        checkpoint=sb.CheckpointOptions(store, report=tally),
+        small_system(), AXES, SPREAD, runs, integration=HOW, checkpoint=sb.CheckpointOptions(store, report=tally)
     )
     assert tally.runs == 0
     with pytest.raises(InputError):
@@ -182,6 +173,4 @@ def test_measurements_are_judged_by_their_likelihood() -> None:
     bad = sb.uncertainty.score_measurements(ds, MeasuredPoints(omega.ravel(), v.ravel(), place, never))
     assert bad.attrs["p_value"] < 0.01 and bad.attrs["agree"] < good.attrs["agree"]
     with pytest.raises(InputError, match="outside"):
-        sb.uncertainty.score_measurements(
-            ds, MeasuredPoints(np.array([3.0]), np.array([0.1]), place[:1], never[:1])
-        )
+        sb.uncertainty.score_measurements(ds, MeasuredPoints(np.array([3.0]), np.array([0.1]), place[:1], never[:1]))

@@ -44,9 +44,7 @@ def test_the_default_split_has_less_than_half_the_error_of_many_short_sequences(
         found = [sb.uncertainty.sobol_indices(ishigami, 3, samples, rng=seed, **split) for seed in range(30)]
         assert {each.runs for each in found} == {5 * 4096}
         return float(
-            np.median(
-                [np.abs(np.concatenate([each.first.estimate, each.total.estimate]) - truth) for each in found]
-            )
+            np.median([np.abs(np.concatenate([each.first.estimate, each.total.estimate]) - truth) for each in found])
         )
 
     assert error(1024) < 0.5 * error(256, replicates=16)
@@ -95,9 +93,7 @@ def test_refusals() -> None:
         ),
     )
     with pytest.raises(InputError, match="no uncertain parameter"):
-        sb.uncertainty.sensitivity(
-            system, "peak_force", sb.uncertainty.ParameterUncertainty(displacement=1e-6)
-        )
+        sb.uncertainty.sensitivity(system, "peak_force", sb.uncertainty.ParameterUncertainty(displacement=1e-6))
     with pytest.raises(InputError, match="statistic"):
         sb.uncertainty.sensitivity(system, "peak", spread)
     tied = sb.uncertainty.ParameterUncertainty(of=spread.of, correlation=[[1.0, 0.5], [0.5, 1.0]])
@@ -107,7 +103,9 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="is missing for"):
         sb.uncertainty.sensitivity(system, far, spread, samples=2, integration=sb.Integration(cycles=1))
     with pytest.raises(InputError, match="at least 200"):
-        sb.uncertainty.sensitivity(system, "peak_force", tied, "given_data", samples=10, integration=sb.Integration(cycles=1))
+        sb.uncertainty.sensitivity(
+            system, "peak_force", tied, "given_data", samples=10, integration=sb.Integration(cycles=1)
+        )
     with pytest.raises(InputError, match="power of 2"):
         sb.uncertainty.sobol_indices(ishigami, 3, 100)
 
