@@ -318,7 +318,7 @@ class Potential:
 
     @cached_property
     def _ranges(self) -> _Array:
-        """Least and greatest displacements of the laws, shape (J, 2)."""
+        """Minimum and maximum displacements of the laws, shape (J, 2)."""
         found = [law.displacement_range(law.numbers) for law in self.local_forces]
         return np.array(found, dtype=np.float64).reshape(-1, 2)
 
