@@ -63,9 +63,7 @@ class Integration:
     1000
     """
 
-    cycles: int | None = quantity(
-        "1", "cycles of excitation", default=None, kind=int, low=1, high=10**7, optional=True
-    )
+    cycles: int | None = quantity("1", "cycles of excitation", default=None, kind=int, low=1, high=10**7, optional=True)
     step: float | None = quantity("s", "step in free flight", default=None, low=0.0, optional=True)
     accuracy: str = quantity("1", "accuracy level", default="standard", kind=str, choices=ACCURACIES)
     tolerance: float | None = quantity(
@@ -105,9 +103,7 @@ class Integration:
         known = quantities(Integration)
         for name in changes:
             if name not in known:
-                raise InputError(
-                    f"{name}: is not a parameter of an integration; must be one of {', '.join(known)}"
-                )
+                raise InputError(f"{name}: is not a parameter of an integration; must be one of {', '.join(known)}")
         return dataclasses.replace(self, **changes)
 
     @property

@@ -33,9 +33,7 @@ def source() -> str:
     def with_headers(name: str) -> str:
         seen.add(name)
         text = (_TEXT / name).read_text(encoding="utf-8").replace("#pragma once", "")
-        return re.sub(
-            r'#include "(\S+)"', lambda found: "" if found[1] in seen else with_headers(found[1]), text
-        )
+        return re.sub(r'#include "(\S+)"', lambda found: "" if found[1] in seen else with_headers(found[1]), text)
 
     return with_headers("kernel.cu")
 
@@ -93,9 +91,7 @@ def _device() -> Any:
         found = Device()
         found.set_current()
     except Exception as error:  # of the driver, or that there is none
-        raise InputError(
-            f"engine = 'cuda': no GPU of NVIDIA answers ({error}); use engine = 'native'"
-        ) from error
+        raise InputError(f"engine = 'cuda': no GPU of NVIDIA answers ({error}); use engine = 'native'") from error
     return found
 
 
@@ -152,9 +148,7 @@ def integrate(problem: dict[str, Any], batch: dict[str, Any], progress: Progress
         memory.close()
 
 
-def _integrate(
-    memory: _Memory, problem: dict[str, Any], batch: dict[str, Any], progress: Progress | None
-) -> None:
+def _integrate(memory: _Memory, problem: dict[str, Any], batch: dict[str, Any], progress: Progress | None) -> None:
     arrays = [each for each in (problem | batch).values() if isinstance(each, np.ndarray)]
     places = {each.ctypes.data: memory.put(each) for each in arrays}
     arguments = _core.moved_arguments(problem, batch, places)
@@ -176,9 +170,7 @@ def _integrate(
     counters, budget, begins = np.zeros(2, dtype=np.int32), 64, True  # next, done
     while counters[1] < runs:
         begun = time.perf_counter()
-        memory.launch(
-            go_on, blocks, threads, np.uint64(shared), np.uint64(aside), np.int32(budget), np.int32(begins)
-        )
+        memory.launch(go_on, blocks, threads, np.uint64(shared), np.uint64(aside), np.int32(budget), np.int32(begins))
         took, begins = time.perf_counter() - begun, False
         memory.get(shared, counters)
         if progress is not None:
