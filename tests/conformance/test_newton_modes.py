@@ -167,3 +167,18 @@ def test_a_contact_that_opens_does_not_land_again_at_once(ratio, velocity, locat
     system = sb.System(model, contacts=[sb.Contact(sb.Restitution(0.0), shaker)])
     impulse = sb.simulate(system, sb.Integration(cycles=6, engine="native")).impacts.impulse.values
     assert impulse.size > 2 and impulse.min() > 1e-6 * impulse.max()
+
+
+def test_energies_over_impacts_do_not_depend_on_the_step():
+    """The mean energy before an impact is that before it: the step that ends there had the energy after it at both ends."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3, damping_ratio=0.01)
+    striker = sb.Contact(sb.Restitution(0.5), sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.3))
+    system = sb.System(model, contacts=[striker])
+    axes = {"drive.velocity_amplitude": [0.1, 0.3]}
+    runs = [
+        sb.sweep(system, axes, sb.Integration(cycles=4, step=step, high_frequency_ratio=1.5))
+        for step in (2e-5, 1e-5)
+    ]
+    assert (runs[0].impacts > 3).all()
+    high = [run.high_frequency_energy_fraction.values for run in runs]
+    np.testing.assert_allclose(high[0], high[1], rtol=1e-6)

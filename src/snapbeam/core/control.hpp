@@ -784,6 +784,7 @@ template <class L> struct Group {
         } else {  // runs that ended may hold anything
             z.q.swap(z.q1), z.p.swap(z.p1), z.k.swap(z.k1);
         }
+        totals.add_modes(z, ok, z.h);  // before an impact changes the energy
         z.t = select(ok, z.t + ticks, z.t), turned += select(ok, Real(1.0), Real(0.0));
         for (int i = 0; i < z.signals; ++i) assign(ok, z.signal[i].begun.sine, z.signal[i].at.sine), assign(ok, z.signal[i].begun.cosine, z.signal[i].at.cosine);
         for (int j = 0; j < z.channels; ++j) {
@@ -843,7 +844,6 @@ template <class L> struct Group {
             assign(changed, energy, value(totals.energy(z, true, true)));
             for (int j = 0; j < z.channels; ++j) assign(changed, z.channel[j].safe, z.t);
         }
-        totals.add_modes(z, ok, z.h);
         if constexpr (L::directions > 0) {
             bool held = false;
             for (int j = 0; j < z.channels; ++j) held |= z.channel[j].contact && z.channel[j].closed;
