@@ -44,5 +44,5 @@ def test_a_sudden_start_excludes_a_filter_and_a_gentle_one_does_not():
     assert sudden.steady.amplitude_se < 1e-3 * sudden.steady.amplitude
     # a notch may be named, but no high-pass; what may be lost is in the standard error
     assert "vibrometer.high_pass" not in {one.code for one in diagnostics_of(gentle)}
-    assert gentle.steady.amplitude_se > 1e-2 * gentle.steady.amplitude
+    assert 1e-2 < gentle.steady.amplitude_se / gentle.steady.amplitude < 0.5
     assert abs(gentle.steady.amplitude - 0.02) < 2.0 * gentle.steady.amplitude_se

@@ -271,6 +271,13 @@ KINDS_DECAY = table(
         "the damping ratio is that of the viscous part, of vanishing amplitude",
     ),
     Kind(
+        "decay.damping_curve", INFO,
+        "the amplitude cycle by cycle, against viscous, dry and quadratic damping and monotone curves of amplitude",
+        "damping depends on amplitude in a free form, {times:.3g} times that of zero amplitude at the start; no amplitude "
+        "below {lowest_percent:.2g} % of the first stands out of the noise: the damping ratio is extrapolated to zero, and "
+        "its standard error holds the curves that fit",
+    ),
+    Kind(
         "decay.misfit", WARNING,
         "what the fit leaves near the mode, against the noise about it",
         "the fit leaves {ratio:.1f} times as much near the mode as the noise explains ({share_percent:.1f} % of the "

@@ -40,6 +40,7 @@ _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
 _START = 20.0  # cycles of the start that a filter shapes
 _CONTRADICTS = 40.0  # chi-square of what a start or a drive that no model describes to the noise leaves
+_PASSES = 0.05  # of the drive that a filter must let pass for it to be seen at all
 _BETWEEN = 0.02  # of a start, which filters between those that are tried leave
 _POSSIBLE = 3.0  # chi-square by which a filter may be worse than none, or than the best, and be there
 _SHOWS = 12.0  # chi-square by which noise or start alone show a filter, whatever the other says
@@ -351,7 +352,8 @@ def _filters(record: Record) -> list[Hypothesis]:
     drive = record.fit.frequency
     noise = _noise_misfit(record)
     plain = noise(None)
-    candidates = list(_candidates(drive))
+    # behind a notch at its own frequency the drive is gone but for the change of its amplitude, and it is there
+    candidates = [one for one in _candidates(drive) if abs(one.response(drive)) > _PASSES]
     start = _start_gains(record, candidates)
     told = [Hypothesis("", 0.0, 1)]
     for one, gain in zip(candidates, start, strict=True):

@@ -102,9 +102,12 @@ def fit_decay(
     console.print(table)
     console.print("softening: relative fall of the first frequency at the starting amplitude")
     for mode in first.modes[:1]:
-        if mode.law != "viscous":
-            strength = f"{mode.law_strength:.3f} +- {mode.law_strength_se:.3f}"
-            console.print(f"damping: viscous and {mode.law}, {strength} times as strong at the start")
+        law = mode.damping
+        if law.name == "free":
+            console.print(f"damping: {1.0 + law.strength:.3f} times that at zero amplitude at the start")
+        elif law.name != "viscous":
+            strength = f"{law.strength:.3f} +- {law.strength_se:.3f}"
+            console.print(f"damping: viscous and {law.name}, {strength} times as strong at the start")
     if mirror_channel is not None:
         second = lab.open_signal(signal, mirror_channel, units, sensitivity, sampling_frequency, columns)
         shapes = mode_shapes(data, second, first)

@@ -22,6 +22,7 @@ from snapbeam.lab.sine_fit import white_variance
 from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError
 
+_VISCOUS = DampingLaw()
 _SLOW = 4  # degree of the polynomial that is fitted beside the modes
 
 _Array = NDArray[np.float64]
@@ -52,11 +53,11 @@ class FitSettings(NamedTuple):
 
 
 def fit_decay(
-    samples: SignalSamples, guesses: list[ModeEstimate], settings: FitSettings, law: DampingLaw | None = None
+    samples: SignalSamples, guesses: list[ModeEstimate], settings: FitSettings, law: DampingLaw = _VISCOUS
 ) -> FitResult:
     """Fit decaying modes to a signal, starting from *guesses* (the first is the one that softens most).
 
-    *law* is a second one by which the first mode is damped; its strength is fitted too.
+    *law* is that by which the first mode is damped; its strength is fitted too, of a free form it is held.
     """
     units, soften, known = settings
     with needing("the fit of a decay", "lab"):
@@ -76,14 +77,14 @@ def fit_decay(
     if soften:
         for name, (mean, _) in prior.items():
             parameters.add(name, mean)
-    if law is not None:
+    named = law.name in ("dry", "quadratic")
+    if named:
         parameters.add("h", law.strength, min=0.0, max=100.0)
-    name = "viscous" if law is None else law.name
     trifle = 1e-12 * float(np.abs(y).max())
     sigma = max(explain(samples, guesses, units, soften).noise_near, trifle)
 
     def residual(value: dict[str, float]) -> _Array:
-        design = _design(t, value, len(guesses), soften, name)
+        design = _design(t, value, len(guesses), soften, law)
         solution = solve(design, y, 1e-12)
         parts = [(y - design @ solution) / sigma]
         if soften:
@@ -97,7 +98,7 @@ def fit_decay(
         lambda p: residual(p.valuesdict()), parameters, scale_covar=False, calc_covar=False
     )
     value = dict(search.leastsq(xtol=1e-9, ftol=1e-9).params.valuesdict())
-    design = _design(t, value, len(guesses), soften, name)
+    design = _design(t, value, len(guesses), soften, law)
     solution = solve(design, y, 1e-12)
     rest = y - design @ solution
     fitted = [value[f"f{i}"] for i in range(len(guesses))]
@@ -125,9 +126,11 @@ def fit_decay(
                 softening=value[f"s{i}"] / first**2 if soften else 0.0,
                 softening_se=error[f"s{i}"] * stretch / first**2 if soften else 0.0,
                 method="fit",
-                law=name if i == 0 else "viscous",
-                law_strength=value["h"] if law is not None and i == 0 else 0.0,
-                law_strength_se=error["h"] if law is not None and i == 0 else 0.0,
+                damping=_VISCOUS
+                if i
+                else law._replace(strength=value["h"], strength_se=error["h"])
+                if named
+                else law,
             )
         )
     rms = math.sqrt(float(rest @ rest) / max(y.size - free, 1))
@@ -146,8 +149,7 @@ def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, softe
             f"z{i}": mode.damping_ratio,
             f"s{i}": mode.softening * first,
         }
-    value["h"] = modes[0].law_strength
-    design = _design(t, value, len(modes), soften, modes[0].law)
+    design = _design(t, value, len(modes), soften, modes[0].damping)
     solution = solve(design, samples.values, 1e-12)
     rest = samples.values - design @ solution
     free = design.shape[1] + 3 * len(modes)
@@ -180,11 +182,11 @@ def _columns(count: int, soften: bool) -> list[int]:
     return [1 + 2 * i + (3 if soften and i > 0 else 0) for i in range(count)]
 
 
-def _design(t: _Array, value: dict[str, float], count: int, soften: bool, law: str) -> _Array:
+def _design(t: _Array, value: dict[str, float], count: int, soften: bool, law: DampingLaw) -> _Array:
     columns = [np.ones_like(t)]
     omega0 = 2.0 * math.pi * value["f0"]
     delta0 = value["z0"] * omega0
-    own, fall, first, second = _first_envelope(t, delta0, law, value.get("h", 0.0))
+    own, fall, first, second = _first_envelope(t, delta0, law._replace(strength=value.get("h", law.strength)))
     for i in range(count):
         omega = 2.0 * math.pi * value[f"f{i}"]
         zeta = value[f"z{i}"]
@@ -205,16 +207,14 @@ def _design(t: _Array, value: dict[str, float], count: int, soften: bool, law: s
     return np.column_stack([*columns, *slow[:, 1:].T])
 
 
-def _first_envelope(
-    t: _Array, decay_rate: float, law: str, strength: float
-) -> tuple[_Array, _Array, _Array, _Array]:
+def _first_envelope(t: _Array, decay_rate: float, law: DampingLaw) -> tuple[_Array, _Array, _Array, _Array]:
     """Envelope E of the first mode, E^2, and the integrals of E^2 and E^4 from the start."""
-    if law == "viscous":
+    if law.name == "viscous":
         own = np.exp(-decay_rate * t)
         fall = own * own
         steep = max(decay_rate, 1e-12)
         return own, fall, (1.0 - fall) / (2.0 * steep), (1.0 - fall**2) / (4.0 * steep)
-    own = envelope(law, t, decay_rate, strength)
+    own = envelope(law, t, decay_rate)
     fall = own * own
     first = cumulative_trapezoid(fall, t, initial=0.0)
     return own, fall, first, cumulative_trapezoid(fall * fall, t, initial=0.0)

@@ -13,6 +13,8 @@ from snapbeam.lab.decay.model import (
     ModeEstimate,
     find_law,
     hilbert_cycles,
+    law_priors,
+    local_amplitudes,
     noise_level,
     peak_cycles,
     regress,
@@ -29,6 +31,8 @@ from snapbeam.util.singular_values import polyfit
 from snapbeam.util.validation import InputError
 
 _MISFIT = 1.7  # times the noise that a fit may leave near the first mode
+_BEATS = 2.0  # times the noise that amplitudes of cycles must scatter about any monotone damping for two modes that beat
+_UNTOLD = 0.45  # of the damping ratio, where amplitudes show a law that the record does not
 _CANCEL = 1.0  # of the range of a record that the amplitude of a mode may reach; more is cancelled by another
 _MANY = 12_000  # samples from which a record is thinned before it is fitted
 
@@ -54,11 +58,13 @@ def fit_modes(
         beside = [pole for pole in centres.near if any(abs(pole.frequency / f - 1.0) < CLOSE for f in group)]
         away = [pole for pole in centres.near if pole not in beside]
         part = without_poles(clean, [*others, *away] if len(groups) > 1 else away, [*mine, *beside])
+        noise = noise_level(part)
         # a long record at fourteen samples or more to the shortest period
         factor = int(part.sampling_frequency / (14.0 * max([*group, *(pole.frequency for pole in beside)])))
         if part.values.size >= _MANY and factor >= 2:
-            part = thinned(part, max(min(factor, part.values.size // 3000), 1))
-        result, cycles, more, diagram = _group_fit(part, group, mine, beside, settings, diagram)
+            factor = max(min(factor, part.values.size // 3000), 1)
+            part, noise = thinned(part, factor), noise / math.sqrt(factor)
+        result, cycles, more, diagram = _group_fit(part, noise, group, mine, beside, settings, diagram)
         part, result = _lines_again(decay, part, result, settings)
         told += more
         found |= dict(zip(group, result.modes, strict=False))
@@ -98,12 +104,12 @@ def _lines_again(
         rest = without_lines(rest, [Line(left.frequency, left.amplitude, left.phase)])
     change = rest.values - result.residual
     better, mode = samples._replace(values=samples.values + change), result.modes[0]
-    law = None if mode.law == "viscous" else DampingLaw(mode.law, mode.law_strength, mode.law_strength_se)
-    return better, fit_decay(better, result.modes, settings, law)
+    return better, fit_decay(better, result.modes, settings, mode.damping)
 
 
 def _group_fit(
     samples: SignalSamples,
+    noise: float,
     centres: list[float],
     own: list[Pole],
     beside: list[Pole],
@@ -112,11 +118,11 @@ def _group_fit(
 ) -> tuple[FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
     """Modes fitted together; where they leave more than noise, a second law of damping or a close mode."""
     start = float(samples.time[0])
-    guesses, cycles = _guesses(samples, centres, own, settings.units, settings.soften)
+    guesses, cycles = _guesses(samples, noise, centres, own, settings.units, settings.soften)
     apart = [pole for pole in beside if _apart(samples, pole, guesses)]
-    made: tuple[FitResult, float, float, list[Diagnostic]] | None = None
+    made: tuple[FitResult, float, float, float, list[Diagnostic]] | None = None
     for some in ([], apart) if apart else ([],):
-        if some and made is not None and made[0].modes[0].law != "viscous" and made[1] < _MISFIT:
+        if some and made is not None and made[0].modes[0].damping.name != "viscous" and made[1] < _MISFIT:
             apart = []
             break  # a law of damping explains what looked like modes
         start_from = [*guesses, *(_of_pole(pole) for pole in some)]
@@ -125,18 +131,22 @@ def _group_fit(
         if made is not None and largest > _CANCEL * float(np.ptp(samples.values)):
             apart = []
             break
-        alone = _own_cycles(samples, result, cycles)
+        alone = samples._replace(values=result.alone)
+        heard = local_amplitudes(alone, _own_cycles(samples, noise, result, cycles), noise)
         rate = 2.0 * math.pi * result.modes[0].natural_frequency * result.modes[0].damping_ratio
-        law, doubt = find_law(alone, start, rate)
+        law, doubt, scatter = find_law(heard, start, rate, _bend(result.modes[0], settings))
         left = misfit_of(samples, result.residual, result.modes).ratio
         told: list[Diagnostic] = []
-        if law is not None:
-            result, left, told = _with_law(samples, result, left, settings, law)
-        made = result, left, doubt, told
+        if law.name != "viscous":
+            lowest = float(heard.amplitude[-1]) / result.modes[0].amplitude
+            result, left, told = _with_law(samples, result, left, settings, law, lowest)
+            if not told:
+                doubt = _UNTOLD
+        made = result, left, doubt, scatter, told
     assert made is not None
-    result, left, doubt, told = made
+    result, left, doubt, scatter, told = made
     guesses = [*guesses, *(_of_pole(pole) for pole in apart)]
-    if left > _MISFIT and len(guesses) < 8:
+    if left > _MISFIT and scatter > _BEATS and len(guesses) < 8:
         near = [pole for pole in beside if pole not in apart]
         better, diagram = _with_close_mode(samples, result, near, settings, diagram)
         if better is not None:
@@ -144,9 +154,8 @@ def _group_fit(
             first = better.modes[0].natural_frequency
             second = min((mode.natural_frequency for mode in better.modes[1:]), key=lambda f: abs(f - first))
             told = [KINDS_DECAY["close_modes"].found(first=first, second=second)]
-    if result.modes[0].law == "viscous":
-        result.modes[0] = widened(result.modes[0], damping_ratio=(doubt * result.modes[0].damping_ratio,))
-    return result, _own_cycles(samples, result, cycles), told, diagram
+    result.modes[0] = widened(result.modes[0], damping_ratio=(doubt * result.modes[0].damping_ratio,))
+    return result, _own_cycles(samples, noise, result, cycles), told, diagram
 
 
 def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> bool:
@@ -157,7 +166,12 @@ def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> boo
 
 
 def _with_law(
-    samples: SignalSamples, result: FitResult, left: float, settings: FitSettings, law: DampingLaw
+    samples: SignalSamples,
+    result: FitResult,
+    left: float,
+    settings: FitSettings,
+    law: DampingLaw,
+    lowest: float,
 ) -> tuple[FitResult, float, list[Diagnostic]]:
     """The fit with a second law of damping where that is told apart and leaves less; else as it was."""
     try:
@@ -166,11 +180,21 @@ def _with_law(
         return result, left, []
     first = other.modes[0]
     rest = misfit_of(samples, other.residual, other.modes).ratio
-    told_apart = first.law_strength > 3.0 * first.law_strength_se
-    if not told_apart or other.noise_rms >= 0.999 * result.noise_rms or rest >= max(0.8 * left, _MISFIT):
+    name, strength, error, _ = first.damping
+    told_apart = name == "free" or strength > 3.0 * error
+    if not told_apart or other.noise_rms >= result.noise_rms or rest >= max(0.8 * left, _MISFIT):
         return result, left, []
-    strength, error = first.law_strength, first.law_strength_se
-    return other, rest, [KINDS_DECAY["damping_law"].found(told=first.law, strength=strength, error=error)]
+    if name == "free":
+        curve = KINDS_DECAY["damping_curve"].found(times=1.0 + strength, lowest_percent=100.0 * lowest)
+        return other, rest, [curve]
+    return other, rest, [KINDS_DECAY["damping_law"].found(told=name, strength=strength, error=error)]
+
+
+def _bend(mode: ModeEstimate, settings: FitSettings) -> tuple[float, float]:
+    """What softening adds to the logarithm of the amplitude at the start, and its standard deviation."""
+    softening = mode.softening * mode.amplitude**2 if settings.soften else 0.0
+    mean, error = law_priors(settings.units)["r"]
+    return mean * softening, error * abs(softening)
 
 
 def _of_pole(pole: Pole) -> ModeEstimate:
@@ -181,16 +205,15 @@ def _of_pole(pole: Pole) -> ModeEstimate:
 
 
 def _guesses(
-    samples: SignalSamples, centres: list[float], poles: list[Pole], units: str, soften: bool
+    samples: SignalSamples, noise: float, centres: list[float], poles: list[Pole], units: str, soften: bool
 ) -> tuple[list[ModeEstimate], Cycles]:
     """Each mode by its cycles, or by its pole where too few stand out; and the cycles of the first."""
-    sigma = noise_level(samples)
     rest = samples
     found: list[ModeEstimate] = []
     kept: Cycles | None = None
     for center in centres:
         try:
-            estimate, cycles = mode_by_cycles(rest, center, sigma, units, "hilbert", soften and not found)
+            estimate, cycles = mode_by_cycles(rest, center, noise, units, "hilbert", soften and not found)
         except InputError:
             pole = next((one for one in poles if one.frequency == center), None)
             if pole is None or kept is None:
@@ -219,14 +242,14 @@ def mode_by_cycles(
     return estimate, cycles
 
 
-def _own_cycles(samples: SignalSamples, result: FitResult, otherwise: Cycles) -> Cycles:
+def _own_cycles(samples: SignalSamples, noise: float, result: FitResult, otherwise: Cycles) -> Cycles:
     """The first mode's cycles with the other modes taken out."""
     first = result.modes[0]
     if len(result.modes) == 1:
         return otherwise
     try:
         alone = samples._replace(values=result.alone)
-        return hilbert_cycles(alone, first.natural_frequency, noise_level(samples))
+        return hilbert_cycles(alone, first.natural_frequency, noise)
     except InputError:
         return otherwise
 

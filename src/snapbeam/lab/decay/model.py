@@ -16,17 +16,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.integrate import cumulative_trapezoid
 
 from snapbeam.lab.decay.poles import Line, Stabilisation, damped_waves
 from snapbeam.lab.least_squares import phasors, weighted_line
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.util.diagnostics import Diagnostic, doubtful
-from snapbeam.util.singular_values import lstsq, pinv
+from snapbeam.util.singular_values import lstsq, pinv, polyfit
 from snapbeam.util.validation import InputError, nonnegative, positive
 
 if TYPE_CHECKING:
@@ -35,14 +36,38 @@ if TYPE_CHECKING:
 
 _Array = NDArray[np.float64]
 _LOWEST = 4.0  # least amplitude of a usable cycle, in standard deviations of its noise
-LAWS = ("viscous", "dry", "quadratic")
 _CERTAIN = 30.0  # chi-square by which a second law must better the fit
 _MOST = 0.45  # of the viscous rate that laws which are not told may put in doubt; more is no damping
-_ODDS = 8.0  # chi-square at which a second law is as likely as none: its parameter, and that it is rare
+_ODDS = 8.0  # chi-square at which an explanation is as likely as none: its parameter, and that it is rare
+_SHARE = 0.9  # of the probability of all forms, that one of the list must have
+_SMOOTH = 8  # degree of the polynomial that a residual of amplitudes is tested with
+_RARE, _RARER = (
+    3.0,
+    2.0,
+)  # logarithm of how much rarer than viscous damping alone dry friction or drag, and free forms, are
+_RAREST = 8.0  # the same of free forms that fall with amplitude, over those that rise: what falls is mostly dry friction
+_SIZE = 2.0  # of the viscous rate: a term of a form at the start, to a standard deviation
+_POWERS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
+_SCALES = (0.1, 0.15, 0.25, 0.4, 0.6, 1.0)
+_LEAST_DAMPING = 0.02  # of that at zero amplitude, which a curve may reach
+CURVE = np.exp(-np.linspace(0.0, 16.0, 400))
+"""Amplitudes, over that at the start, at which the curve of a free form is held."""
 _MATTERS = 0.03  # change of the viscous rate from which it matters
 SHAPES = ("symmetric", "antisymmetric", "unclear")
 _IN_PHASE = 0.7  # cosine of the angle between two sensors from which a mode is told
 _ALIKE = 0.2  # amplitude of one sensor over the other's below which it is not
+
+
+class DampingLaw(NamedTuple):
+    """A law of damping: its name, its strength h over the constant part at the start, and the standard error.
+
+    Of a free form ``curve`` is the damping ratio over that at zero amplitude, at the amplitudes of ``CURVE``.
+    """
+
+    name: str = "viscous"
+    strength: float = 0.0
+    strength_se: float = 0.0
+    curve: _Array | None = None
 
 
 @dataclass(frozen=True)
@@ -51,9 +76,8 @@ class ModeEstimate:
 
     ``natural_frequency`` [Hz] at zero amplitude and ``damping_ratio``, with standard errors; ``amplitude`` at
     the start of the analysed part, in the unit of the signal; ``softening`` kappa in f = natural_frequency (1 -
-    kappa a^2), per squared unit of the signal, where a is the amplitude of the first mode.  ``law`` is how it
-    is damped, "viscous", "dry" or "quadratic", the latter two beside viscous damping and ``law_strength``
-    times as strong at the start; the damping ratio is that of the viscous part.
+    kappa a^2), per squared unit of the signal, where a is the amplitude of the first mode.  ``damping`` is its
+    law of damping; the damping ratio is that of zero amplitude, without dry friction.
     """
 
     natural_frequency: float
@@ -66,9 +90,7 @@ class ModeEstimate:
     softening: float
     softening_se: float
     method: str
-    law: str = "viscous"
-    law_strength: float = 0.0
-    law_strength_se: float = 0.0
+    damping: DampingLaw = field(default=DampingLaw(), compare=False)
 
 
 @dataclass(frozen=True)
@@ -117,13 +139,18 @@ class DecayFit:
 
     def summary(self) -> dict[str, Any]:
         """The figures as plain numbers and words, for a table or a JSON file."""
-        stems = ("natural_frequency", "damping_ratio", "amplitude", "softening", "law_strength")
+        stems = ("natural_frequency", "damping_ratio", "amplitude", "softening")
         names = [name for stem in stems for name in (stem, f"{stem}_se")]
         return {
             "method": self.modes[0].method,
             "units": self.units,
             "modes": [
-                {"law": mode.law, **{name: float(getattr(mode, name)) for name in names}}
+                {
+                    "law": mode.damping.name,
+                    "law_strength": mode.damping.strength,
+                    "law_strength_se": mode.damping.strength_se,
+                    **{name: float(getattr(mode, name)) for name in names},
+                }
                 for mode in self.modes
             ],
             "noise_rms": self.noise_rms,
@@ -196,6 +223,29 @@ def hilbert_cycles(samples: SignalSamples, frequency: float, sigma: float) -> Cy
     phase = np.unwrap(np.angle(mean)) + 2.0 * math.pi * frequency * (middle - samples.time[0])
     noise = sigma * math.sqrt(2.0 / width)
     return _usable(Cycles(middle[3:-3], np.abs(mean[3:-3]), phase[3:-3], noise))
+
+
+def local_amplitudes(samples: SignalSamples, cycles: Cycles, sigma: float) -> Cycles:
+    """Every other cycle, its amplitude by a sine over two periods, which changes evenly, its mean and second harmonic.
+
+    No filter distorts them; other modes must be out of *samples*, with white noise of standard deviation *sigma*.
+    """
+    rate = np.polyder(polyfit(cycles.time, cycles.phase, 3, w=cycles.amplitude))
+    period = float(np.diff(cycles.time).mean())
+    cycles = cycles._replace(**{name: getattr(cycles, name)[::2] for name in ("time", "amplitude", "phase")})
+    edges = np.searchsorted(samples.time, [cycles.time - period, cycles.time + period])
+    amplitude, unit = np.empty_like(cycles.time), np.empty_like(cycles.time)
+    for k, (first, last) in enumerate(edges.T):
+        since = samples.time[first:last] - cycles.time[k]
+        turn = np.exp(1j * np.polyval(rate, cycles.time[k]) * since)
+        waves = np.column_stack([turn, turn * (since / period), turn**2])
+        design = np.hstack([waves.real, waves.imag, np.ones((since.size, 1))])
+        inverse = pinv(design.T @ design)
+        found = inverse @ (design.T @ samples.values[first:last])
+        amplitude[k], unit[k] = math.hypot(found[0], found[3]), 0.5 * (inverse[0, 0] + inverse[3, 3])
+    noise = sigma * math.sqrt(float(unit.mean()))
+    # noise at right angles to a phasor lengthens it
+    return cycles._replace(amplitude=np.maximum(amplitude - noise**2 / (2.0 * amplitude), noise), noise=noise)
 
 
 def peak_cycles(samples: SignalSamples, frequency: float, sigma: float) -> Cycles:
@@ -310,30 +360,27 @@ def backbone(cycles: Cycles, parts: int = 12) -> tuple[_Array, _Array, _Array]:
     return np.array(amplitude), np.array(freq), np.array(error)
 
 
-# The amplitude a of a free oscillation falls as da/dt = -delta a - c - q a^2, of which one of c and q is taken
-# to act beside the viscous delta.  Over the viscous fall e = exp(-delta t) that is
+# The amplitude a of a free oscillation falls as d ln a/dt = -omega zeta(a).  Beside the constant, zeta has one of the
+# terms c/a (dry friction) and c a (quadratic drag), or a free form: a monotone curve of amplitude.  With
+# e = exp(-delta t) the fall by the constant part delta, and h the other part over it at the start,
 #
-#     dry:        a/a_0 = (1 + h) e - h,               h = c/(delta a_0),
-#     quadratic:  a/a_0 = e/(1 + h (1 - e)),           h = q a_0/delta,
+#     dry:        a/a_0 = (1 + h) e - h,
+#     quadratic:  a/a_0 = e/(1 + h (1 - e)).
 #
-# so h is the strength of the other law at the start, over the viscous one.
+# Over the measured amplitudes, smoothed, ln a is linear in all unknowns.  So each form is a linear regression with
+# normal priors on the size of its terms, and its probability follows in closed form.
 
 
-class DampingLaw(NamedTuple):
-    """A law of damping: its name, its strength h over the viscous one at the start, and the standard error."""
-
-    name: str
-    strength: float
-    strength_se: float
-
-
-def envelope(law: str, time: _Array, decay_rate: float, strength: float) -> _Array:
+def envelope(law: DampingLaw, time: _Array, decay_rate: float) -> _Array:
     """Amplitude over that at time 0; dry friction ends at zero."""
+    if law.curve is not None:
+        clock = cumulative_trapezoid(1.0 / law.curve, -np.log(CURVE), initial=0.0)
+        return np.asarray(np.exp(np.interp(decay_rate * time, clock, np.log(CURVE))))
     fall = np.exp(-decay_rate * time)
-    if law == "quadratic":
-        return np.asarray(fall / (1.0 + strength * (1.0 - fall)))
-    if law == "dry":
-        return np.asarray(np.maximum((1.0 + strength) * fall - strength, 1e-9))
+    if law.name == "quadratic":
+        return np.asarray(fall / (1.0 + law.strength * (1.0 - fall)))
+    if law.name == "dry":
+        return np.asarray(np.maximum((1.0 + law.strength) * fall - law.strength, 1e-9))
     return np.asarray(fall)
 
 
@@ -342,44 +389,133 @@ def likely(gain: float, odds: float = _ODDS) -> float:
     return 1.0 / (1.0 + math.exp(min(0.5 * (odds - gain), 700.0)))
 
 
-def find_law(cycles: Cycles, start: float, decay_rate: float) -> tuple[DampingLaw | None, float]:
-    """The second law of damping that the amplitude of each cycle shows; None if viscous damping says it all.
+class _Form(NamedTuple):
+    """Terms of zeta(a) beside the constant one, and the regression: coefficients, their covariance, log probability."""
 
-    With it comes the share of the viscous rate that laws which are not told put in doubt: its change under each, by the
-    root of the probability of that law.  *start* [s] is where the decay begins, *decay_rate* [1/s] a guess of the
-    viscous rate.
+    terms: tuple[int, ...]
+    found: _Array
+    spread: _Array
+    weight: float
+
+
+def _terms(x: _Array) -> _Array:
+    """Terms of zeta over amplitude x, 1 at the start: of dry friction, of drag, and curves that rise ever later."""
+    rising = [x**power for power in _POWERS]
+    levelling = [
+        np.expm1(-((x / scale) ** power)) / math.expm1(-(scale**-power))
+        for scale in _SCALES
+        for power in (1.0, 2.0)
+    ]
+    return np.column_stack([1.0 / x, x, *rising, *levelling])
+
+
+def find_law(
+    cycles: Cycles, start: float, decay_rate: float, bend: tuple[float, float]
+) -> tuple[DampingLaw, float, float]:
+    """The law of damping that the amplitude of each cycle shows, its doubt, and what it leaves over the noise.
+
+    The doubt is the standard deviation of the damping ratio at zero amplitude, over that ratio, over all forms, each with its probability, so that it holds how far
+    a curve may turn below the amplitudes of the record.  *start* [s] is where the decay begins, *decay_rate* [1/s] a guess
+    of the viscous rate, *bend* the change of ln a by softening at the start and its standard deviation.
     """
     t = cycles.time - start
     if t.size < 10:
-        return None, 0.0
-    first = float(cycles.amplitude[0]) * math.exp(decay_rate * float(t[0]))
-    noise = max(cycles.noise, 1e-6 * first)
-
-    def fitted(law: str, guess: list[float]) -> tuple[_Array, float, _Array]:
-        def miss(p: _Array) -> _Array:
-            strength = float(p[2]) if p.size > 2 else 0.0
-            return (math.exp(p[0]) * envelope(law, t, math.exp(p[1]), strength) - cycles.amplitude) / noise
-
-        n = len(guess)
-        bounds = [-np.inf, -np.inf, 0.0][:n], [np.inf] * n
-        found = least_squares(miss, guess, bounds=bounds, x_scale=[0.1, 0.3, 0.3][:n])
-        gram = found.jac.T @ found.jac
-        spread = np.sqrt(np.maximum(np.diag(pinv(gram)), 0.0))
-        return found.x, 2.0 * float(found.cost), spread
-
+        return DampingLaw(), 0.0, 1.0
     rate = max(decay_rate, 1e-6)
-    plain, chi, _ = fitted("viscous", [math.log(first), math.log(rate)])
-    best: DampingLaw | None = None
-    least, doubt = chi, 0.0
-    for law in LAWS[1:]:
-        p, better, spread = fitted(law, [math.log(first), math.log(0.7 * rate), 0.5])
-        unit = max(1.0, better / max(t.size - 3, 1))
-        changed = abs(math.exp(p[1] - plain[1]) - 1.0)
-        doubt = max(doubt, math.sqrt(likely((chi - better) / unit)) * changed)
-        certain = (chi - better) / unit > _CERTAIN and p[2] > 4.0 * spread[2] * math.sqrt(unit)
-        if better < least and certain and changed > _MATTERS:
-            least, best = better, DampingLaw(law, float(p[2]), float(spread[2]) * math.sqrt(unit))
-    return best, min(doubt, _MOST) if best is None else 0.0
+    first = float(cycles.amplitude[0]) * math.exp(rate * float(t[0]))
+    noise = max(cycles.noise / first, 1e-6)
+    aim = np.log(cycles.amplitude / first)
+    clock = rate * t
+    smooth = np.polyval(polyfit(clock, aim, 3, w=np.exp(aim)), clock)
+    for _ in range(3):
+        x = np.exp(np.minimum(smooth, 0.3))
+        slopes = cumulative_trapezoid(_terms(x), clock, axis=0, initial=0.0)
+        design = np.column_stack([np.ones_like(t), x**2, -clock, -slopes])
+        forms, unit = _regressions(design, aim, x / noise, bend)
+        best = max(forms, key=lambda one: one.weight)
+        smooth = design[:, [0, 1, 2, *(3 + k for k in best.terms)]] @ best.found
+    plain = forms[0]
+    named = {"viscous": plain, "dry": forms[1], "quadratic": forms[2]}
+    free = forms[3:]
+    name = max(named, key=lambda name: named[name].weight)
+    usual = named[name]
+    weights = np.exp([one.weight - best.weight for one in forms])
+    zero = np.array([one.found[2] for one in forms])
+    within = np.array([one.spread[2] for one in forms])
+
+    def doubt(value: float, own: float) -> float:
+        variance = float(weights @ ((zero - value) ** 2 + within**2) / weights.sum()) - own**2
+        return math.sqrt(max(variance, 0.0)) / value
+
+    certain = best.weight - plain.weight > 0.5 * _CERTAIN
+    if certain and math.exp(usual.weight - best.weight) < _SHARE * weights.sum():
+        mean = float(weights @ zero / weights.sum())
+        grid = _terms(CURVE)
+        curve = sum(
+            w * (one.found[2] + grid[:, list(one.terms)] @ one.found[3:])
+            for w, one in zip(weights[3:], free, strict=True)
+        ) / float(weights[3:].sum())
+        curve = np.maximum(curve / mean, _LEAST_DAMPING)
+        return DampingLaw("free", float(curve[0] - 1.0), 0.0, curve), doubt(mean, 0.0), unit
+    changed = abs(usual.found[2] / plain.found[2] - 1.0)
+    if not certain or name == "viscous" or changed < _MATTERS:
+        return DampingLaw(), min(doubt(float(plain.found[2]), float(plain.spread[2])), _MOST), unit
+    strength = float(usual.found[3] / usual.found[2])
+    error = float(usual.spread[3] / usual.found[2])
+    return DampingLaw(name, strength, error), doubt(float(usual.found[2]), float(usual.spread[2])), unit
+
+
+def _regressions(
+    design: _Array, aim: _Array, weight: _Array, bend: tuple[float, float]
+) -> tuple[list[_Form], float]:
+    """Regressions of all forms, the first three of viscous, dry and quadratic damping, and what they leave over the noise.
+
+    What any smooth curve of time explains better is no noise, and widens all.
+    """
+    heavy, right = design * weight[:, None], aim * weight
+    gram, moment, total = heavy.T @ heavy, heavy.T @ right, float(right @ right)
+    rising = range(2, design.shape[1] - 3)
+    groups: list[list[tuple[int, ...]]] = [
+        [()],
+        [(0,), (1,), *((k,) for k in rising)],
+        list(combinations(rising, 2)),
+    ]
+    share = np.cumsum(weight**2) / float(weight @ weight)
+    curves = np.polynomial.legendre.legvander(2.0 * share - 1.0, _SMOOTH) * weight[:, None]
+    onto = np.linalg.qr(curves)[0].T
+    smooth, heavy_smooth = onto @ right, onto @ heavy
+    unit, scatter = 1.0, 1.0
+    forms: list[_Form] = []
+    for _ in range(2):
+        forms, least = [], (math.inf, 0.0)
+        for size, sets in enumerate(groups):
+            used = np.array([[0, 1, 2, *(3 + term for term in terms)] for terms in sets])
+            spread = np.array([1e3, max(bend[1], 1e-6), 3.0, *([_SIZE] * size)])
+            mean = np.array([0.0, bend[0], 0.0, *([0.0] * size)])
+            parts = gram[used[:, :, None], used[:, None, :]]
+            precision = parts / unit + np.diag(spread**-2)
+            inverse = np.linalg.inv(precision)
+            found = np.einsum("kij,kj->ki", inverse, moment[used] / unit + mean / spread**2)
+            chi = total - 2.0 * (moment[used] * found).sum(1) + np.einsum("ki,kij,kj->k", found, parts, found)
+            k = int(np.argmin(chi))
+            if chi[k] < least[0]:
+                gone = smooth - heavy_smooth[:, used[k]] @ found[k]
+                least = float(chi[k]), float(gone @ gone)
+            extra = found[:, 3:]
+            sound = (found[:, 2] > 0.0) & (
+                (extra >= 0.0).all(1) | ((extra <= 0.0).all(1) & (used[:, -1] > 3))
+            )
+            evidence = -0.5 * (chi / unit + (((found - mean) / spread) ** 2).sum(1))
+            evidence -= 0.5 * np.linalg.slogdet(precision)[1] + float(np.log(spread).sum())
+            rare = _RARER + math.log(2.0 * len(sets))
+            evidence -= np.where(used[:, -1] > 4, rare, _RARE) if size else 0.0
+            evidence -= _RAREST * (extra < 0.0).any(1)
+            own = np.sqrt(np.maximum(np.diagonal(inverse, axis1=1, axis2=2), 0.0))
+            evidence[~sound & (size > 0)] = -math.inf
+            forms += [_Form(*one) for one in zip(sets, found, own, evidence.tolist(), strict=True)]
+        scatter = least[0] / max(aim.size - 5, 1)
+        unit = max(1.0, scatter, least[1] / (_SMOOTH + 1.0))
+    return forms, scatter
 
 
 def mode_shapes(first: xr.DataArray, second: xr.DataArray, fit: DecayFit) -> tuple[str, ...]:

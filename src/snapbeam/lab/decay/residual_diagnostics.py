@@ -111,7 +111,7 @@ def _halves(
         return (0.0, math.inf), (0.0, math.inf)
     omega = 2.0 * math.pi * mode.natural_frequency
     rate = mode.damping_ratio * omega
-    shape = envelope(mode.law, t, rate, mode.law_strength)
+    shape = envelope(mode.damping, t, rate)
     log_rest = np.log(cycles.amplitude) - np.log(shape)
     s = mode.softening * mode.amplitude**2 if soften else 0.0
     clock = t - s * cumulative_trapezoid(shape**2, t, initial=0.0)

@@ -50,7 +50,7 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
     scale, unit = _SCALE.get(fit.units, (1.0, fit.units))
     mode = fit.modes[0]
     rate = 2.0 * np.pi * mode.natural_frequency * mode.damping_ratio
-    envelope = mode.amplitude * law_envelope(mode.law, time - fit.start, rate, mode.law_strength)
+    envelope = mode.amplitude * law_envelope(mode.damping, time - fit.start, rate)
     middle = float(values.mean())
     told = fit.diagnostics
     with figure_style():
