@@ -69,9 +69,7 @@ def changed(kind, frames, recording, rng):
         hidden[:rest] = False
         for k in np.flatnonzero(hidden):
             top, half = int(near[k]), 0.5 * stage.shaker_width / recording.camera.pixel_size
-            rod = (
-                np.abs(np.arange(width) - (width - 1) / 2.0) < half
-            )  # oil hides the sticker and fills the gap
+            rod = np.abs(np.arange(width) - (width - 1) / 2.0) < half  # oil hides the sticker and fills the gap
             level = full * (stage.beam if stage.marker_thickness == 0.0 else stage.shaker)
             frames[k, top:, rod] = level + noise * rng.standard_normal((rod.sum(), height - top))
     elif kind == "one repeated frame":
@@ -109,9 +107,7 @@ def changed(kind, frames, recording, rng):
         near, _ = _rows(recording, frames)
         rows, taper = np.arange(height), float(rng.choice([-1.0, 1.0])) * rng.uniform(0.01, 0.03)
         for k in range(count):  # the near edge leans, the far one does not, nor the rod
-            share = np.clip(
-                (rows - near[k] + 0.6 * stage.beam_thickness / recording.camera.pixel_size) / 4.0, 0, 1
-            )
+            share = np.clip((rows - near[k] + 0.6 * stage.beam_thickness / recording.camera.pixel_size) / 4.0, 0, 1)
             for c in range(width):
                 x = c - (width - 1) / 2.0
                 if abs(x) * recording.camera.pixel_size > 0.5 * stage.shaker_width:
@@ -129,9 +125,9 @@ def changed(kind, frames, recording, rng):
     elif kind == "fixed rows":
         frames += 0.006 * full * rng.standard_normal((height, 1))
     if kind in ("one repeated frame", "every seventh a copy"):  # the copy is encoded by itself
-        frames = frames[shown] + 0.3 * noise * (shown != np.arange(count))[
-            :, None, None
-        ] * rng.standard_normal(frames.shape)
+        frames = frames[shown] + 0.3 * noise * (shown != np.arange(count))[:, None, None] * rng.standard_normal(
+            frames.shape
+        )
         shown = np.arange(count)
     elif shown.size < count:
         frames = frames[shown]
@@ -156,18 +152,12 @@ def prepared(kind, rng):
         scene.settings["beam_thickness"] = 0.4e-3 * (1.0 + 0.01 * rng.standard_normal())
         scale = float(rng.choice(SCALES[kind])) if len(SCALES[kind]) > 1 else 1.0
         if kind in ("gauge out of plane", "three rulers", "pixel size ten times off"):
-            scene.settings["tip_diameter"] = scene.stage["shaker_width"] * (
-                1.0 + 0.01 * rng.standard_normal()
-            )
+            scene.settings["tip_diameter"] = scene.stage["shaker_width"] * (1.0 + 0.01 * rng.standard_normal())
             scene.cycles = rng.uniform(6.0, 10.0)
     elif kind == "lamp pulse":
         scene.camera["exposure"] = 0.9 / scene.camera["frame_rate"]
     elif kind == "swinging sticker":
-        scene.stage |= {
-            "shaker_width": rng.uniform(0.5e-3, 0.8e-3),
-            "tip_radius": 2.5e-3,
-            "marker_thickness": 0.25e-3,
-        }
+        scene.stage |= {"shaker_width": rng.uniform(0.5e-3, 0.8e-3), "tip_radius": 2.5e-3, "marker_thickness": 0.25e-3}
         scene.stage["marker_distance"] = 0.35e-3
     elif kind == "uneven light":
         scene.camera["light"] = (rng.uniform(0.3, 0.6), rng.uniform(-0.5, 0.5))

@@ -124,11 +124,7 @@ def good_scene(rng):
         "beam_thickness": 0.4e-3,
         **levels,
     }
-    defects = {
-        "flicker": rng.uniform(0.0, 0.05),
-        "texture": rng.uniform(0.0, 0.03),
-        "shot": rng.uniform(0.0, 0.01),
-    }
+    defects = {"flicker": rng.uniform(0.0, 0.05), "texture": rng.uniform(0.0, 0.03), "shot": rng.uniform(0.0, 0.01)}
     return Scene(camera=camera, stage=stage, defects=defects)
 
 
@@ -180,11 +176,7 @@ def spoiled_scene(rng, kind):
         scene.defects["gain"] = rng.uniform(1.3, 2.2) / max(scene.stage["beam"], scene.stage["background"])
         scene.name = "scene.tif"
     elif kind == "sticker taken for the tip":
-        scene.stage |= {
-            "marker_thickness": 0.25e-3,
-            "shaker": scene.stage["background"],
-            "marker": scene.stage["beam"],
-        }
+        scene.stage |= {"marker_thickness": 0.25e-3, "shaker": scene.stage["background"], "marker": scene.stage["beam"]}
         scene.stage |= {"shaker_width": 0.7e-3, "marker_distance": rng.uniform(0.2e-3, 0.45e-3)}
         scene.settings["marker"] = False
         scene.camera["shape"] = (190, 80) if scene.camera["shape"][0] > 100 else (80, 190)
@@ -212,9 +204,7 @@ def write(recording, path):
         )  # fmt: skip
         writer.send(None)
         for frame in recording:
-            writer.send(
-                np.ascontiguousarray((frame >> max(recording.camera.bit_depth - 8, 0)).astype(np.uint8))
-            )
+            writer.send(np.ascontiguousarray((frame >> max(recording.camera.bit_depth - 8, 0)).astype(np.uint8)))
         writer.close()
         return path
     return recording.write(path)
@@ -260,9 +250,7 @@ def _reordered(recording, kind, rng):
             before = as_taken(k - 1)
             return np.clip(before + rng.integers(0, 3, before.shape), 1, before.max()).astype(np.uint16)
         if kind == "camera knocked" and index >= k:
-            return np.roll(
-                as_taken(index), shift, axis=int(recording.camera.shape[1] > recording.camera.shape[0])
-            )
+            return np.roll(as_taken(index), shift, axis=int(recording.camera.shape[1] > recording.camera.shape[0]))
         return as_taken(index)
 
     if kind in ORDER_DEFECTS:
@@ -286,10 +274,7 @@ def outcome(measure):
     worst, far, lost = 0.0, 0.0, 0.0
     pixel = recording.camera.pixel_size * 1e3
     count = min(tracked.sizes["time"], len(recording))
-    for name, error in (
-        ("displacement_mm", "displacement_stderr_mm"),
-        ("shaker_displacement_mm", "shaker_stderr_mm"),
-    ):
+    for name, error in (("displacement_mm", "displacement_stderr_mm"), ("shaker_displacement_mm", "shaker_stderr_mm")):
         if name not in tracked:
             continue
         miss = tracked[name].values[:count] - recording.truth[name].values[:count]

@@ -100,13 +100,7 @@ def drive_signal(rng, kind):
         level = rng.uniform(0.55, 0.9) * amplitude
         noise = 0.01 * amplitude * rng.standard_normal(values.size)
         clean = render_vibrometer(
-            freq,
-            amplitude,
-            duration=length,
-            onset=onset,
-            start_up=start_up,
-            start_up_share=share,
-            snr_db=200.0,
+            freq, amplitude, duration=length, onset=onset, start_up=start_up, start_up_share=share, snr_db=200.0
         )
         values = np.clip(clean.values, -level, level) + noise[: clean.size]
     elif kind == "begins in motion":
@@ -157,9 +151,7 @@ def common_defect(rng, kind, values, at, freq, size, rate):
         values = np.round(values / step) * step
     elif kind == "folded line":
         line = rng.uniform(0.0, 0.5 * rate)
-        values = values + rng.uniform(0.02, 0.2) * size * np.cos(
-            2.0 * np.pi * line * time + rng.uniform(-3.0, 3.0)
-        )
+        values = values + rng.uniform(0.02, 0.2) * size * np.cos(2.0 * np.pi * line * time + rng.uniform(-3.0, 3.0))
     elif kind == "interpolated":
         coarse = np.arange(0.0, time[-1], 1.0 / (freq * rng.uniform(5.0, 15.0)))
         values = np.interp(time, coarse, np.interp(coarse, time, values))
@@ -185,9 +177,7 @@ def sensor_signal(rng, kind):
     )
     since = np.maximum(taken - onset, 0.0)
     if kind == "clock drifts":
-        since = since * (
-            1.0 + rng.choice([-1.0, 1.0]) * float(np.exp(rng.uniform(-7.6, -4.6))) * since / since[-1]
-        )
+        since = since * (1.0 + rng.choice([-1.0, 1.0]) * float(np.exp(rng.uniform(-7.6, -4.6))) * since / since[-1])
     turn = 2.0 * np.pi * freq * since + rng.uniform(-3.0, 3.0)
     second, third = rng.uniform(0.0, 0.03), rng.choice([0.0, rng.uniform(0.0, 0.02)])
     if kind == "hard":
@@ -276,11 +266,7 @@ def fading(time, freq, zeta):
 
 def decay_signal(rng, kind):
     """A free decay, what is true of it, and what a person says of it."""
-    freq, zeta, rate = (
-        rng.uniform(40.0, 200.0),
-        float(np.exp(rng.uniform(np.log(0.002), np.log(0.015)))),
-        5000.0,
-    )
+    freq, zeta, rate = (rng.uniform(40.0, 200.0), float(np.exp(rng.uniform(np.log(0.002), np.log(0.015)))), 5000.0)
     length = float(np.clip(3.0 / (2.0 * np.pi * freq * zeta), 20.0 / freq, 1.2))
     time = np.arange(int(length * rate)) / rate
     omega = 2.0 * np.pi * freq
@@ -362,9 +348,7 @@ def judged_drive(rng, kind):
     ratios = {}
     for name in ("amplitude", "frequency"):
         if name in truth:
-            ratios[name] = abs(getattr(drive.steady, name) - truth[name]) / getattr(
-                drive.steady, f"{name}_se"
-            )
+            ratios[name] = abs(getattr(drive.steady, name) - truth[name]) / getattr(drive.steady, f"{name}_se")
     if "onset" in truth and drive.startup is not None:
         ratios["onset"] = abs(drive.startup.onset - truth["onset"]) / drive.startup.onset_uncertainty
     worst = max(ratios, key=ratios.get, default="")

@@ -73,19 +73,13 @@ def record(rng, start, *, filtered):
     if start == "resonance":  # the table on its suspension, struck by the sine
         own, damping = freq * float(np.exp(rng.uniform(np.log(0.08), np.log(0.6)))), rng.uniform(0.05, 1.2)
         speed = rate / (np.pi * own)  # of the bilinear transform
-        below = np.array([speed**2, 2.0 * damping * speed, 1.0]) @ [
-            [1.0, -2.0, 1.0],
-            [1.0, 0.0, -1.0],
-            [1.0, 2.0, 1.0],
-        ]
+        below = np.array([speed**2, 2.0 * damping * speed, 1.0]) @ [[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]]
         above = speed**2 * np.array([1.0, -2.0, 1.0])
         clean = lfilter(above / below[0], below / below[0], clean)
         amplitude *= abs(freqz(above, below, [freq], fs=rate)[1][0])
     clean *= 0.02
     kind = NOISES[rng.integers(len(NOISES))]
-    values = clean + 0.02 / np.sqrt(2.0) * 10.0 ** (-rng.uniform(20.0, 50.0) / 20.0) * noise(
-        rng, kind, count, rate
-    )
+    values = clean + 0.02 / np.sqrt(2.0) * 10.0 ** (-rng.uniform(20.0, 50.0) / 20.0) * noise(rng, kind, count, rate)
     corner = 0.0
     if filtered:
         corner = freq * float(np.exp(rng.uniform(np.log(0.12), np.log(1.5))))
@@ -108,8 +102,7 @@ def judged(seed, k, *, filtered):
     except InputError as error:
         return [f"refused: {error}"], 0.0, start, kind, corner / truth["frequency"]
     off = max(
-        abs(getattr(drive.steady, name) - true) / getattr(drive.steady, f"{name}_se")
-        for name, true in truth.items()
+        abs(getattr(drive.steady, name) - true) / getattr(drive.steady, f"{name}_se") for name, true in truth.items()
     )
     codes = [one.code.partition(".")[2] for one in doubtful(diagnostics_of(drive))]
     return codes, off, start, kind, corner / truth["frequency"]

@@ -30,9 +30,7 @@ def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
     speed = velocity * BEAM.buckling_level * 2.0 * np.pi * first
     lasting = {"duration": 0.1 + (CYCLES + 2) / frequency, "start_up": 0.01}
     true = lab.render_vibrometer(frequency, speed, snr_db=100.0, **lasting)
-    motion = sb.Striker(
-        drive=sb.RecordedMotion.from_dataset(lab.recorded_drive(true, 1e5)), location=LOCATION
-    )
+    motion = sb.Striker(drive=sb.RecordedMotion.from_dataset(lab.recorded_drive(true, 1e5)), location=LOCATION)
     run = sb.simulate(sb.System(MODEL, contacts=[sb.Contact(CONTACT, motion)]), sb.Integration(cycles=CYCLES))
     clean = ResponseClass(run.summary.response_class).label
     if spoiled == "begins in motion":

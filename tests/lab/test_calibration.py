@@ -91,13 +91,7 @@ def test_two_wells_and_soft_ends_go_into_the_file(tmp_path, kind, value):
 
 
 @pytest.mark.slow
-@given(
-    st.floats(0.2e-3, 1.0e-3),
-    st.floats(0.4, 3.0),
-    st.floats(0.1, 0.3),
-    st.floats(0.8, 1.25),
-    st.floats(0.8, 1.25),
-)
+@given(st.floats(0.2e-3, 1.0e-3), st.floats(0.4, 3.0), st.floats(0.1, 0.3), st.floats(0.8, 1.25), st.floats(0.8, 1.25))
 @settings(max_examples=12, deadline=None, derandomize=True)
 def test_a_hidden_beam_is_found_exactly_without_noise(thickness, level, length, off, away):
     hidden = Beam(
@@ -144,9 +138,7 @@ def test_what_data_cannot_tell_apart_is_said(fit, words):
 
 def test_parameters_that_hardly_part_are_warned_of():
     """Length and thickness act alike but for the pull of b."""
-    data = Measurements(
-        straight_frequencies=[80.0], lower_well_frequencies=[81.0, 159.0], straight_frequencies_se=0.4
-    )
+    data = Measurements(straight_frequencies=[80.0], lower_well_frequencies=[81.0, 159.0], straight_frequencies_se=0.4)
     found = calibrate(data, fit=("thickness", "length", "buckling_level"), modes=12)
     assert found.undetermined or any("hardly" in text or "known to" in text for text in found.warnings)
 
@@ -227,10 +219,7 @@ def test_a_file_of_measurements(tmp_path):
         (lambda: calibrate(PAPER, fit=("thickness", "thickness")), "different"),
         (lambda: calibrate(PAPER, fit="thickness"), "tuple"),
         (lambda: calibrate(PAPER, BEAM.replace(axial_load=0.0)), "straight"),
-        (
-            lambda: calibrate(Measurements(straight_frequencies=[80.0]), fit=("buckling_level",)),
-            "about a well",
-        ),
+        (lambda: calibrate(Measurements(straight_frequencies=[80.0]), fit=("buckling_level",)), "about a well"),
         (lambda: calibrate(Measurements(damping_ratio=[0.01]), fit=("thickness",)), "no frequency"),
         (lambda: calibrate(PAPER, modes=1), "for a model of 1 modes"),
         (lambda: calibrate({"straight_frequencies": [80.0]}), "Measurements"),

@@ -102,9 +102,7 @@ def test_light_shorter_than_the_exposure_is_told_by_the_blur_of_fast_frames():
     beam = motion(noise=0.0)[0]
     rng = np.random.default_rng(2)
     for share, stated, told in ((0.9, 0.9, 0.0), (0.1, 0.9, 0.45), (0.1, None, 0.0), (0.1, 0.1, 0.0)):
-        width = np.sqrt(1.0 + np.gradient(beam) ** 2 * share**2 / 12.0) + 0.005 * rng.standard_normal(
-            beam.size
-        )
+        width = np.sqrt(1.0 + np.gradient(beam) ** 2 * share**2 / 12.0) + 0.005 * rng.standard_normal(beam.size)
         assert exposure_blur(beam, width, stated) == (0.0, told)
 
 
@@ -169,9 +167,7 @@ EXPECTED = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "kind", [*EXPECTED, "white bar at the edge", "tapered beam", "rotated camera", "gauge", ""]
-)
+@pytest.mark.parametrize("kind", [*EXPECTED, "white bar at the edge", "tapered beam", "rotated camera", "gauge", ""])
 def test_a_rendered_scene_is_told_or_right(kind, tmp_path):
     outcome = camera_scenes.judged(kind, np.random.default_rng((31, 1, sum(map(ord, kind)))), tmp_path)
     if kind in EXPECTED:

@@ -57,12 +57,7 @@ def test_packed_phantom_levels_are_proportional_to_light(tmp_path):
 @pytest.mark.parametrize(("bits", "packing"), [(12, 256), (14, 256), (12, 1024)])
 def test_other_packings_of_phantom_say_how_to_export(tmp_path, bits, packing):
     path = write_cine(
-        tmp_path / "a.cine",
-        pictures(1023, (2, 16, 64)),
-        frame_rate=20_000,
-        exposure=20e-6,
-        bits=bits,
-        packing=packing,
+        tmp_path / "a.cine", pictures(1023, (2, 16, 64)), frame_rate=20_000, exposure=20e-6, bits=bits, packing=packing
     )
     with pytest.raises(InputError, match=r"a\.cine.*export it as .*AVI.*TIFF.*--frame-rate"):
         open_recording(path, pixel_size=1e-5)
@@ -83,9 +78,7 @@ def test_arrays_of_numpy(tmp_path):
     with pytest.raises(InputError, match=r"frame rate is not in the file; give frame_rate \(--frame-rate\)"):
         open_recording(tmp_path / "a.npy", pixel_size=1e-5)
     np.save(tmp_path / "a.npy", pictures().astype(np.int64))
-    with pytest.raises(
-        InputError, match=r"type int64: must be .* unsigned integers of 8 or 16 bits or floating"
-    ):
+    with pytest.raises(InputError, match=r"type int64: must be .* unsigned integers of 8 or 16 bits or floating"):
         open_recording(tmp_path / "a.npy", **SCALES)
     np.save(tmp_path / "a.npy", np.array([{}], dtype=object), allow_pickle=True)
     with pytest.raises(InputError, match="cannot be read as a stack of pictures"):
@@ -104,9 +97,7 @@ def test_arrays_of_hdf5(tmp_path):
         assert recording.frame_rate == 5000.0 and recording.pixel_size == 20e-6
     with h5py.File(tmp_path / "a.h5", "a") as file:
         file["dark"] = data[:1]
-    with pytest.raises(
-        InputError, match=r"2 stacks of pictures \(dark, run/frames\); name one as in a\.h5::name"
-    ):
+    with pytest.raises(InputError, match=r"2 stacks of pictures \(dark, run/frames\); name one as in a\.h5::name"):
         open_recording(tmp_path / "a.h5")
     np.testing.assert_array_equal(read(tmp_path / "a.h5::run/frames", frame_rate=None)[0], data)
     with h5py.File(tmp_path / "a.h5", "a") as file:
@@ -147,9 +138,7 @@ def test_eight_bits_of_twelve_as_the_camera_s_program_saves_them(tmp_path):
 
 def test_sixteen_bits_of_twelve_and_the_step_between_frames(tmp_path):
     path = with_pixels(tmp_path, "switch.cih")
-    with pytest.raises(
-        InputError, match=r"every 36th of 677 .* 19 frames, but there are 12; frame_rate \(--frame"
-    ):
+    with pytest.raises(InputError, match=r"every 36th of 677 .* 19 frames, but there are 12; frame_rate \(--frame"):
         open_recording(path, pixel_size=1e-5)
     found, recording, _ = read(path, frame_rate=60_000.0)
     np.testing.assert_array_equal(found, images(12, 368, 896, 16))
@@ -181,9 +170,7 @@ def test_a_header_whose_pixels_are_in_images(tmp_path, kind, suffix):
     np.testing.assert_array_equal(found, images(10, 128, 256, 16))
     assert recording.max_value == 4095 and recording.frame_rate == 10_000.0
     (tmp_path / f"images000004.{suffix}").unlink()
-    with pytest.raises(
-        InputError, match=rf"says 10 frames of 128 x 256 pixels; beside it are 9 \.{suffix} images"
-    ):
+    with pytest.raises(InputError, match=rf"says 10 frames of 128 x 256 pixels; beside it are 9 \.{suffix} images"):
         open_recording(path, **SCALES)
 
 

@@ -55,8 +55,7 @@ def test_the_confusion_table_counts_every_swap(synthetic_map):
     at = np.flatnonzero(swapped == ResponseClass.TRANSIENT_2)[:7]
     swapped[at] = ResponseClass.INTRAWELL
     found = compare_measured_points(
-        MeasuredPoints(points.frequency_ratio, points.velocity_amplitude, points.location, swapped),
-        synthetic_map,
+        MeasuredPoints(points.frequency_ratio, points.velocity_amplitude, points.location, swapped), synthetic_map
     )
     assert found.confusion[ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_2] == 7
     assert found.agreement == pytest.approx(1.0 - 7.0 / found.used)
@@ -128,9 +127,7 @@ def test_points_that_do_not_belong_are_left_out_and_said(synthetic_map):
     found = compare_measured_points(points, synthetic_map)
     assert found.table["used"].values.tolist() == [1, 0, 0, 0, 0]
     assert len(found.notes) == 3 and "2 of 5" in found.notes[0]
-    empty = compare_measured_points(
-        MeasuredPoints(*(np.empty(0),) * 3, np.empty(0, dtype=np.int8)), synthetic_map
-    )
+    empty = compare_measured_points(MeasuredPoints(*(np.empty(0),) * 3, np.empty(0, dtype=np.int8)), synthetic_map)
     assert empty.used == 0 and np.isnan(empty.agreement)
     with pytest.raises(InputError, match="map"):
         compare_measured_points(points, synthetic_map.drop_vars("response_class"))
@@ -202,9 +199,7 @@ def test_a_displacement_sensor_without_the_shaker(synthetic_run, program, tmp_pa
     signal = make_signal(length * (exact + noise), "m", time=time, name="laser")
     found = compare_waveforms(signal, run, 100.0, at="midspan_displacement", start=start)
     assert found.rms_difference == pytest.approx(0.01, rel=0.2) and found.correlation > 0.98
-    assert [one.code for one in found.diagnostics] == ["comparison.no_shaker"] and np.isnan(
-        found.amplitude_ratio
-    )
+    assert [one.code for one in found.diagnostics] == ["comparison.no_shaker"] and np.isnan(found.amplitude_ratio)
     with pytest.raises(InputError, match="must be in m"):
         compare_waveforms(make_signal(exact, "m/s", time=time), run, 100.0, start=start)
     write_signal(tmp_path / "laser.csv", signal)
@@ -287,8 +282,7 @@ def test_the_band_of_a_model_is_that_of_its_runs(synthetic_run):
 
     off = np.linspace(-0.4, 0.4, 41)
     runs = [
-        synthetic_run.assign(displacement_at_striker=synthetic_run["displacement_at_striker"] + each)
-        for each in off
+        synthetic_run.assign(displacement_at_striker=synthetic_run["displacement_at_striker"] + each) for each in off
     ]
     runs = [run.assign_attrs(length_scale=1e-3) for run in runs]
     runs[3] = scaled(runs[3], 2e-3)
@@ -368,8 +362,7 @@ def test_a_drive_takes_amplitude_and_sign_from_the_camera(program, tmp_path, pol
     frames = np.arange(3500) / 5e3
     seen = polarity * gain * shaker(frames + 0.02) + 2e-7 * rng.standard_normal(frames.size)
     tracked = xr.Dataset(
-        {"shaker_displacement_mm": ("time", 1e3 * seen, {"units": "mm"})},
-        {"time": ("time", frames, {"units": "s"})},
+        {"shaker_displacement_mm": ("time", 1e3 * seen, {"units": "mm"})}, {"time": ("time", frames, {"units": "s"})}
     )
     tracked.to_netcdf(tmp_path / "tracked.nc", engine="h5netcdf")
     told = program("vibrometer", path, "--frequency", freq, "--camera", tmp_path / "tracked.nc", "--drive-output",
@@ -428,9 +421,7 @@ def test_command_of_comparison(program, tmp_path, synthetic_map, synthetic_run):
     assert report["rms_difference_b"] == 0.0
     for option in ("", "--overlay"):
         picture = tmp_path / f"runs{option}.png"
-        told = program(
-            "compare", tmp_path / "run.nc", tmp_path / "run.nc", "--plot", picture, *option.split()
-        )
+        told = program("compare", tmp_path / "run.nc", tmp_path / "run.nc", "--plot", picture, *option.split())
         assert told.exit_code == 0, told.output
         assert picture.stat().st_size > 20_000
     assert (tmp_path / "runs.png").read_bytes() != (tmp_path / "runs--overlay.png").read_bytes()

@@ -47,9 +47,7 @@ def test_the_error_covers_the_truth():
     ],
 )
 def test_impacts_that_tell_no_stiffness_say_so(changes, code):
-    assert code in {
-        diagnostic.code for diagnostic in stiffness_from_impacts(collisions(**changes), MASS).diagnostics
-    }
+    assert code in {diagnostic.code for diagnostic in stiffness_from_impacts(collisions(**changes), MASS).diagnostics}
 
 
 def test_too_few_impacts_are_refused():

@@ -44,8 +44,6 @@ def test_good_rows_are_not_doubted():
 
 @pytest.mark.parametrize("kind", ["frames_exchanged", "frames_copied", "time_jump", "knocked", "scattered"])
 def test_a_wrong_order_is_named(kind):
-    told = [
-        [name for name, _ in drive_clock(spoiled(np.random.default_rng((2, k)), kind))] for k in range(20)
-    ]
+    told = [[name for name, _ in drive_clock(spoiled(np.random.default_rng((2, k)), kind))] for k in range(20)]
     assert sum(bool(names) for names in told) >= 19, told
     assert sum(names == [kind] for names in told) >= 17, told

@@ -90,9 +90,7 @@ def test_tracking_takes_the_size_of_a_pixel_along_the_motion(tmp_path, side):
     resolution = (across, along)
     if side == "left":
         frames, resolution = frames.transpose(0, 2, 1)[:, :, ::-1], (along, across)
-    path = imagej(
-        tmp_path / "a.tif", np.ascontiguousarray(frames).astype(np.uint16), resolution, unit="um", fps=5000.0
-    )
+    path = imagej(tmp_path / "a.tif", np.ascontiguousarray(frames).astype(np.uint16), resolution, unit="um", fps=5000.0)
     with open_recording(path) as recording:
         tracked = lab.track(recording, side=side, shaker=True)
     found = tracked.displacement_mm.values
@@ -113,9 +111,7 @@ def test_tracking_takes_the_size_of_a_pixel_along_the_motion(tmp_path, side):
 def test_channels_and_slices_are_no_frames(tmp_path, shape, axes, words, kind):
     path = tmp_path / ("a.tif" if kind == "imagej" else "a.ome.tif")
     pictures = FRAMES.reshape(*shape, *SHAPE)
-    tifffile.imwrite(
-        path, pictures, imagej=kind == "imagej", photometric="minisblack", metadata={"axes": axes}
-    )
+    tifffile.imwrite(path, pictures, imagej=kind == "imagej", photometric="minisblack", metadata={"axes": axes})
     with pytest.raises(InputError, match=words):
         open_recording(path, frame_rate=1e3, **SCALE)
 
@@ -154,12 +150,7 @@ def test_times_and_sizes_of_ome(tmp_path):
         tifffile.imwrite(path, FRAMES, photometric="minisblack", metadata={"axes": "TYX", **told})
         return path
 
-    sizes = {
-        "PhysicalSizeX": 20.0,
-        "PhysicalSizeXUnit": "µm",
-        "PhysicalSizeY": 0.01,
-        "PhysicalSizeYUnit": "mm",
-    }
+    sizes = {"PhysicalSizeX": 20.0, "PhysicalSizeXUnit": "µm", "PhysicalSizeY": 0.01, "PhysicalSizeYUnit": "mm"}
     with open_recording(write(**sizes, TimeIncrement=0.4, TimeIncrementUnit="ms")) as recording:
         assert recording.frame_rate == pytest.approx(2500.0)
         assert (recording.pixel_size, recording.pixel_width) == pytest.approx((1e-5, 2e-5))
@@ -188,12 +179,7 @@ def video(path, codec, numbers=NUMBERS, rate=25, pixels="gray", base=None):
 @pytest.mark.parametrize("rate", [25, 400])
 @pytest.mark.parametrize(
     ("name", "codec", "pixels"),
-    [
-        ("a.avi", "ffv1", "gray"),
-        ("a.mkv", "ffv1", "gray"),
-        ("a.mov", "png", "gray"),
-        ("a.mp4", "libx264", "yuv420p"),
-    ],
+    [("a.avi", "ffv1", "gray"), ("a.mkv", "ffv1", "gray"), ("a.mov", "png", "gray"), ("a.mp4", "libx264", "yuv420p")],
 )
 def test_time_stamps_and_empty_chunks_tell_lost_frames(tmp_path, name, codec, pixels, rate):
     path = video(tmp_path / name, codec, rate=rate, pixels=pixels)
@@ -217,15 +203,11 @@ def test_stamps_coarser_than_frames(tmp_path):
     path = tmp_path / "a.mkv"  # counts milliseconds
     with open_recording(video(path, "ffv1", range(12), 3000), frame_rate=3e3, **SCALE) as recording:
         assert recording.numbers.tolist() == list(range(12))
-    with pytest.raises(
-        InputError, match=r"12 frames at 3000 Hz end .*, and stamps of 0\.001 s do not tell where"
-    ):
+    with pytest.raises(InputError, match=r"12 frames at 3000 Hz end .*, and stamps of 0\.001 s do not tell where"):
         open_recording(video(path, "ffv1", [*range(6), *range(16, 22)], 3000), frame_rate=3e3, **SCALE)
 
 
-@pytest.mark.parametrize(
-    ("tick", "step"), [(1e-3, 1.43e-3), (1e-3, 2.5e-3), (1.0 / 600.0, 1.0 / 240.0), (0.0, 1e-4)]
-)
+@pytest.mark.parametrize(("tick", "step"), [(1e-3, 1.43e-3), (1e-3, 2.5e-3), (1.0 / 600.0, 1.0 / 240.0), (0.0, 1e-4)])
 @pytest.mark.parametrize("stated", [True, False])
 def test_numbers_from_rounded_stamps(tick, step, stated):
     stated = stated or step < 2.0 * tick  # else a tick more need not be a frame

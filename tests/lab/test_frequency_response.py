@@ -19,12 +19,7 @@ TURN = 2.0 * np.pi * FREQUENCY
 OSCILLATOR = cont2discrete(
     tuple(
         np.array(each)
-        for each in (
-            [[0.0, 1.0], [-(TURN**2), -2.0 * DAMPING * TURN]],
-            [[0.0], [1.0 / MASS]],
-            [[1.0, 0.0]],
-            [[0.0]],
-        )
+        for each in ([[0.0, 1.0], [-(TURN**2), -2.0 * DAMPING * TURN]], [[0.0], [1.0 / MASS]], [[1.0, 0.0]], [[0.0]])
     ),
     1.0 / RATE,
 )[:4]
@@ -64,8 +59,7 @@ def struck(seed, frequency, damping, count):
 
 @pytest.mark.parametrize("estimator", ["h1", "h2"])
 @pytest.mark.parametrize(
-    ("frequency", "damping", "lines"),
-    [(150.0, 0.004, 1.0), (90.0, 0.01, 2.0), (70.3, 0.02, 4.0), (210.0, 0.012, 9.0)],
+    ("frequency", "damping", "lines"), [(150.0, 0.004, 1.0), (90.0, 0.01, 2.0), (70.3, 0.02, 4.0), (210.0, 0.012, 9.0)]
 )
 def test_the_mode_at_the_peak_has_no_bias_by_the_window(frequency, damping, lines, estimator):
     resolution = 2.0 * damping * frequency / lines
@@ -98,9 +92,7 @@ def test_a_pole_through_a_window_is_lowered_as_its_closed_form_says(lines):
     found = windowed_pole(turn) * turn
     assert found[0].real - 1.0 == pytest.approx(-4.0 / (3.0 * lines**2), rel=5.0 / lines**2)
     time = (np.arange(200_000) + 0.5) / 200_000
-    shape = (1.0 - time) * (2.0 + np.cos(2.0 * np.pi * time)) / 3.0 + np.sin(2.0 * np.pi * time) / (
-        2.0 * np.pi
-    )
+    shape = (1.0 - time) * (2.0 + np.cos(2.0 * np.pi * time)) / 3.0 + np.sin(2.0 * np.pi * time) / (2.0 * np.pi)
     for k in range(2):
         assert found[k] == pytest.approx((shape * np.exp(-turn[k] * time)).mean() * turn[k], rel=1e-6)
 
@@ -218,10 +210,7 @@ def test_the_command_writes_what_can_be_drawn_and_exported(tmp_path, monkeypatch
     np.testing.assert_allclose(np.abs(response["data"]), found.magnitude)
     np.testing.assert_allclose(coherence["data"], found.coherence)
     np.testing.assert_allclose(response["x"], found.frequency, rtol=1e-5)
-    assert (
-        response["ordinate_axis_units_lab"].strip() == "m"
-        and response["orddenom_axis_units_lab"].strip() == "N"
-    )
+    assert response["ordinate_axis_units_lab"].strip() == "m" and response["orddenom_axis_units_lab"].strip() == "N"
 
 
 def test_the_command_names_no_peak_of_unrelated_signals(tmp_path, monkeypatch):
@@ -231,8 +220,4 @@ def test_the_command_names_no_peak_of_unrelated_signals(tmp_path, monkeypatch):
     table = np.column_stack([np.arange(20_000) / RATE, values])
     np.savetxt("noise.csv", table, delimiter=",", header="time [s],force [N],beam [m]", comments="")
     answer = CliRunner().invoke(app, ["frf", "noise.csv", "--excitation", "force", "--response", "beam"])
-    assert (
-        answer.exit_code == 0
-        and "response.incoherent" in answer.output
-        and "highest peak" not in answer.output
-    )
+    assert answer.exit_code == 0 and "response.incoherent" in answer.output and "highest peak" not in answer.output

@@ -96,9 +96,7 @@ def test_modes_follow_with_their_errors_and_phases(tmp_path):
     signal = lab.make_signal(found.modal_amplitude.values[late, 0], "1", RATE, start=8 / RATE)
     fit = lab.fit_sine(signal, 120.0)
     phase = np.angle(np.exp(1j * (fit.phase + 0.5 * np.pi)))  # of sine from zero, at time 0
-    assert (
-        abs(phase) < 5.0 * fit.phase_se + 0.02 and abs(fit.amplitude - 3e-3) < 5.0 * fit.amplitude_se + 1e-5
-    )
+    assert abs(phase) < 5.0 * fit.phase_se + 0.02 and abs(fit.amplitude - 3e-3) < 5.0 * fit.amplitude_se + 1e-5
 
 
 def test_columns_and_lost_blocks(tmp_path):
@@ -137,10 +135,7 @@ def test_refusals(tmp_path):
     [
         ({"contact": 0.0}, "reaches from 0.562 to 1.43 of the length"),
         ({"modes": 5}, "modes = 5"),
-        (
-            {"position": np.linspace(0.079, 0.082, 20)},
-            r"modes = 4: their shapes cannot be told apart from 0.49",
-        ),
+        ({"position": np.linspace(0.079, 0.082, 20)}, r"modes = 4: their shapes cannot be told apart from 0.49"),
         ({"position": np.linspace(0.01, 0.15, 3)}, "with 3 blocks"),
     ],
 )
@@ -150,10 +145,7 @@ def test_views_that_do_not_tell_modes_apart(change, words):
     position = change.pop("position", np.linspace(0.01, 0.15, 30))
     zero = np.zeros((2, position.size))
     field = xr.Dataset(
-        {
-            "displacement": (("time", "position"), zero),
-            "displacement_se": (("time", "position"), zero + 1e-6),
-        },
+        {"displacement": (("time", "position"), zero), "displacement_se": (("time", "position"), zero + 1e-6)},
         {"time": [0.0, 1.0], "position": position},
     )
     with pytest.raises(InputError, match=words):

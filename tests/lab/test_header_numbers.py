@@ -80,13 +80,7 @@ def test_rates_of_headers(tmp_path, head, rate):
 
 @pytest.mark.parametrize(
     "head",
-    [
-        "Sample Rate: 25,600 Hz",
-        '"Sample Rate","25,600"',
-        "Sample Rate,25,600 Hz",
-        "Sample Rate;25,600",
-        "fs = 25,600",
-    ],
+    ["Sample Rate: 25,600 Hz", '"Sample Rate","25,600"', "Sample Rate,25,600 Hz", "Sample Rate;25,600", "fs = 25,600"],
 )
 def test_a_rate_with_two_readings_is_refused_and_decided_by_other_evidence(tmp_path, head):
     path = table(tmp_path / "a.csv", head)

@@ -65,9 +65,7 @@ def false_npy(path):
 def zeros_in_mat(path):
     """A variable of doubles, stored as bytes and compressed, as MATLAB does."""
     element = matrix_of_zeros(b"v", MANY)
-    path.write_bytes(
-        b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + struct.pack("<II", 15, len(element)) + element
-    )
+    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + struct.pack("<II", 15, len(element)) + element)
 
 
 def zeros_in_structure(path):
@@ -81,17 +79,13 @@ def matrix_of_zeros(name, count):
 
     head = tagged(6, struct.pack("<II", 6, 0)) + tagged(5, struct.pack("<ii", count, 1)) + tagged(1, name)
     packer = zlib.compressobj(1)
-    parts = [
-        packer.compress(struct.pack("<II", 14, len(head) + 8 + count) + head + struct.pack("<II", 2, count))
-    ]
+    parts = [packer.compress(struct.pack("<II", 14, len(head) + 8 + count) + head + struct.pack("<II", 2, count))]
     parts += [packer.compress(bytes(count // 100)) for _ in range(100)]
     return b"".join(parts) + packer.flush()
 
 
 @pytest.mark.parametrize(
-    "make",
-    [zeros_in_npz, false_npz, false_npy, zeros_in_mat, zeros_in_structure],
-    ids=lambda make: make.__name__,
+    "make", [zeros_in_npz, false_npz, false_npy, zeros_in_mat, zeros_in_structure], ids=lambda make: make.__name__
 )
 @pytest.mark.slow
 def test_small_files_with_a_large_content(tmp_path, make):
@@ -131,9 +125,7 @@ def test_pictures_that_fill_the_memory(tmp_path, suffix, pixels):
     path = tmp_path / f"x1{suffix}"
     if suffix == ".tif":
         with tifffile.TiffWriter(path) as file:
-            file.write(
-                shape=(pixels, pixels), dtype=np.uint8, data=None, compression=None, rowsperstrip=pixels
-            )
+            file.write(shape=(pixels, pixels), dtype=np.uint8, data=None, compression=None, rowsperstrip=pixels)
         os.truncate(path, 1000)
     elif suffix == ".png":
         chunk = b"IHDR" + struct.pack(">IIBBBBB", pixels, pixels, 8, 0, 0, 0, 0)
@@ -157,9 +149,7 @@ def test_pictures_that_fill_the_memory(tmp_path, suffix, pixels):
         stated = path.read_bytes().replace(struct.pack("<ii", 64, 64), struct.pack("<ii", pixels, pixels))
         path.write_bytes(stated)
     for source in (path, tmp_path / "x*.png") if suffix == ".png" else (path,):
-        with pytest.raises(
-            InputError, match=r"would take .* GiB of memory, from .* MB on the disk|holds no frame"
-        ):
+        with pytest.raises(InputError, match=r"would take .* GiB of memory, from .* MB on the disk|holds no frame"):
             load_image(source) if suffix == ".png" and source == path else open_source(source)
 
 

@@ -228,19 +228,14 @@ def test_noise_alone_is_no_mode():
 # --- response class of a measured run -----------------------------------------------------------------
 
 
-def run_of(
-    signs, freq: float = 100.0, rate: float = 5000.0, noise: float = 0.03, seed: int = 0
-) -> xr.Dataset:
+def run_of(signs, freq: float = 100.0, rate: float = 5000.0, noise: float = 0.03, seed: int = 0) -> xr.Dataset:
     """A run that spends each cycle of excitation about the well given in *signs*."""
     time = np.arange(round(len(signs) / freq * rate)) / rate
     well = np.repeat(np.asarray(signs, dtype=float), round(rate / freq))[: time.size]
     smooth = np.convolve(np.pad(well, 10, mode="edge"), np.ones(21) / 21.0, mode="valid")
     wobble = 0.15 * np.sin(2.0 * np.pi * freq * time)
     return trajectory_dataset(
-        time,
-        displacement_at_striker=smooth
-        + wobble
-        + noise * np.random.default_rng(seed).standard_normal(time.size),
+        time, displacement_at_striker=smooth + wobble + noise * np.random.default_rng(seed).standard_normal(time.size)
     )
 
 
@@ -335,9 +330,7 @@ def judged_of(kind, k):
     return random_signals.judged_decay(np.random.default_rng((7, random_signals.hash_of(kind), k)), kind)
 
 
-@pytest.mark.parametrize(
-    ("kind", "code"), [("shaker touches", "touches"), ("frequency creeps", "frequency_drift")]
-)
+@pytest.mark.parametrize(("kind", "code"), [("shaker touches", "touches"), ("frequency creeps", "frequency_drift")])
 def test_a_course_is_told_from_its_alternatives(kind, code):
     outcomes = [judged_of(kind, k) for k in range(8)]
     assert sum(f"decay.{code}" in one.codes for one in outcomes) >= 5

@@ -41,9 +41,7 @@ def test_a_mark_that_shows_no_shift_is_refused(rows, words):
 
 def drawn(folder, drift):
     time, beam, shaker, *_ = impacts(4)
-    camera = lab.SyntheticCamera(
-        frame_rate=FRAME_RATE, pixel_size=PIXEL, shape=(192, 96), lens="disk", snr_db=40.0
-    )
+    camera = lab.SyntheticCamera(frame_rate=FRAME_RATE, pixel_size=PIXEL, shape=(192, 96), lens="disk", snr_db=40.0)
     scene = lab.render_recording(
         time, beam, shaker, camera=camera, stage=lab.SyntheticStage(shaker_width=0.8e-3),
         defects=lab.Defects(drift=drift, fixture=Fixture(18.0, 6.0, 0.8)), rest_frames=24,

@@ -67,9 +67,7 @@ def test_a_mistake_is_right_or_flagged_or_refused(case, tmp_path):
 def test_the_table_of_the_documentation_has_every_case():
     written = table.FILE.read_text(encoding="utf-8")
     for case in CASES:
-        line = next(
-            line for line in written.splitlines() if line.startswith(f"| {case.mistake} | {case.end} |")
-        )
+        line = next(line for line in written.splitlines() if line.startswith(f"| {case.mistake} | {case.end} |"))
         assert f"`{case.code}`" in line or not case.code
 
 

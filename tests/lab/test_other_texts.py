@@ -44,13 +44,7 @@ def test_labview_commas_between_cells_and_in_numbers(tmp_path):
 
 @pytest.mark.parametrize(
     "form",
-    [
-        "%Y-%m-%d %H:%M:%S.%f",
-        "%Y-%m-%dT%H:%M:%S.%fZ",
-        "%H:%M:%S.%f",
-        "%m/%d/%Y %H:%M:%S.%f",
-        "%d.%m.%Y %H:%M:%S,%f",
-    ],
+    ["%Y-%m-%d %H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S.%fZ", "%H:%M:%S.%f", "%m/%d/%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S,%f"],
 )
 @pytest.mark.parametrize("separator", [";", "\t"])
 def test_dates_and_clock_times_are_refused_with_two_ways_out(tmp_path, form, separator):

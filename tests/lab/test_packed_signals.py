@@ -56,9 +56,7 @@ def test_packed_numbers_are_unpacked_by_one_rule(tmp_path):
     same(hdf5(tmp_path / "a.h5", **PACKED))
     same(netcdf(tmp_path / "three.nc", scale_factor=1e-6, add_offset=2e-3))
     np.testing.assert_allclose(read_netcdf(tmp_path / "three.nc").velocity, VALUES, atol=1e-9)
-    data = xr.Dataset(
-        {"velocity": ("time", VALUES, {"units": "m/s"})}, {"time": ("time", TIME, {"units": "s"})}
-    )
+    data = xr.Dataset({"velocity": ("time", VALUES, {"units": "m/s"})}, {"time": ("time", TIME, {"units": "s"})})
     packing = {"dtype": "int16", "scale_factor": 1e-6, "add_offset": 2e-3, "_FillValue": np.int16(-32768)}
     data.to_netcdf(tmp_path / "xarray.nc", engine="h5netcdf", encoding={"velocity": packing})
     same(tmp_path / "xarray.nc")
@@ -67,8 +65,7 @@ def test_packed_numbers_are_unpacked_by_one_rule(tmp_path):
     )
     small = COUNTS // 50
     same(
-        hdf5(tmp_path / "u.nc", small.astype(np.int8).view(np.uint8), **PACKED, _Unsigned="false"),
-        1e-6 * small + 2e-3,
+        hdf5(tmp_path / "u.nc", small.astype(np.int8).view(np.uint8), **PACKED, _Unsigned="false"), 1e-6 * small + 2e-3
     )
 
 
@@ -77,9 +74,7 @@ def test_packed_numbers_are_unpacked_by_one_rule(tmp_path):
 def test_fill_values_are_no_data(tmp_path, key, kind):
     counts = COUNTS.copy()
     counts[7:9] = -32768
-    value = {"valid_min": np.int16(-6000), "valid_range": np.array([-6000, 6000], np.int16)}.get(
-        key, np.int16(-32768)
-    )
+    value = {"valid_min": np.int16(-6000), "valid_range": np.array([-6000, 6000], np.int16)}.get(key, np.int16(-32768))
     if key == "fillvalue":
         with h5py.File(tmp_path / "a.h5", "w") as file:
             file["time"] = TIME
@@ -117,9 +112,7 @@ def test_counts_beside_a_scale_in_matlab_and_numpy(tmp_path):
     savemat(tmp_path / "a.mat", arrays)
     np.savez(tmp_path / "a.npz", **arrays)
     for path in (tmp_path / "a.mat", tmp_path / "a.npz"):
-        with pytest.raises(
-            InputError, match="scale_factor = 1e-06 may scale its numbers: store the scaled numbers"
-        ):
+        with pytest.raises(InputError, match="scale_factor = 1e-06 may scale its numbers: store the scaled numbers"):
             read_signal(path)
     arrays["velocity"] = 1e-6 * arrays["velocity"]
     del arrays["scale_factor"]
@@ -190,19 +183,11 @@ def test_rates_in_attributes_and_axes_of_dimensions(tmp_path):
             file.attrs["dt"] = 1e-3
         with pytest.raises(InputError, match="contradicts itself"):
             read_signal(tmp_path / "a.h5")
-    for units, scale in (
-        ("s", 1.0),
-        ("milliseconds since 2024-01-01", 1e3),
-        ("days since 2024-01-01", 1.0 / 86400.0),
-    ):
-        data = xr.Dataset(
-            {"velocity": ("x", VALUES, {"units": "m/s"})}, {"x": ("x", scale * TIME, {"units": units})}
-        )
+    for units, scale in (("s", 1.0), ("milliseconds since 2024-01-01", 1e3), ("days since 2024-01-01", 1.0 / 86400.0)):
+        data = xr.Dataset({"velocity": ("x", VALUES, {"units": "m/s"})}, {"x": ("x", scale * TIME, {"units": units})})
         data.to_netcdf(tmp_path / "axis.nc", engine="h5netcdf")
         same(tmp_path / "axis.nc")
-    data = xr.Dataset(
-        {"velocity": ("sample", VALUES, {"units": "m/s"})}, {"sample": np.arange(COUNT)}, {"fs": 2000.0}
-    )
+    data = xr.Dataset({"velocity": ("sample", VALUES, {"units": "m/s"})}, {"sample": np.arange(COUNT)}, {"fs": 2000.0})
     data.to_netcdf(tmp_path / "number.nc", engine="h5netcdf")
     assert [each["name"] for each in read_channels(tmp_path / "number.nc")] == ["velocity"]
     same(tmp_path / "number.nc")

@@ -24,8 +24,7 @@ def test_damping_by_a_law_of_no_list_is_within_the_standard_error_at_zero_amplit
 
 
 @pytest.mark.parametrize(
-    "damping",
-    [lambda a: 0.0035 - 0.0030 * np.expm1(-a / 0.4), lambda a: 0.0025 + 0.0045 * np.sqrt(a)],
+    "damping", [lambda a: 0.0035 - 0.0030 * np.expm1(-a / 0.4), lambda a: 0.0025 + 0.0045 * np.sqrt(a)]
 )
 def test_a_curve_follows_the_damping_where_the_record_has_it(damping):
     rate, freq = 4000.0, 70.0

@@ -49,10 +49,7 @@ MAKERS = {
     ),
     "camera": (camera_scenes.ERRORS, camera_scenes.judged),
     "drive": (random_signals.DRIVE_DEFECTS, lambda kind, rng, folder: random_signals.judged_drive(rng, kind)),
-    "sensor": (
-        random_signals.SENSOR_DEFECTS,
-        lambda kind, rng, folder: random_signals.judged_drive(rng, kind),
-    ),
+    "sensor": (random_signals.SENSOR_DEFECTS, lambda kind, rng, folder: random_signals.judged_drive(rng, kind)),
     "decay": (random_signals.DECAY_DEFECTS, lambda kind, rng, folder: random_signals.judged_decay(rng, kind)),
     "mode": (random_signals.MODE_DEFECTS, lambda kind, rng, folder: random_signals.judged_decay(rng, kind)),
 }

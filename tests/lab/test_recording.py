@@ -23,8 +23,7 @@ def frames(count=5, shape=(20, 34), high=4095, seed=0):
 
 
 @pytest.mark.parametrize(
-    ("suffix", "depth", "high"),
-    [(".cihx", 12, 4095), (".cih", 16, 4095), (".cihx", 8, 255), (".cih", 12, 4095)],
+    ("suffix", "depth", "high"), [(".cihx", 12, 4095), (".cih", 16, 4095), (".cihx", 8, 255), (".cih", 12, 4095)]
 )
 def test_photron_round_trip(tmp_path, suffix, depth, high):
     data = frames(high=high)
@@ -77,15 +76,11 @@ def test_pixels_on_the_higher_side_are_shifted_down(tmp_path):
         np.testing.assert_array_equal(np.stack(list(recording)), data)
 
 
-@pytest.mark.skipif(
-    not (REAL / "beam.cihx").exists(), reason="the public recording is not beside the project"
-)
+@pytest.mark.skipif(not (REAL / "beam.cihx").exists(), reason="the public recording is not beside the project")
 def test_a_real_recording_that_contradicts_itself_asks_for_its_frame_rate():
     with pytest.raises(InputError, match="pixel size is not in the file"):
         open_recording(REAL / "beam.cihx", frame_rate=20.0)
-    with pytest.raises(
-        InputError, match=r"contradicts itself: every 2500th of 400.*frame_rate \(--frame-rate\)"
-    ):
+    with pytest.raises(InputError, match=r"contradicts itself: every 2500th of 400.*frame_rate \(--frame-rate\)"):
         open_recording(REAL / "beam.cihx", pixel_size=1e-4)
     with open_recording(REAL / "beam.cihx", pixel_size=1e-4, frame_rate=20.0) as recording:
         assert len(recording) == 4 and recording.shape == (80, 1024)
@@ -208,12 +203,7 @@ def test_damaged_files_are_refused(tmp_path):
     mraw.unlink()
     with pytest.raises(InputError, match=r"a\.mraw: cannot be read"):
         open_recording(path, pixel_size=1e-5)
-    for name, text in (
-        ("b.avi", b"RIFF not a video"),
-        ("c.tif", b"II*\0 no"),
-        ("d.mp4", b""),
-        ("e.cih", b""),
-    ):
+    for name, text in (("b.avi", b"RIFF not a video"), ("c.tif", b"II*\0 no"), ("d.mp4", b""), ("e.cih", b"")):
         (tmp_path / name).write_bytes(text)
         with pytest.raises(InputError, match=name):
             open_recording(tmp_path / name, **SCALES)
@@ -282,18 +272,13 @@ def test_writing_refuses_what_it_cannot_hold_and_leaves_nothing_behind(tmp_path)
 
 
 FUZZ = settings(
-    max_examples=150,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-    derandomize=True,
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True
 )
 
 
 @pytest.mark.parametrize("suffix", [".cihx", ".cih"])
 @FUZZ
-@given(
-    at=st.integers(0, 2000), junk=st.binary(max_size=12), cut=st.integers(0, 12), size=st.integers(-40, 40)
-)
+@given(at=st.integers(0, 2000), junk=st.binary(max_size=12), cut=st.integers(0, 12), size=st.integers(-40, 40))
 def test_a_damaged_recording_opens_or_is_refused_but_never_crashes(tmp_path, suffix, at, junk, cut, size):
     path = tmp_path / f"fuzz{suffix}"
     if not (tmp_path / f"whole{suffix}").exists():
@@ -302,9 +287,7 @@ def test_a_damaged_recording_opens_or_is_refused_but_never_crashes(tmp_path, suf
     at %= len(text)
     path.write_bytes(text[:at] + junk + text[at + cut :])
     pixels = (tmp_path / "whole.mraw").read_bytes()
-    path.with_suffix(".mraw").write_bytes(
-        pixels[: len(pixels) + size] if size < 0 else pixels + b"\0" * (size // 8)
-    )
+    path.with_suffix(".mraw").write_bytes(pixels[: len(pixels) + size] if size < 0 else pixels + b"\0" * (size // 8))
     try:
         with open_recording(path, pixel_size=1e-5) as recording:
             assert np.isfinite(recording.time).all()

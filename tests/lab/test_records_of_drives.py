@@ -37,9 +37,7 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     table = np.column_stack((TIME, G, 0.1 * G))
-    np.savetxt(
-        tmp_path / "rec.csv", table, delimiter=",", header="time (s),base (g),other (m/s^2)", comments=""
-    )
+    np.savetxt(tmp_path / "rec.csv", table, delimiter=",", header="time (s),base (g),other (m/s^2)", comments="")
     return tmp_path
 
 
@@ -75,22 +73,12 @@ def test_units_columns_and_quantities(folder) -> None:
     omega = 2.0 * np.pi * 75.0
     for unit, values in (("um", 50.0 * np.sin(omega * TIME)), ("mm/s", 0.05 * omega * np.cos(omega * TIME))):
         np.savetxt(
-            "tip.csv",
-            np.column_stack((TIME, values)),
-            delimiter=",",
-            header=f"time (s),tip ({unit})",
-            comments="",
+            "tip.csv", np.column_stack((TIME, values)), delimiter=",", header=f"time (s),tip ({unit})", comments=""
         )
         motion = sb.RecordedMotion.from_file("tip.csv", frequency=75.0)
         np.testing.assert_allclose(motion.displacement, 5e-5 * np.sin(omega * TIME), atol=5e-9)
         np.testing.assert_allclose(motion.velocity, 5e-5 * omega * np.cos(omega * TIME), atol=3e-6)
-    np.savetxt(
-        "force.csv",
-        np.column_stack((TIME, 0.2 * G)),
-        delimiter=",",
-        header="time (s),force (mN)",
-        comments="",
-    )
+    np.savetxt("force.csv", np.column_stack((TIME, 0.2 * G)), delimiter=",", header="time (s),force (mN)", comments="")
     force = sb.RecordedForce.from_file("force.csv")
     np.testing.assert_allclose(force.record, 2e-4 * G, rtol=1e-12, atol=1e-15)
     with pytest.raises(InputError, match=r"unit = 'N': must be m/s\^2 \(an acceleration\)"):
@@ -105,13 +93,7 @@ def test_drift_is_decided(folder) -> None:
         (sb.RecordedAcceleration, "g", G + 0.15, "an offset of 1.47 m/s"),
         (sb.RecordedMotion, "m/s", 1e-3 * G + 1e-2, "a mean velocity of 0.01 m/s"),
     ):
-        np.savetxt(
-            "x.csv",
-            np.column_stack((TIME, values)),
-            delimiter=",",
-            header=f"time (s),x ({unit})",
-            comments="",
-        )
+        np.savetxt("x.csv", np.column_stack((TIME, values)), delimiter=",", header=f"time (s),x ({unit})", comments="")
         fields = {"frequency": 75.0} if of is sb.RecordedMotion else {}
         with pytest.raises(InputError, match=rf"x\.csv.*drift: {words}.*must be 'remove'.*or 'keep'"):
             of.from_file("x.csv", **fields)
@@ -137,40 +119,25 @@ def test_parameter_files_name_records(folder) -> None:
     system = load_config(path).system
     assert system == sb.System.load(path)
     assert system.base_excitation.direction == "down"
-    assert system.base_excitation.motion == sb.RecordedAcceleration.from_file(
-        folder / "rec.csv", column="base"
-    )
+    assert system.base_excitation.motion == sb.RecordedAcceleration.from_file(folder / "rec.csv", column="base")
     system.save("whole.toml")
     assert sb.System.load("whole.toml") == system
     (folder / "psd.csv").write_text("frequency (Hz),psd (m^2/s^3)\n20,1\n200,1\n", encoding="utf-8")
     path = saved(
-        folder,
-        '[base_excitation]\ntype = "random_vibration"\nfile = "psd.csv"\nduration_s = 0.5\nrms_g = 2\n',
+        folder, '[base_excitation]\ntype = "random_vibration"\nfile = "psd.csv"\nduration_s = 0.5\nrms_g = 2\n'
     )
     motion = sb.System.load(path).base_excitation.motion
     np.testing.assert_allclose(motion.psd, [(20.0, GRAVITY**-2), (200.0, GRAVITY**-2)], rtol=1e-14)
     assert motion.rms_g == 2.0
-    path = saved(
-        folder, '[base_excitation]\ntype = "random_vibration"\npsd = "NAVMAT P-9492"\nduration_s = "500 ms"\n'
-    )
-    assert sb.System.load(path).base_excitation.motion == sb.RecordedAcceleration.from_psd(
-        "NAVMAT P-9492", 0.5
-    )
+    path = saved(folder, '[base_excitation]\ntype = "random_vibration"\npsd = "NAVMAT P-9492"\nduration_s = "500 ms"\n')
+    assert sb.System.load(path).base_excitation.motion == sb.RecordedAcceleration.from_psd("NAVMAT P-9492", 0.5)
     np.savetxt(
-        folder / "force.csv",
-        np.column_stack((TIME, G)),
-        delimiter=",",
-        header="time (s),force (mN)",
-        comments="",
+        folder / "force.csv", np.column_stack((TIME, G)), delimiter=",", header="time (s),force (mN)", comments=""
     )
     path = saved(folder, '[[force]]\ntype = "recorded_force"\nfile = "force.csv"\nlocation = 0.5\n')
     assert sb.System.load(path).forces[0].history.record.size == TIME.size
     np.savetxt(
-        folder / "tip.csv",
-        np.column_stack((TIME, 5.0 * G)),
-        delimiter=",",
-        header="time (s),tip (um)",
-        comments="",
+        folder / "tip.csv", np.column_stack((TIME, 5.0 * G)), delimiter=",", header="time (s),tip (um)", comments=""
     )
     path = saved(
         folder,

@@ -35,9 +35,7 @@ def through_the_laboratory(folder, seed, *, cycles, camera, snr=None):
     drive = sb.Shaker(
         frequency_ratio=rng.uniform(0.9, 3.6), velocity_amplitude=rng.uniform(0.05, 0.6), location=LOCATION
     )
-    run = sb.simulate(
-        sb.System(MODELS[modes], contacts=[sb.Contact(CONTACT, drive)]), sb.Integration(cycles=cycles)
-    )
+    run = sb.simulate(sb.System(MODELS[modes], contacts=[sb.Contact(CONTACT, drive)]), sb.Integration(cycles=cycles))
     stage = SyntheticStage(shaker_width=min(0.8e-3, 0.5 * camera.shape[1] * camera.pixel_size))
     recording = render_run(run, camera=camera, stage=stage, rng=seed)
     path = recording.write(folder / f"run{seed}.{'cihx' if seed % 2 else 'cih'}")
@@ -112,9 +110,7 @@ def test_onsets_of_isolated_impacts_of_a_simulated_run_within_one_frame(tmp_path
 @pytest.mark.slow
 def test_a_run_without_its_length_scale_is_refused():
     run = sb.simulate(
-        sb.System(
-            MODELS[1], contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))]
-        ),
+        sb.System(MODELS[1], contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))]),
         sb.Integration(cycles=2),
     )
     del run.dataset.attrs["length_scale"]

@@ -17,9 +17,5 @@ def test_the_seed_that_was_drawn_is_in_the_result() -> None:
 
 def test_no_public_function_has_a_seed() -> None:
     functions = [getattr(lab, name) for name in dir(lab) if not name.startswith("_")]
-    named = [
-        each
-        for each in functions
-        if inspect.isfunction(each) and "seed" in inspect.signature(each).parameters
-    ]
+    named = [each for each in functions if inspect.isfunction(each) and "seed" in inspect.signature(each).parameters]
     assert not named

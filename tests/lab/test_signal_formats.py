@@ -106,14 +106,10 @@ def test_thousands_are_points_only_before_a_decimal_comma(tmp_path):
 
 def test_a_header_that_contradicts_itself_is_refused(tmp_path):
     path = tmp_path / "twice.csv"
-    path.write_text(
-        "Sample Rate: 2000 Hz\nSample Interval: 1e-3\nvelocity [m/s]\n" + rows("{v:.9f}"), encoding="utf-8"
-    )
+    path.write_text("Sample Rate: 2000 Hz\nSample Interval: 1e-3\nvelocity [m/s]\n" + rows("{v:.9f}"), encoding="utf-8")
     with pytest.raises(InputError, match="contradicts itself"):
         read_signal(path)
-    path.write_text(
-        "Sample Rate: 1000 Hz\ntime [s],velocity [m/s]\n" + rows("{t:.6f},{v:.9f}"), encoding="utf-8"
-    )
+    path.write_text("Sample Rate: 1000 Hz\ntime [s],velocity [m/s]\n" + rows("{t:.6f},{v:.9f}"), encoding="utf-8")
     with pytest.raises(InputError, match="the header says 1000"):
         read_signal(path)
 
@@ -253,9 +249,7 @@ def test_tables_of_polytec(tmp_path, heads, decimal):
 
 def test_a_spectrum_is_no_time_signal(tmp_path):
     path = tmp_path / "scan.txt"
-    path.write_text(
-        POLYTEC + "Frequency\tMagnitude\n[ Hz ]\t[ m/s ]\n" + rows("{i}\t{v:.9e}"), encoding="utf-8"
-    )
+    path.write_text(POLYTEC + "Frequency\tMagnitude\n[ Hz ]\t[ m/s ]\n" + rows("{i}\t{v:.9e}"), encoding="utf-8")
     with pytest.raises(InputError, match="this is a spectrum; export the time signal"):
         read_signal(path)
 
@@ -263,9 +257,7 @@ def test_a_spectrum_is_no_time_signal(tmp_path):
 def test_labview_text_with_appended_records_and_empty_channels(tmp_path):
     path = tmp_path / "daq.lvm"
     head = lvm(".").replace("Samples\t40\t40", "Samples\t20\t20").replace("Channels\t2", "Channels\t3")
-    path.write_text(
-        head.replace("Velocity\tDrive\tComment", "Velocity\tDrive\tUntitled\tComment"), encoding="utf-8"
-    )
+    path.write_text(head.replace("Velocity\tDrive\tComment", "Velocity\tDrive\tUntitled\tComment"), encoding="utf-8")
     with pytest.warns(DiagnosticWarning, match="appended"):
         signal = read_signal(path, "Velocity")
     same(signal)

@@ -57,10 +57,7 @@ def test_units():
 
 TABLES = {
     "time [ms];velocity [mm/s]\n" + "".join(f"{i};{i % 7},5\n" for i in range(30)): (1e3, 1e-3),
-    "# sampling_frequency: 2 kHz\nvelocity (mm/s)\n" + "".join(f"{i % 7}.5\n" for i in range(30)): (
-        2e3,
-        1e-3,
-    ),
+    "# sampling_frequency: 2 kHz\nvelocity (mm/s)\n" + "".join(f"{i % 7}.5\n" for i in range(30)): (2e3, 1e-3),
     "t_ms,velocity_mm_s\n" + "".join(f"{i},{i % 7}.5\n" for i in range(30)): (1e3, 1e-3),
     "time [s]\tvelocity [m/s]\n" + "".join(f"{i / 1e3}\t{i % 7}.5\n" for i in range(30)): (1e3, 1.0),
     "time[s] velocity[mm/s]\n" + "".join(f"{i / 3e3:.4f} {i % 7}.5\n" for i in range(30)): (3e3, 1e-3),

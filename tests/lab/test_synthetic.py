@@ -44,9 +44,7 @@ def test_the_truth_is_the_mean_over_the_exposure():
     np.testing.assert_array_equal(truth["displacement_mm"].values[:3], 0.0)
     np.testing.assert_allclose(truth["penetration_mm"].values, -0.1, atol=1e-9)
     stage = SyntheticStage(marker_thickness=0.0, shaker_width=1e-6)
-    camera = SyntheticCamera(
-        frame_rate=5000.0, pixel_size=PIXEL, shape=(120, 48), snr_db=math.inf, bit_depth=16
-    )
+    camera = SyntheticCamera(frame_rate=5000.0, pixel_size=PIXEL, shape=(120, 48), snr_db=math.inf, bit_depth=16)
     moving = render_recording(time, beam, beam - 0.1e-3, camera=camera, stage=stage, rest_frames=3).frame(3)
     picture = column_light(moving / 65535, stage.background, stage.beam)
     np.testing.assert_allclose(picture[:3], 0.4e-3 / PIXEL, atol=0.01)
@@ -132,9 +130,7 @@ def test_impossible_requests_are_refused_by_name(call, name):
 
 
 def test_vibrometer_signal_has_the_promised_sine_noise_and_start():
-    signal = render_vibrometer(
-        80.0, 0.05, duration=2.0, onset=0.2, start_up=0.05, snr_db=20.0, distortion=0.02, rng=1
-    )
+    signal = render_vibrometer(80.0, 0.05, duration=2.0, onset=0.2, start_up=0.05, snr_db=20.0, distortion=0.02, rng=1)
     time, velocity = signal["time"].values, signal.values
     assert signal.attrs["units"] == "m/s"
     quiet = velocity[time < 0.2]

@@ -19,8 +19,7 @@ CASES = {
     "pandas, text": FRAME.rename(columns={"time [s]": "time_s", "velocity [m/s]": "velocity_m_s"}).to_string(
         float_format="%.9f"
     ),
-    "R": '"time [s]"\t"velocity [m/s]"\n'
-    + "".join(f'"{k + 1}"\t{t:.6f}\t{v:.9f}\n' for k, (t, v) in enumerate(PAIRS)),
+    "R": '"time [s]"\t"velocity [m/s]"\n' + "".join(f'"{k + 1}"\t{t:.6f}\t{v:.9f}\n' for k, (t, v) in enumerate(PAIRS)),
     "index and units": ",time,velocity\n,s,m/s\n" + rows("{i},{t:.6f},{v:.9f}"),
     "MATLAB timetable": "Time,velocity_m_s\n" + rows("{t:.6f} sec,{v:.9f}"),
     "MATLAB, minutes": "Time;velocity_m_s\n" + "".join(f"{t / 60.0:.12f} min;{v:.9f}\n" for t, v in PAIRS),
@@ -31,8 +30,7 @@ CASES = {
     "Fortran": "time[s] velocity[m/s]\n" + "".join(f"{t:.9e} {v:.9e}\n".replace("e", "D") for t, v in PAIRS),
     "Unicode minus": "time [s];velocity [m/s]\n" + rows("{t:.6f};{v:.9f}").replace("-", "\u2212"),
     "settings in the first row": "time [s],velocity [m/s]\n" + BODY.replace("\n", ",2024-05-01,run 7\n", 1),
-    "numbers in the first row": "time [s];velocity [m/s]\n"
-    + rows("{t:.6f};{v:.9f}").replace("\n", ";2000;1\n", 1),
+    "numbers in the first row": "time [s];velocity [m/s]\n" + rows("{t:.6f};{v:.9f}").replace("\n", ";2000;1\n", 1),
 }
 
 

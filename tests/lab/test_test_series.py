@@ -21,11 +21,7 @@ OPTIONS = (
     "--buckling-level", "0.335e-3", "--location", "1/2.1", "--beam-thickness", "0.4e-3", "--units", "m/s",
     "--cycles", "20",
 )  # fmt: skip
-REASONS = {
-    "test03": "is truncated",
-    "test07": "begins in motion",
-    "test10": "must be the same motion",
-}
+REASONS = {"test03": "is truncated", "test07": "begins in motion", "test10": "must be the same motion"}
 
 
 def command(*arguments):

@@ -22,9 +22,7 @@ def rendered(motion=None, *, snr=30.0, stage=STICKER, shape=(160, 64), seed=0, l
     options.setdefault("rest_frames", 20)
     time, beam, shaker, *_ = impacts(5) if motion is None else motion
     camera = SyntheticCamera(frame_rate=FRAME_RATE, pixel_size=PIXEL, shape=shape, snr_db=snr, light=light)
-    return render_recording(
-        time, beam, shaker, camera=camera, stage=SyntheticStage(**stage), rng=seed, **options
-    )
+    return render_recording(time, beam, shaker, camera=camera, stage=SyntheticStage(**stage), rng=seed, **options)
 
 
 def followed(recording, folder, name="a.cihx", **options):
@@ -48,9 +46,7 @@ def test_displacements_within_the_promised_error(tmp_path, name, snr, error, bia
         assert rms(miss) <= error
         assert bias is None or abs(np.nanmean(miss)) <= bias
     beam = errors_px(tracked, recording.truth, "displacement_mm")
-    assert np.nanmedian(tracked["displacement_stderr_mm"]) / (PIXEL * 1e3) == pytest.approx(
-        np.nanstd(beam), rel=0.25
-    )
+    assert np.nanmedian(tracked["displacement_stderr_mm"]) / (PIXEL * 1e3) == pytest.approx(np.nanstd(beam), rel=0.25)
 
 
 def test_a_sticker_that_is_not_looked_for_does_not_mislead(tmp_path):
@@ -83,9 +79,7 @@ def test_the_result_follows_the_schema_of_a_run(tmp_path):
     tracked = followed(rendered(), tmp_path, progress=lambda done, total: calls.append((done, total)))
     check_trajectory(tracked, ("displacement_at_striker", "striker_displacement", "penetration_normalised"))
     assert calls[-1] == (tracked.sizes["time"],) * 2 and calls == sorted(calls)
-    np.testing.assert_allclose(
-        tracked["displacement_at_striker"] * BUCKLING_LEVEL * 1e3, tracked["displacement_mm"]
-    )
+    np.testing.assert_allclose(tracked["displacement_at_striker"] * BUCKLING_LEVEL * 1e3, tracked["displacement_mm"])
     np.testing.assert_allclose(
         tracked["penetration_normalised"],
         tracked["striker_displacement"] - tracked["displacement_at_striker"],
@@ -94,9 +88,7 @@ def test_the_result_follows_the_schema_of_a_run(tmp_path):
     np.testing.assert_allclose(np.diff(tracked["time"]), 1.0 / FRAME_RATE)
     assert ((tracked["confidence"] >= 0) & (tracked["confidence"] <= 1)).all()
     assert tracked["confidence"].median() > 0.8
-    assert all(
-        variable.attrs["units"] and variable.attrs["long_name"] for variable in tracked.data_vars.values()
-    )
+    assert all(variable.attrs["units"] and variable.attrs["long_name"] for variable in tracked.data_vars.values())
     tracked.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
 
 
@@ -105,15 +97,13 @@ def test_rest_is_the_facing_well_unless_given(tmp_path):
     well = followed(recording, tmp_path, rest_displacement=None, location=1 / 2.1)
     expected = -0.5 * (1.0 - np.cos(2.0 * np.pi / 2.1))
     assert well["displacement_at_striker"][0] == pytest.approx(expected, abs=0.005)
-    assert followed(recording, tmp_path, rest_displacement=0.0)["displacement_at_striker"][
-        0
-    ] == pytest.approx(0.0, abs=0.005)
+    assert followed(recording, tmp_path, rest_displacement=0.0)["displacement_at_striker"][0] == pytest.approx(
+        0.0, abs=0.005
+    )
 
 
 def test_trouble_is_flagged_and_never_filled_in(tmp_path):
-    recording = rendered(
-        glare_frames=[60, 61], blurred_frames=[80], repeated_frames=[100, 101], blank_frames=[120]
-    )
+    recording = rendered(glare_frames=[60, 61], blurred_frames=[80], repeated_frames=[100, 101], blank_frames=[120])
     tracked = followed(recording, tmp_path)
     flags = {k: FrameFlag(int(flag)) for k, flag in enumerate(tracked["flags"].values) if flag}
     assert flags == {
@@ -192,14 +182,10 @@ def test_the_beam_alone_and_a_picture_of_the_background(tmp_path):
         tracked = track(read, shaker=False)
         assert "shaker_displacement_mm" not in tracked and "displacement_at_striker" not in tracked
         shifted = tracked["displacement_mm"] + recording.truth["displacement_mm"][0]
-        assert (
-            rms(errors_px(tracked.assign(displacement_mm=shifted), recording.truth, "displacement_mm")) < 0.1
-        )
+        assert rms(errors_px(tracked.assign(displacement_mm=shifted), recording.truth, "displacement_mm")) < 0.1
         lamp = np.tile(np.linspace(0.0, 300.0, 64), (160, 1))
         again = track(read, shaker=False, background=lamp)
-        np.testing.assert_allclose(
-            again["displacement_mm"], tracked["displacement_mm"], atol=0.1 * PIXEL * 1e3
-        )
+        np.testing.assert_allclose(again["displacement_mm"], tracked["displacement_mm"], atol=0.1 * PIXEL * 1e3)
 
 
 def test_frames_without_anything_to_find_are_refused(tmp_path):
@@ -209,8 +195,7 @@ def test_frames_without_anything_to_find_are_refused(tmp_path):
     cases = {
         "black": np.zeros((6, 64, 64), np.uint16),
         "noise": rng.integers(0, 4095, (6, 64, 64)).astype(np.uint16),
-        "thin": np.where(np.arange(64)[:, None] == 5, 900, 10).astype(np.uint16)
-        * np.ones((6, 1, 64), np.uint16),
+        "thin": np.where(np.arange(64)[:, None] == 5, 900, 10).astype(np.uint16) * np.ones((6, 1, 64), np.uint16),
     }
     for name, data in cases.items():
         path = write_photron(tmp_path / f"{name}.cihx", data, frame_rate=1e4, pixel_size=1e-5)
@@ -254,9 +239,7 @@ def test_onsets_of_isolated_impacts_within_one_frame(tmp_path, snr, gap_px):
     assert motion[4] >= 0.3 and onsets.size == expected.size
     assert (np.abs(onsets - expected) <= 4.0 * found["onset_stderr"].values[1:]).all()
     assert np.median(np.abs(onsets - expected)) * FRAME_RATE <= 0.5
-    np.testing.assert_allclose(
-        found["duration"].values[1:-1] * FRAME_RATE, 4.3, atol=1.0 if snr == 30.0 else 3.0
-    )
+    np.testing.assert_allclose(found["duration"].values[1:-1] * FRAME_RATE, 4.3, atol=1.0 if snr == 30.0 else 3.0)
     speed = found["closing_speed"].values[1:] / (PIXEL * FRAME_RATE)
     np.testing.assert_allclose(speed, motion[4], rtol=0.35)
     assert found["bounded"].values[1:-1].all() and not found["bounded"].values[0]

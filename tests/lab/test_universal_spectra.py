@@ -34,9 +34,7 @@ def test_responses_and_spectra(tmp_path, binary, even):
     path = tmp_path / "a.uff"
     record(path, RESPONSE, 4, binary=binary, even=even)
     record(path, np.abs(RESPONSE) ** 2, 9, binary=binary, even=even, units=("(m/s)^2/Hz", "NONE"))
-    with pytest.raises(
-        InputError, match=r"no whole time response .* read its 2 spectra by lab\.read_spectra"
-    ):
+    with pytest.raises(InputError, match=r"no whole time response .* read its 2 spectra by lab\.read_spectra"):
         lab.read_channels(path)
     response, density = lab.read_spectra(path)
     np.testing.assert_allclose(response.values, RESPONSE, rtol=1e-5)
@@ -71,8 +69,7 @@ def test_what_is_no_spectrum_is_refused(tmp_path):
     with pytest.raises(InputError, match="has no spectrum"):
         lab.read_spectra(path)
     path.write_text(
-        path.read_text(encoding="ascii").replace("    1         0    0", "    4         0    0"),
-        encoding="ascii",
+        path.read_text(encoding="ascii").replace("    1         0    0", "    4         0    0"), encoding="ascii"
     )
     with pytest.raises(InputError, match=r"abscissa is in 's', not in Hz"):
         lab.read_spectra(path)

@@ -225,10 +225,7 @@ def test_resampling_noise_free_is_faithful():
         (lambda: measure_drive(np.zeros(5)), "DataArray"),
         (lambda: measure_drive(record()[0], 2e4), "half the sampling rate"),
         (lambda: measure_drive(record()[0], tolerance=0.7), "tolerance"),
-        (
-            lambda: fit_sine(SignalSamples(np.cos(np.arange(100) * 0.06), np.arange(100) / 1e4, 1e4), 95.0),
-            "2",
-        ),
+        (lambda: fit_sine(SignalSamples(np.cos(np.arange(100) * 0.06), np.arange(100) / 1e4, 1e4), 95.0), "2"),
         (lambda: recorded_drive(record()[0], 1500.0), "sampling_frequency"),
         (lambda: recorded_drive(record()[0], 1e5, bandwidth=110.0), "bandwidth"),
         (lambda: align(record()[0], record()[0]), "units 'm/s'"),
@@ -312,8 +309,7 @@ def test_noise_behind_a_filter_of_first_order_tells_its_corner():
 )  # fmt: skip
 def test_an_error_of_electronics_is_told_by_its_name(kind, least):
     outcomes = [
-        random_signals.judged_drive(np.random.default_rng((9, random_signals.hash_of(kind), k)), kind)
-        for k in range(2)
+        random_signals.judged_drive(np.random.default_rng((9, random_signals.hash_of(kind), k)), kind) for k in range(2)
     ]
     names = random_signals.CAUSES[kind].split()
     assert sum(any(f"vibrometer.{name}" in one.codes for name in names) for one in outcomes) >= least
@@ -333,18 +329,14 @@ def test_a_third_harmonic_of_the_shaker_itself_is_no_saturation():
         turn = np.pi + (0.05 if third == 0.11 else rng.uniform(-0.3, 0.3))
         found = measure_drive(
             _of_the_sensor(
-                lambda v, t, third=third, turn=turn: (
-                    v + third * V * (t > 0.1) * np.cos(6e2 * np.pi * (t - 0.1) + turn)
-                )
+                lambda v, t, third=third, turn=turn: v + third * V * (t > 0.1) * np.cos(6e2 * np.pi * (t - 0.1) + turn)
             ),
             100.0,
         )
         assert "vibrometer.saturated" not in [one.code for one in found.diagnostics]
 
 
-@pytest.mark.parametrize(
-    "kind", ["slew", "crossover", "samples_lost", "drifts", "beat", "high_pass", "notch"]
-)
+@pytest.mark.parametrize("kind", ["slew", "crossover", "samples_lost", "drifts", "beat", "high_pass", "notch"])
 def test_an_error_of_electronics_is_named_and_covered(kind):
     rng = np.random.default_rng(5)
     frequency = 55.0 if kind == "notch" else 100.0
@@ -410,13 +402,7 @@ def test_a_start_that_is_not_over_is_in_the_standard_error(frequency, start_up):
     """Twenty cycles of a shaker that is within a percent of its amplitude: 10 to 20 standard errors in silence once."""
     for seed in range(3):
         record = render_vibrometer(
-            frequency,
-            0.01,
-            duration=0.1 + 20.0 / frequency,
-            onset=0.1,
-            start_up=start_up,
-            snr_db=40.0,
-            rng=seed,
+            frequency, 0.01, duration=0.1 + 20.0 / frequency, onset=0.1, start_up=start_up, snr_db=40.0, rng=seed
         )
         steady = measure_drive(record).steady
         assert abs(steady.amplitude - 0.01) < 3.0 * steady.amplitude_se < 0.1 * 0.01

@@ -119,9 +119,7 @@ def find_tests(folder: Path, table: Path | None = None, besides: Path | None = N
         elif suffix in _SIGNALS and path.name not in ("tests.csv", "test_series.csv"):
             _put(signals, path, path.stem)
     if not recordings:
-        raise InputError(
-            f"{folder}: holds no recording ({', '.join(RECORDING_SUFFIXES)}, or a folder of images)"
-        )
+        raise InputError(f"{folder}: holds no recording ({', '.join(RECORDING_SUFFIXES)}, or a folder of images)")
     return [Test(name, path, signals.get(name)) for name, path in recordings.items()]
 
 
@@ -229,9 +227,7 @@ class SeriesSettings:
         object.__setattr__(self, "cycles", integer("cycles", self.cycles, LEAST_CYCLES))
         require_texts("operator", instance("operator", self.operator, str, "text"))
         if self.tracking.buckling_level is None:
-            raise InputError(
-                "buckling_level (--buckling-level): must be given, in m, or no response can be told"
-            )
+            raise InputError("buckling_level (--buckling-level): must be given, in m, or no response can be told")
         if not self.tracking.shaker:
             raise InputError("shaker: must be followed in a test series")
 
@@ -331,9 +327,7 @@ def run_test(test: Test, settings: SeriesSettings, folder: Path, fingerprint: st
         result = _row(test, diagnostics, status="spoiled", reason=reason)
     result = replace(result, fingerprint=fingerprint)
     missing = {
-        name: None
-        for name, value in vars(result).items()
-        if isinstance(value, float) and not math.isfinite(value)
+        name: None for name, value in vars(result).items() if isinstance(value, float) and not math.isfinite(value)
     }
     plain = asdict(result) | missing
     with atomic_path(folder / f"{test.name}.json") as temporary:
@@ -358,9 +352,7 @@ def _wrong(diagnostics: list[Diagnostic]) -> str:
     return next((one.message for one in diagnostics if one.severity is Severity.ERROR), "")
 
 
-def _measured(
-    test: Test, settings: SeriesSettings, folder: Path, diagnostics: list[Diagnostic]
-) -> TestResult:
+def _measured(test: Test, settings: SeriesSettings, folder: Path, diagnostics: list[Diagnostic]) -> TestResult:
     """The row of a test; *diagnostics* is filled as they come, for a test that ends half way."""
     tracking = settings.tracking
     if test.location is not None:
@@ -490,15 +482,11 @@ def _row_of(result: TestResult) -> list[str]:
     values = asdict(result)
     values["diagnostics"] = " ".join(code for code, _, _ in result.diagnostics)
     values["comment"] = result.reason
-    values |= {
-        name: f"{x:.9g}" if math.isfinite(x) else "" for name, x in values.items() if isinstance(x, float)
-    }
+    values |= {name: f"{x:.9g}" if math.isfinite(x) else "" for name, x in values.items() if isinstance(x, float)}
     return [str(values[name]) for name in COLUMNS]
 
 
-def write_page(
-    path: Path, results: list[TestResult], settings: SeriesSettings, pictures: Iterable[Path]
-) -> Path:
+def write_page(path: Path, results: list[TestResult], settings: SeriesSettings, pictures: Iterable[Path]) -> Path:
     """Write the table of tests as a page for a browser, with links to pictures in its folder."""
     import pandas as pd
 

@@ -105,9 +105,7 @@ def sensitivity(frequencies: Callable[[_Array], _Array], logs: _Array, errors: _
     return np.column_stack(columns) / errors[:, None]
 
 
-def search(
-    residual: Callable[[_Array], _Array], begin: _Array, keep: _Array, names: list[str], freedom: int
-) -> _Array:
+def search(residual: Callable[[_Array], _Array], begin: _Array, keep: _Array, names: list[str], freedom: int) -> _Array:
     """The least squares minimum; other buckling levels are tried where the first start meets the data badly.
 
     Frequencies are told apart by their order only, and at b/r = 6.2 the first two change places: from the
@@ -189,9 +187,7 @@ def either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, 
     for goal in goals:
         options = {"x1": goal / here + 1e-6, "tol": 1e-7, "maxiter": 12}
         try:
-            levels.append(
-                level * float(newton(lambda at, goal=goal: symmetric(at) / goal - 1.0, 1.0, **options))
-            )
+            levels.append(level * float(newton(lambda at, goal=goal: symmetric(at) / goal - 1.0, 1.0, **options)))
         except RuntimeError:  # no level gives that frequency
             return ()
     return tuple(levels)
@@ -262,8 +258,7 @@ def remarks(result: Calibration, measured: Measurements) -> list[str]:
         gauge, value = getattr(measured, name), getattr(result.beam, name)
         if gauge is not None:
             told.append(
-                f"{name}: {value * 1e3:.4g} mm in the model, {gauge * 1e3:.4g} mm measured "
-                f"({value / gauge - 1.0:+.1%})"
+                f"{name}: {value * 1e3:.4g} mm in the model, {gauge * 1e3:.4g} mm measured ({value / gauge - 1.0:+.1%})"
             )
     if result.gauge_well_frequency is not None:
         told.append(
@@ -748,9 +743,7 @@ def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> Contac
     speed, duration = impacts["closing_speed"].values, impacts["duration"].values
     good = np.isfinite(speed) & (speed > 0.0) & (duration > 0.0) & (impacts["bounded"].values == 1)
     if good.sum() < 3:
-        raise InputError(
-            f"impacts: {int(good.sum())} of {speed.size} seen from end to end: must be at least 3"
-        )
+        raise InputError(f"impacts: {int(good.sum())} of {speed.size} seen from end to end: must be at least 3")
     log_v, log_t = np.log(speed[good]), np.log(duration[good])
     spread = np.maximum(impacts["duration_stderr"].values[good] / duration[good], 1e-3)
     weight = 1.0 / spread**2

@@ -91,9 +91,7 @@ class Recording:
         pixel_width: float | None = None,
     ) -> None:
         if not isinstance(source, FrameSource):
-            raise InputTypeError(
-                f"source = {shown(source)}: must be a source of frames; open_recording opens a file"
-            )
+            raise InputTypeError(f"source = {shown(source)}: must be a source of frames; open_recording opens a file")
         if not isinstance(region, (tuple, list)) or len(region) != 4:
             raise InputError(f"region = {shown(region)}: must be four numbers")
         self.path = path
@@ -128,9 +126,7 @@ class Recording:
         index = integer("index", index, 0, len(self) - 1)
         return self._read(index, index + 1)[0]
 
-    def batches(
-        self, size: int = 64, *, start: int = 0, stop: int | None = None
-    ) -> Iterator[NDArray[np.integer]]:
+    def batches(self, size: int = 64, *, start: int = 0, stop: int | None = None) -> Iterator[NDArray[np.integer]]:
         """Runs of up to *size* frames in order, integers (frames, height, width)."""
         size = integer("size", size, 1)
         start = integer("start", start, 0, len(self))
@@ -169,9 +165,7 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
     if value is None:
         return (0, shape[0], 0, shape[1])
     if len(value) != 4:
-        raise InputError(
-            f"region = {shown(value)}: must be (first row, last row + 1, first column, last column + 1)"
-        )
+        raise InputError(f"region = {shown(value)}: must be (first row, last row + 1, first column, last column + 1)")
     top = integer("region[0]", value[0], 0, shape[0] - 1)
     bottom = integer("region[1]", value[1], top + 1, shape[0])
     left = integer("region[2]", value[2], 0, shape[1] - 1)
@@ -261,9 +255,7 @@ def open_recording(
             raise InputError(f"{path}: {why}")
         if size is None:
             hint = f"; {source.pixel_size_hint}" if source.pixel_size_hint else ""
-            raise InputError(
-                f"{path}: the pixel size is not in the file{hint}; give pixel_size (--pixel-size) in m"
-            )
+            raise InputError(f"{path}: the pixel size is not in the file{hint}; give pixel_size (--pixel-size) in m")
         if size > _LARGEST_PIXEL:
             raise InputError(
                 f"pixel_size (--pixel-size) = {size:g}: a pixel of {size:g} m; must be at most {_LARGEST_PIXEL:g} m, "
@@ -313,9 +305,7 @@ def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
     if reach < 1:
         raise InputError(f"fixed mark (--fixed-mark) of {rows} rows: must be at least 11 along the motion")
     if np.ptp(reference) <= 0.0:
-        raise InputError(
-            "fixed mark (--fixed-mark): shows nothing that could be followed; choose another part"
-        )
+        raise InputError("fixed mark (--fixed-mark): shows nothing that could be followed; choose another part")
     # finer than two pixels the raster shows other things in each frame
     profiles = gaussian_filter1d(np.asarray(profiles, dtype=np.float64), _SMOOTH, axis=1)
     reference = gaussian_filter1d(np.asarray(reference, dtype=np.float64), _SMOOTH)
@@ -397,9 +387,7 @@ def pixel_size_from_marks(
     centres = [_centre(picture, where, reach, name) for name, where in (("first", first), ("second", second))]
     apart = float(np.hypot(*(centres[1] - centres[0])))
     if apart < 4.0 * reach:
-        raise InputError(
-            f"marks {first} and {second}: {apart:.1f} pixels apart: must be at least {4 * reach}"
-        )
+        raise InputError(f"marks {first} and {second}: {apart:.1f} pixels apart: must be at least {4 * reach}")
     # a centre of mass within a pixel's raster is good to some hundredths of a pixel
     return length / apart, length / apart**2 * 0.05 * np.sqrt(2.0)
 
@@ -443,9 +431,7 @@ def _checked(
         if even and array.size % 2:
             raise InputError(f"frames of shape {array.shape}: 12-bit frames hold an even number of pixels")
         if array.min() < 0 or array.max() > limit:
-            raise InputError(
-                f"frames[{number}] holds {array.min()} to {array.max()}: must lie in [0, {limit}]"
-            )
+            raise InputError(f"frames[{number}] holds {array.min()} to {array.max()}: must lie in [0, {limit}]")
         if not shape:
             shape[:] = [0, *array.shape]
         shape[0] += 1
@@ -509,9 +495,7 @@ def write_photron(
     bits = integer("bit_depth", (12 if kind == ".cihx" else 16) if bit_depth is None else bit_depth, 8, 16)
     if bits not in (8, 12, 16):
         raise InputError(f"bit_depth = {shown(bit_depth)}: must be 8, 12 or 16")
-    effective = integer(
-        "effective_bits", min(bits, 12) if effective_bits is None else effective_bits, 1, bits
-    )
+    effective = integer("effective_bits", min(bits, 12) if effective_bits is None else effective_bits, 1, bits)
     require_texts("comment", instance("comment", comment, str, "text"))
     if "\n" in comment or "\r" in comment:
         raise InputError(f"comment = {shown(comment)}: must be a single line")

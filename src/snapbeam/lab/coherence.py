@@ -38,11 +38,7 @@ _NEIGHBOURS = 6
 
 @checked
 def frequency_response(
-    excitation: xr.DataArray,
-    response: xr.DataArray,
-    *,
-    resolution: float | None = None,
-    estimator: str = "h1",
+    excitation: xr.DataArray, response: xr.DataArray, *, resolution: float | None = None, estimator: str = "h1"
 ) -> xr.Dataset:
     """Estimate the frequency response and the coherence of two signals by Welch's method.
 
@@ -116,9 +112,7 @@ def frequency_response(
     error = np.sqrt((1.0 - coherence) / (2.0 * averages * np.maximum(coherence, 1e-300)))
     limit = 1.0 - _UNRELATED ** (1.0 / (averages - 1.0))
     above, below = (str(each.attrs["units"]) for each in (response, excitation))
-    unit = (
-        "1" if above == below else "/".join(f"({each})" if "/" in each else each for each in (above, below))
-    )
+    unit = "1" if above == below else "/".join(f"({each})" if "/" in each else each for each in (above, below))
     columns = {
         "magnitude": (np.abs(ratio), unit, "magnitude of the frequency response"),
         "magnitude_se": (np.abs(ratio) * error, unit, "standard error of the magnitude"),
@@ -144,9 +138,7 @@ def frequency_response(
         bias[mode.lines] = mode.bias
     words = {"units": "1", "long_name": "relative bias of the magnitude by the window"}
     found["window_bias"] = "frequency", bias, words
-    found["magnitude_se"] = found["magnitude_se"].copy(
-        data=np.abs(ratio) * np.hypot(error, bias / (1.0 + bias))
-    )
+    found["magnitude_se"] = found["magnitude_se"].copy(data=np.abs(ratio) * np.hypot(error, bias / (1.0 + bias)))
     found.attrs["diagnostics"] = to_json(_diagnostics(found))
     return found
 
@@ -295,16 +287,12 @@ def _diagnostics(found: xr.Dataset) -> list[Diagnostic]:
     top = int(np.argmax(size))
     bias = float(found["window_bias"].values[top])
     if "peak_magnitude" not in found.attrs:
-        first, last = next(
-            each for each in stretches(size > size[top] / math.sqrt(2.0)) if each[0] <= top < each[1]
-        )
+        first, last = next(each for each in stretches(size > size[top] / math.sqrt(2.0)) if each[0] <= top < each[1])
         if first == 0 or last == size.size or last - first >= _WIDE:
             return []
         return [KINDS_RESPONSE["no_mode"].found(frequency=float(found["frequency"].values[top]))]
     if abs(bias) > _BIAS:
         frequency, magnitude = (float(found.attrs[f"peak_{name}"]) for name in ("frequency", "magnitude"))
-        told = KINDS_RESPONSE["coarse"].found(
-            bias_percent=100.0 * bias, frequency=frequency, magnitude=magnitude
-        )
+        told = KINDS_RESPONSE["coarse"].found(bias_percent=100.0 * bias, frequency=frequency, magnitude=magnitude)
         return [told]
     return []

@@ -109,9 +109,7 @@ def full_field(
     def frame(k: int) -> _Array:
         return np.asarray(turned(recording.frame(k)), dtype=np.float64)
 
-    at_rest = _Template.of(
-        np.mean([frame(k) for k in range(rest_frames)], axis=0), first, last, block, rest_frames
-    )
+    at_rest = _Template.of(np.mean([frame(k) for k in range(rest_frames)], axis=0), first, last, block, rest_frames)
     if not at_rest.slope.any():
         raise InputError(f"rows = {first}, {last}: hold no texture and no edge in any block")
     length = int(recording.numbers[-1]) + 1
@@ -156,10 +154,7 @@ def full_field(
 def _taps(t: _Array) -> _Array:
     """Weights of four neighbouring coefficients of a cubic spline at fraction *t* between the inner two, shape (4, ...)."""
     return (
-        np.stack(
-            [(1.0 - t) ** 3, 3.0 * t**3 - 6.0 * t**2 + 4.0, -3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0, t**3]
-        )
-        / 6.0
+        np.stack([(1.0 - t) ** 3, 3.0 * t**3 - 6.0 * t**2 + 4.0, -3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0, t**3]) / 6.0
     )
 
 
@@ -187,18 +182,11 @@ class _Template(NamedTuple):
         slope = 0.5 * (coefficients[first + 1 : last + 1] - coefficients[first - 1 : last - 1])
         blocks = picture.shape[1] // block
         level, slope = (
-            each[:, : blocks * block]
-            .reshape(last - first, blocks, block)
-            .transpose(1, 0, 2)
-            .reshape(blocks, -1)
+            each[:, : blocks * block].reshape(last - first, blocks, block).transpose(1, 0, 2).reshape(blocks, -1)
             for each in (picture[first:last], slope)
         )
         return cls(
-            level - level.mean(1, keepdims=True),
-            slope - slope.mean(1, keepdims=True),
-            first,
-            last - first,
-            frames,
+            level - level.mean(1, keepdims=True), slope - slope.mean(1, keepdims=True), first, last - first, frames
         )
 
     def fit_shifts(self, picture: _Array, start: _Array) -> tuple[_Array, _Array, _Array]:

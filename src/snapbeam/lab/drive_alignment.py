@@ -70,9 +70,7 @@ class Alignment:
     def description(self) -> str:
         """The alignment in words."""
         sign = "-" if self.delay < 0.0 else "+"
-        text = (
-            f"t_camera = t_vibrometer {sign} {abs(self.delay):.7f} s (standard error {self.delay_se:.1e} s)"
-        )
+        text = f"t_camera = t_vibrometer {sign} {abs(self.delay):.7f} s (standard error {self.delay_se:.1e} s)"
         if self.polarity < 0:
             text += "; turned over (polarity -1)"
         if not self.certain:
@@ -231,12 +229,7 @@ def _candidates(
 
 
 def _refine(
-    camera: xr.DataArray,
-    moved: xr.DataArray,
-    seen: DriveMeasurement,
-    felt: DriveMeasurement,
-    delay: float,
-    sign: int,
+    camera: xr.DataArray, moved: xr.DataArray, seen: DriveMeasurement, felt: DriveMeasurement, delay: float, sign: int
 ) -> tuple[float, float]:
     """The delay from the phases over the time both records share, and its standard error."""
     start = max(seen.steady.start, felt.steady.start + delay)
@@ -333,13 +326,9 @@ def recorded_drive(
     wanted = 10.0 * drive.steady.frequency if bandwidth is None else positive("bandwidth", bandwidth, "Hz")
     band = min(wanted, top)
     if band < 1.5 * drive.steady.frequency:
-        raise InputError(
-            f"bandwidth = {band:g} Hz: must be 1.5 times the excitation, {drive.steady.frequency:g} Hz"
-        )
+        raise InputError(f"bandwidth = {band:g} Hz: must be 1.5 times the excitation, {drive.steady.frequency:g} Hz")
     if rate < 2.5 * band:
-        raise InputError(
-            f"sampling_frequency = {rate:g} Hz: must be at least 2.5 times the bandwidth, {band:g} Hz"
-        )
+        raise InputError(f"sampling_frequency = {rate:g} Hz: must be at least 2.5 times the bandwidth, {band:g} Hz")
     position = scale * displacement_from_velocity(velocity, drive).values
     nyquist = samples.sampling_frequency / 2.0
     width = 0.25 * band
@@ -386,8 +375,6 @@ def _scale(alignment: Alignment | None, polarity: int | None, amplitude_from: st
     if polarity not in (None, 1, -1):
         raise InputError(f"polarity (--polarity) = {shown(polarity)}: must be 1 or -1")
     if amplitude_from == "camera" and alignment is None:
-        raise InputError(
-            "amplitude_from (--amplitude-from) = 'camera': needs an alignment with a camera (--camera)"
-        )
+        raise InputError("amplitude_from (--amplitude-from) = 'camera': needs an alignment with a camera (--camera)")
     sign = polarity if polarity is not None else (alignment.polarity if alignment is not None else 1)
     return float(sign) * (alignment.gain if alignment is not None and amplitude_from == "camera" else 1.0)

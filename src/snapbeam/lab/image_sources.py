@@ -93,7 +93,9 @@ class FrameSource:
             self.frame_rate = next(iter(rates.values()))
         elif rates:
             told = ", ".join(f"{words}: {rate:.6g} Hz" for words, rate in rates.items())
-            self.frame_rate_question = f"the file contradicts itself about the frame rate ({told}); give frame_rate (--frame-rate) in Hz"
+            self.frame_rate_question = (
+                f"the file contradicts itself about the frame rate ({told}); give frame_rate (--frame-rate) in Hz"
+            )
 
 
 def grey_of(colors: NDArray[Any]) -> NDArray[Any]:
@@ -170,12 +172,7 @@ class TiffSource(FrameSource):
             self._colors = first.ndim == 3
             if self._colors:
                 self.diagnostics += (KINDS_RECORDING["colour"].found(channels=first.shape[2]),)
-            if str(getattr(first.compression, "name", "NONE")).upper() in (
-                "JPEG",
-                "OJPEG",
-                "JPEG2000",
-                "WEBP",
-            ):
+            if str(getattr(first.compression, "name", "NONE")).upper() in ("JPEG", "OJPEG", "JPEG2000", "WEBP"):
                 self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
                 self.edge_error = LOSSY_ERROR
             self.metadata = {"format": "TIFF stack"}
@@ -204,9 +201,7 @@ class TiffSource(FrameSource):
         series = self._file.series
         if len(series) > 1:
             if self._file.is_ome or told:
-                raise InputError(
-                    f"{self.path}: holds {len(series)} images of several frames; save one of them"
-                )
+                raise InputError(f"{self.path}: holds {len(series)} images of several frames; save one of them")
             return count
         axes = {
             axis: size
@@ -254,11 +249,7 @@ class TiffSource(FrameSource):
     @staticmethod
     def _size(unit: Any, resolution: Any) -> float | None:
         """Metres per pixel of a resolution; inches come from printers."""
-        if (
-            resolution is None
-            or not min(resolution.value) > 0
-            or _unescaped(unit) in ("in", "inch", "inches")
-        ):
+        if resolution is None or not min(resolution.value) > 0 or _unescaped(unit) in ("in", "inch", "inches"):
             return None
         metres = _metres(unit)
         return None if metres is None else metres * resolution.value[1] / resolution.value[0]
@@ -268,10 +259,7 @@ class TiffSource(FrameSource):
         pixels = (image[0] if isinstance(image, list) else image)["Pixels"]
         sizes = {}
         for axis in "YX":
-            size, metres = (
-                pixels.get(f"PhysicalSize{axis}"),
-                _metres(pixels.get(f"PhysicalSize{axis}Unit", "um")),
-            )
+            size, metres = (pixels.get(f"PhysicalSize{axis}"), _metres(pixels.get(f"PhysicalSize{axis}Unit", "um")))
             sizes[axis] = None if not size or metres is None else float(size) * metres
         self.pixel_size, self.pixel_width = sizes["Y"] or sizes["X"], sizes["X"] or sizes["Y"]
         rates: dict[str, float] = {}
@@ -282,9 +270,7 @@ class TiffSource(FrameSource):
         stamps = [plane for plane in planes if "DeltaT" in plane] if isinstance(planes, list) else []
         if len(stamps) == self.numbers.size > 2 and any(plane["DeltaT"] for plane in stamps):
             stamps.sort(key=lambda plane: int(plane.get("TheT", 0)))
-            times = [
-                float(one["DeltaT"]) * seconds_in("DeltaT", str(one.get("DeltaTUnit", "s"))) for one in stamps
-            ]
+            times = [float(one["DeltaT"]) * seconds_in("DeltaT", str(one.get("DeltaTUnit", "s"))) for one in stamps]
             known = 1.0 / rates["TimeIncrement"] if rates else None
             self.numbers, step = numbers_of_stamps(self.path, np.array(times), 0.0, known)
             rates["time stamps DeltaT"] = 1.0 / step
@@ -381,9 +367,7 @@ class ArraySource(FrameSource):
             self.diagnostics += (KINDS_RECORDING["colour"].found(channels=shape[3]),)
         self._full = 0.0
         if dtype.kind == "f":
-            self._full = float_range(
-                [np.asarray(self._stack[k]) for k in {0, shape[0] // 2, shape[0] - 1}], path
-            )
+            self._full = float_range([np.asarray(self._stack[k]) for k in {0, shape[0] // 2, shape[0] - 1}], path)
             self.max_value = 65535
         else:
             self.max_value = int(np.iinfo(dtype).max)
@@ -439,9 +423,7 @@ class ArraySource(FrameSource):
             for name in (name for name in names if name in level and name not in found):
                 value = np.asarray(level[name])
                 if value.size != 1 or value.dtype.kind not in "iuf" or not value.item() > 0.0:
-                    raise InputError(
-                        f"{self.path}: attribute {name!r} = {level[name]!r}: must be a positive number"
-                    )
+                    raise InputError(f"{self.path}: attribute {name!r} = {level[name]!r}: must be a positive number")
                 found[name] = float(value.item())
         return found
 
@@ -454,9 +436,7 @@ class ArraySource(FrameSource):
             return part
         levels = scaled_floats(part, self._full)
         if levels is None:
-            raise InputError(
-                f"{self.path}: frames {start} to {stop - 1} hold numbers outside 0 to {self._full:g}"
-            )
+            raise InputError(f"{self.path}: frames {start} to {stop - 1} hold numbers outside 0 to {self._full:g}")
         return levels
 
     def close(self) -> None:
@@ -483,9 +463,7 @@ def take_header(source: FrameSource, header: CameraHeader) -> None:
     source.exposure = header.timing.exposure
     source.diagnostics = header.diagnostics
     source.metadata = {
-        "format": "Photron mraw"
-        if not header.image_suffix
-        else f"Photron header of {header.image_suffix} images",
+        "format": "Photron mraw" if not header.image_suffix else f"Photron header of {header.image_suffix} images",
         "camera": header.camera,
         "comment": header.comment,
         "date": header.recorded,
@@ -599,9 +577,7 @@ def images_of_header(header: CameraHeader) -> FrameSource:
     beside = sorted(one for one in folder.iterdir() if one.suffix.lower() in kinds)
     own = [one for one in beside if one.name.startswith(header.path.stem)] or beside
     if not own:
-        raise InputError(
-            f"{header.path}: its pixels are in {header.image_suffix} images, but none is beside it"
-        )
+        raise InputError(f"{header.path}: its pixels are in {header.image_suffix} images, but none is beside it")
     source = ImageSource(header.path, own)
     if len(own) != header.frame_count or source.shape != (header.height, header.width):
         raise InputError(
@@ -777,8 +753,7 @@ class VideoSource(FrameSource):
             way_out = ""
             if path.suffix.lower() == ".cine":
                 way_out = (
-                    "; export it as an uncompressed AVI or as 16-bit TIFF images, and give frame_rate "
-                    "(--frame-rate)"
+                    "; export it as an uncompressed AVI or as 16-bit TIFF images, and give frame_rate (--frame-rate)"
                 )
             raise InputError(f"{path}: cannot be read as a video ({error}){way_out}") from None
         if count == 0 or 0 in self.shape:
@@ -824,9 +799,7 @@ class VideoSource(FrameSource):
                 if frame is None:
                     raise InputError(f"{self.path}: ends after frame {self._next} of {self.numbers.size}")
                 if frame.shape != self.shape:
-                    raise InputError(
-                        f"{self.path}: frame {self._next} is of shape {frame.shape}, not {self.shape}"
-                    )
+                    raise InputError(f"{self.path}: frame {self._next} is of shape {frame.shape}, not {self.shape}")
                 if self._next >= start:
                     out[self._next - start] = frame[rows[0] : rows[1]]
                 self._next += 1

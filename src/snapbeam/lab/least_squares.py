@@ -55,9 +55,7 @@ def weighted_line(x: _Array, y: _Array, weight: _Array) -> tuple[float, float, f
 def widened(fit: _Fit, **errors: tuple[float, ...]) -> _Fit:
     """A fit whose standard errors, by the names of the numbers, hold further independent errors."""
     names = {f"{name}_se": added for name, added in errors.items()}
-    return dataclasses.replace(
-        fit, **{name: math.hypot(getattr(fit, name), *added) for name, added in names.items()}
-    )
+    return dataclasses.replace(fit, **{name: math.hypot(getattr(fit, name), *added) for name, added in names.items()})
 
 
 def _scale(design: _Array) -> _Array:

@@ -206,9 +206,7 @@ def _on_map(
     return place, inside, response.isel(pick).values.astype(np.int8)
 
 
-def _repeated(
-    where: dict[str, _Array], measured: NDArray[np.int8]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _repeated(where: dict[str, _Array], measured: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which points repeat an earlier one, and which have the coordinates of another one of another class."""
     repeated, contradicting = np.zeros(measured.size, dtype=bool), np.zeros(measured.size, dtype=bool)
     groups: dict[tuple[str, ...], list[int]] = {}
@@ -249,9 +247,7 @@ def _units(
         "the frequency is in rad/s and the velocity in mm/s": dict(
             zip(names, (frequency / turn, velocity / 1e3), strict=True)
         ),
-        "the columns of frequency and velocity are exchanged": dict(
-            zip(names, (velocity, frequency), strict=True)
-        ),
+        "the columns of frequency and velocity are exchanged": dict(zip(names, (velocity, frequency), strict=True)),
     }
     level, first = attrs.get("beam_buckling_level"), attrs.get("reference_frequency")
     if level is not None:  # exchanged in Hz and m/s

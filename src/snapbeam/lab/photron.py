@@ -234,16 +234,12 @@ def _exposure(fields: HeaderFields, rate: float | None) -> tuple[float | None, t
             diagnostics.append(KINDS_RECORDING["shutter"].found(stated=exposure, exposure_us=1e6 * other))
             exposure = other
         else:
-            diagnostics.append(
-                KINDS_RECORDING["no_exposure"].found(stated=exposure, frame_us=1e6 / (rate or math.nan))
-            )
+            diagnostics.append(KINDS_RECORDING["no_exposure"].found(stated=exposure, frame_us=1e6 / (rate or math.nan)))
             exposure = None
     nsec = fields.number("shutter_nsec")
     if nsec is not None and nsec > 0.0 and 1e-9 * nsec <= longest:
         if exposure is not None and abs(1e-9 * nsec / exposure - 1.0) > 0.02:
-            diagnostics.append(
-                KINDS_RECORDING["two_exposures"].found(first_us=1e6 * exposure, second_us=1e-3 * nsec)
-            )
+            diagnostics.append(KINDS_RECORDING["two_exposures"].found(first_us=1e6 * exposure, second_us=1e-3 * nsec))
         exposure = 1e-9 * nsec
     return exposure, tuple(diagnostics)
 
@@ -321,8 +317,7 @@ def read_header(path: str | Path) -> CameraHeader:
     kind = fields.text("format", "mraw").lower()
     if kind != "mraw" and kind not in _IMAGES:
         raise fields.error(
-            "format",
-            f"= {fields.text('format')!r}: must be MRaw, PNG, TIFF, BMP or JPEG; save it as one of these",
+            "format", f"= {fields.text('format')!r}: must be MRaw, PNG, TIFF, BMP or JPEG; save it as one of these"
         )
     color = fields.text("color", "Mono").lower()
     if color not in ("mono", "raw"):

@@ -166,9 +166,7 @@ def find_errors(record: Record) -> list[Hypothesis]:
     What an error leaves is no noise and no clean course, so later groups of detectors are asked where the ones before
     found nothing that matters.
     """
-    slow = np.asarray(
-        np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, record.left.size), 3), dtype=np.float64
-    )
+    slow = np.asarray(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, record.left.size), 3), dtype=np.float64)
     # a zero that drifts is no noise
     record = record._replace(left=record.left - slow @ solve(slow, record.left))
     told: list[Hypothesis] = []
@@ -187,9 +185,7 @@ def find_errors(record: Record) -> list[Hypothesis]:
                 continue
             # an error that explains nearly as much is not told, but may be there; a large one would show elsewhere
             near = [one for one in found if one.score > max(best.score - _AHEAD, 0.0) and one.loss < _HIDDEN]
-            loss, shift = (
-                max((getattr(one, name) for one in near), default=0.0) for name in ("loss", "shift")
-            )
+            loss, shift = (max((getattr(one, name) for one in near), default=0.0) for name in ("loss", "shift"))
             if max(loss, shift) > 0.0:
                 told.append(Hypothesis("", best.score, 1, loss, shift))
     return told
@@ -401,11 +397,7 @@ def _hidden_filters(record: Record) -> list[Hypothesis]:
         return []
     most = int(np.argmax(np.where(possible, loss, 0.0)))
     taken = float(loss[most])
-    numbers = {
-        "corner": filters[most].centre,
-        "loss_percent": 100.0 * taken / (1.0 + taken),
-        "limit": 0.05 * drive,
-    }
+    numbers = {"corner": filters[most].centre, "loss_percent": 100.0 * taken / (1.0 + taken), "limit": 0.05 * drive}
     return [Hypothesis("high_pass_possible", math.inf, 1, taken, numbers=numbers)]
 
 
@@ -457,9 +449,7 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
     n = left.size
     freq = np.fft.rfftfreq(n, 1.0 / rate)
     # a start that is not over is no noise
-    wave = np.exp(
-        2j * math.pi * drive / rate * np.arange(n)[:, None] - np.linspace(0.0, 1.0, n)[:, None] * _FADES
-    )
+    wave = np.exp(2j * math.pi * drive / rate * np.arange(n)[:, None] - np.linspace(0.0, 1.0, n)[:, None] * _FADES)
     late = np.hstack([wave.real, wave.imag])
     left = left - late @ solve(late, left)
     # without a taper, steep noise leaks from high frequencies over all lines
@@ -685,9 +675,7 @@ def beside_acceleration(fit: SineFit, units: str, acceleration: SineFit) -> list
         tens = round(exponent) if cause == read[0] or factor is None else 0.0
         if abs(exponent - tens) < math.log10(1.0 + _AGREE):
             told.append(cause)
-    words = (
-        " or ".join(told) or "look at sensitivity (--sensitivity), units (--units) and channels (--channel)"
-    )
+    words = " or ".join(told) or "look at sensitivity (--sensitivity), units (--units) and channels (--channel)"
     return [KINDS_VIBROMETER["acceleration"].found(told=words, ratio=ratio)]
 
 

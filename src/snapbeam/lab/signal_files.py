@@ -85,8 +85,7 @@ def read_channels(
         told = channel.get("fs")
         if rate is not None and told is not None and abs(told / rate - 1.0) > 1e-5:
             raise InputError(
-                f"{source}: {channel['name']} is sampled at {told:.9g} Hz but sampling_frequency = {rate:g} "
-                "was given"
+                f"{source}: {channel['name']} is sampled at {told:.9g} Hz but sampling_frequency = {rate:g} was given"
             )
         if rate is not None and "time" in channel:
             way_out = "leave out sampling_frequency (--sampling-freq)"
@@ -166,11 +165,7 @@ def read_signal(
 
 
 def read_columns(
-    path: str | os.PathLike[str],
-    names: Sequence[str] | None,
-    units: Sequence[str],
-    *,
-    are_stated: bool = False,
+    path: str | os.PathLike[str], names: Sequence[str] | None, units: Sequence[str], *, are_stated: bool = False
 ) -> list[tuple[list[float], str]]:
     """Return columns of a text table whose header names them, each with its unit.
 
@@ -217,9 +212,7 @@ def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, sourc
             raise InputError(f"{name} is in {unit!r} but sensitivity = {sensitivity!r} is per {per}")
         factor, base = factor * scale, target
     elif base == "FS":
-        raise InputError(
-            f"{name} is a fraction of full scale; state sensitivity (--sensitivity), such as '0.5 m/s/FS'"
-        )
+        raise InputError(f"{name} is a fraction of full scale; state sensitivity (--sensitivity), such as '0.5 m/s/FS'")
     data = np.asarray(entry["data"], dtype=np.float64)
     bad = np.flatnonzero(~np.isfinite(data))
     if bad.size:
@@ -238,9 +231,7 @@ def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, sourc
     return signal
 
 
-def write_signal(
-    path: str | os.PathLike[str], signal: xr.DataArray, *, full_scale: float | None = None
-) -> Path:
+def write_signal(path: str | os.PathLike[str], signal: xr.DataArray, *, full_scale: float | None = None) -> Path:
     """Write a signal to a CSV, WAV, UFF-58 (binary), TDMS, HDF5 or NumPy ``.npz`` file, whole or not at all.
 
     Parameters

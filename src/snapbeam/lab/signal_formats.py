@@ -48,15 +48,7 @@ _SCALES = (
     "scale", "scalefactor", "scaling", "gain", "factor", "slope", "multiplier", "conversion", "conversionfactor", "lsb",
 )  # fmt: skip
 _OFFSETS = ("offset", "addoffset", "intercept", "zerooffset", "bias")
-_PACKING = (
-    "scale_factor",
-    "add_offset",
-    "_FillValue",
-    "missing_value",
-    "valid_min",
-    "valid_max",
-    "valid_range",
-)
+_PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value", "valid_min", "valid_max", "valid_range")
 _COMMENT = ("#", "%", "//", "!")
 _LOOK = 400  # lines in which the table must begin
 _ABOVE = 20
@@ -187,9 +179,7 @@ def with_time(channels: list[Channel]) -> list[Channel]:
         least = 1e-3 * abs(axis[-1] - axis[0]) / axis.size
         for other, times in others:
             if not np.allclose(times - times[0], axis - axis[0], rtol=0.0, atol=least):
-                raise InputError(
-                    f"{name} has the time axes {first} and {other}, which differ: remove the wrong one"
-                )
+                raise InputError(f"{name} has the time axes {first} and {other}, which differ: remove the wrong one")
         if "fs" in channel:
             agree(name, axis, channel.pop("fs"), "rename or remove the wrong one")
         channel["time"] = axis
@@ -215,9 +205,7 @@ def read_numpy(path: Path, _told: Told) -> list[Channel]:
         arrays = None if isinstance(loaded, np.ndarray) else {name: loaded[name] for name in loaded.files}
     if arrays is None:
         if loaded.ndim != 1 or loaded.dtype.kind not in "iuf":
-            raise InputError(
-                f"array of {loaded.dtype} and shape {loaded.shape}: must be one channel of numbers"
-            )
+            raise InputError(f"array of {loaded.dtype} and shape {loaded.shape}: must be one channel of numbers")
         return [{"data": loaded, "name": path.stem, "unit_str": None}]
     return _channels({name: _Stored(np.squeeze(data), {}) for name, data in arrays.items()}, {})
 
@@ -451,8 +439,7 @@ def _netcdf3(path: Path, version: int) -> list[Channel]:
                 item.dimensions[0] if item.dimensions[:1] != (name,) and item.dimensions else None,
             )
             for name, item in file.variables.items()
-            if item.data.dtype.kind in "iuf"
-            and (item.dimensions != (name,) or _is_axis(name, item._attributes))
+            if item.data.dtype.kind in "iuf" and (item.dimensions != (name,) or _is_axis(name, item._attributes))
         }
         return _channels(stored, {"": _stating(file._attributes)})
 
@@ -466,9 +453,7 @@ def _is_axis(name: str, attributes: Mapping[str, Any]) -> bool:
     """Return whether a dimension scale contains times."""
     stated = stated_unit(attributes)
     try:
-        return is_time(split_unit(name.rpartition("/")[2])[0]) or (
-            stated != "" and seconds_in(name, stated) > 0.0
-        )
+        return is_time(split_unit(name.rpartition("/")[2])[0]) or (stated != "" and seconds_in(name, stated) > 0.0)
     except InputError:
         return False
 
@@ -578,12 +563,7 @@ def _dialects(lines: list[str]) -> list[_Dialect]:
     """Every way in which a table can be seen in the first lines."""
     found = []
     few = lines[:_LOOK]
-    for separator, commas in (
-        (";", (True, False)),
-        ("\t", (False, True)),
-        (",", (False,)),
-        (None, (False, True)),
-    ):
+    for separator, commas in ((";", (True, False)), ("\t", (False, True)), (",", (False,)), (None, (False, True))):
         try:
             cells = _cells(few, separator)
         except csv.Error:
@@ -598,12 +578,7 @@ def _dialects(lines: list[str]) -> list[_Dialect]:
                     one = _Dialect(separator, comma, k, used)
                     before = replace(one, first=k - 1)
                     # the first row may have more cells, such as the settings of an instrument
-                    wide = (
-                        k
-                        and separator
-                        and len(cells[k - 1]) > used[-1] + 1
-                        and _is_row(cells[k - 1], used, comma)
-                    )
+                    wide = k and separator and len(cells[k - 1]) > used[-1] + 1 and _is_row(cells[k - 1], used, comma)
                     found.append(before if wide and _heads(lines, before)[0] else one)
                     break
     return found
@@ -642,8 +617,7 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
         )
     places = [0, *(i for i, _ in numbered)]
     above = {
-        one.first: [text for i, text in marked if places[one.first] < i < places[one.first + 1]]
-        for one in dialects
+        one.first: [text for i, text in marked if places[one.first] < i < places[one.first + 1]] for one in dialects
     }
     dialect, names, units, taken = _best(path, lines, dialects, columns, above)
     first = _earlier(lines, dialect)
@@ -656,9 +630,7 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     if not text.endswith("\n") and _is_short(cells):
         last = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
         tell([KINDS_SIGNAL["cut_in_number"].found(told=last)])
-    beyond = " ".join(
-        cell for cell in cells[0][max(dialect.used) + 1 :] if cell
-    )  # settings behind the first row
+    beyond = " ".join(cell for cell in cells[0][max(dialect.used) + 1 :] if cell)  # settings behind the first row
     return TextBlock(
         path=path,
         header=(
@@ -668,9 +640,7 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
         ),
         names=names,
         units=units,
-        rows=[
-            _kept(row, dialect, numbered[first + k][0], path, names, k == 0) for k, row in enumerate(cells)
-        ],
+        rows=[_kept(row, dialect, numbered[first + k][0], path, names, k == 0) for k, row in enumerate(cells)],
         lines=[i for i, _ in numbered[first:]],
         decimal_comma=dialect.decimal_comma,
     )
@@ -737,9 +707,7 @@ def _best(
     return best
 
 
-def _heads(
-    lines: list[str], dialect: _Dialect
-) -> tuple[tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
+def _heads(lines: list[str], dialect: _Dialect) -> tuple[tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
     """Names and units of the columns from the one or two lines before the table."""
     above: list[tuple[int, list[str]]] = []
     count = len(dialect.used)
@@ -781,17 +749,11 @@ def _wider(words: list[str], rows: list[list[str]]) -> list[str]:
         return []
     if any(math.isfinite(to_number(word)) or re.search("[=:]", word) for word in words):
         return []
-    steps = [
-        [after - before for before, after in zip(*pair, strict=True)] for pair in (values[:2], values[1:])
-    ]
+    steps = [[after - before for before, after in zip(*pair, strict=True)] for pair in (values[:2], values[1:])]
     if values[0][0] in (0.0, 1.0) and steps[0][0] == steps[1][0] == 1.0:
         return ["", *words]
     rising = [min(one[k] for one in steps) > 0.0 for k in (0, 1)]
-    return (
-        [*words, f"column {len(rows[0])}"]
-        if is_time(split_unit(words[0])[0]) and rising == [True, False]
-        else []
-    )
+    return [*words, f"column {len(rows[0])}"] if is_time(split_unit(words[0])[0]) and rising == [True, False] else []
 
 
 def _like_unit(cell: str) -> bool:
@@ -900,9 +862,7 @@ def read_matlab(path: Path, _told: Told) -> list[Channel]:
     values = _version_73(path) if newer else read_version_5(path)
     channels = _channels({name: _Stored(value, {}) for name, value in values.items()}, {})
     if not channels:
-        raise InputError(
-            "holds no vector or matrix of numbers (objects and cells are not read; save as numbers)"
-        )
+        raise InputError("holds no vector or matrix of numbers (objects and cells are not read; save as numbers)")
     return channels
 
 
@@ -953,9 +913,7 @@ def header_rate(
     *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
     """
     found = {
-        key: rate
-        for key, value in values.items()
-        if (rate := _rate_of(key, value, decimal_comma, known)) is not None
+        key: rate for key, value in values.items() if (rate := _rate_of(key, value, decimal_comma, known)) is not None
     }
     return _one_rate(found, f"{where}: the header") if found else None
 
@@ -1010,8 +968,7 @@ def header_unit(values: dict[str, str], *keys: str) -> str | None:
 def _quantity(text: str, decimal_comma: bool = False) -> tuple[tuple[float, ...], str]:
     """Readings and unit of ``"12 kHz"``, ``"CH1:2e-8"``, ``"51 200"`` or ``"0,5 ms"``."""
     found = re.fullmatch(
-        r"(?:\w+:)?\s*([-+]?\.?[0-9][0-9.,' ]*(?:[eE][-+]?\d+)?)\s*\[?([^\]]*)\]?",
-        text.strip().translate(_SIGNS),
+        r"(?:\w+:)?\s*([-+]?\.?[0-9][0-9.,' ]*(?:[eE][-+]?\d+)?)\s*\[?([^\]]*)\]?", text.strip().translate(_SIGNS)
     )
     return (readings(found[1], decimal_comma), found[2].strip()) if found else ((), "")
 
@@ -1050,15 +1007,9 @@ def read_table(path: Path, columns: str | None = None) -> Table:
             "give columns (--columns), such as 'time [s],velocity [mm/s]'"
         )
     if len(names) != width:
-        raise InputError(
-            f"{path}: columns (--columns) = {columns!r} names {len(names)}, the rows have {width}"
-        )
+        raise InputError(f"{path}: columns (--columns) = {columns!r} names {len(names)}, the rows have {width}")
     columns_of = list(zip(*block.rows, strict=True))
-    if (
-        not names[0]
-        and len(names) > 1
-        and (np.diff([to_number(cell) for cell in columns_of[0]]) == 1.0).all()
-    ):
+    if not names[0] and len(names) > 1 and (np.diff([to_number(cell) for cell in columns_of[0]]) == 1.0).all():
         names, columns_of = names[1:], columns_of[1:]  # the index of a data frame
     if "" in names or len(set(names)) < len(names):
         raise InputError(f"{path}: columns {list(names)}: each must have a name of its own")
@@ -1104,15 +1055,11 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
         word, unit = columns[times[0]]
         duration = _DURATION.fullmatch(table.columns[times[0]][0])
         if duration and unit not in (None, "s"):
-            raise InputError(
-                f"{path}: column {times[0]!r} has times such as {duration[0]!r}: remove one of the units"
-            )
+            raise InputError(f"{path}: column {times[0]!r} has times such as {duration[0]!r}: remove one of the units")
         common["time"] = table.numbers(times[0]) * seconds_in(f"{path}: column {word!r}", unit)
         if known is None and common["time"].size > 2:
             known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
-    commas = table.block.decimal_comma and any(
-        "," in cell for row in table.block.rows[:_ABOVE] for cell in row
-    )
+    commas = table.block.decimal_comma and any("," in cell for row in table.block.rows[:_ABOVE] for cell in row)
     rate = header_rate(values, str(path), commas, known)
     if times:
         if rate is not None:
@@ -1141,9 +1088,7 @@ def agree(name: str, time: NDArray[np.float64], rate: float, way_out: str) -> No
         return
     _, found = even_sampling(name, time)
     if abs(found / rate - 1.0) * time.size > 1.0 and abs(found / rate - 1.0) > 1e-3:
-        raise InputError(
-            f"{name}: the times are sampled at {found:.9g} Hz, the header says {rate:.9g} Hz; {way_out}"
-        )
+        raise InputError(f"{name}: the times are sampled at {found:.9g} Hz, the header says {rate:.9g} Hz; {way_out}")
 
 
 def write_csv(path: Path, signal: xr.DataArray, _full_scale: float | None = None) -> None:
@@ -1326,9 +1271,7 @@ def read_spectra(path: str | os.PathLike[str]) -> list[xr.DataArray]:
             count = entry["data"].size
             even = float(entry["abscissa_min"]) + float(entry["abscissa_inc"]) * np.arange(count)
             lines = factor * (even if entry["abscissa_spacing"] == 1 else np.asarray(entry["x"]))
-            units = [
-                _first(entry.get(f"{which}_axis_units_lab"), "").strip() for which in ("ordinate", "orddenom")
-            ]
+            units = [_first(entry.get(f"{which}_axis_units_lab"), "").strip() for which in ("ordinate", "orddenom")]
             unit = "/".join(each for each in (units[0] or "1", units[1]) if each)
             axis = ("frequency", lines, {"units": "Hz", "long_name": "frequency"})
             words = SPECTRA[entry["func_type"]]

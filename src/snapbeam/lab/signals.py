@@ -64,9 +64,7 @@ def si_unit(name: str, unit: str) -> tuple[float, str]:
     """
     if not isinstance(unit, str):
         where = f"unit of {name}" if isinstance(name, str) else "unit"
-        raise InputTypeError(
-            f"{where} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}"
-        )
+        raise InputTypeError(f"{where} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}")
     word = unit.strip().replace("\u03bc", "u").replace("\u00b5", "u").replace(" ", "").replace("*", "")
     word = _WORDS.get(word.lower(), word)
     word = word.replace("sec", "s").replace("²", "^2").replace("/s/s", "/s^2").replace("/s2", "/s^2")
@@ -208,9 +206,7 @@ def make_signal(
     if time is not None:
         time = finite_array("time", time, 1)
         if np.shape(time) != array.shape:
-            raise InputError(
-                f"{name}: time of shape {np.shape(time)} and values of shape {array.shape}: must agree"
-            )
+            raise InputError(f"{name}: time of shape {np.shape(time)} and values of shape {array.shape}: must agree")
         start, rate = even_sampling(name, time)
     else:
         rate = positive("sampling_frequency", sampling_frequency, "Hz")
@@ -227,21 +223,15 @@ def make_signal(
     )
 
 
-def check_signal(
-    signal: xr.DataArray, units: str | tuple[str, ...] = (), name: str = "signal"
-) -> SignalSamples:
+def check_signal(signal: xr.DataArray, units: str | tuple[str, ...] = (), name: str = "signal") -> SignalSamples:
     """Return the samples of *signal* if it is one: evenly sampled, finite, long enough and in one of *units*."""
     from snapbeam.util.datasets import xr
 
     if not isinstance(signal, xr.DataArray):
-        raise InputTypeError(
-            f"{name}: must be an xarray.DataArray (see make_signal), not {type(signal).__name__}"
-        )
+        raise InputTypeError(f"{name}: must be an xarray.DataArray (see make_signal), not {type(signal).__name__}")
     label = f"{name} {str(signal.name)!r}" if signal.name not in (None, name) else name
     if signal.dims != ("time",) or "time" not in signal.coords:
-        raise InputError(
-            f"{label} with dimensions {signal.dims}: must have the one dimension time with its times"
-        )
+        raise InputError(f"{label} with dimensions {signal.dims}: must have the one dimension time with its times")
     allowed = (units,) if isinstance(units, str) else units
     unit = signal.attrs.get("units")
     if unit is None:
@@ -259,10 +249,7 @@ def check_signal(
 def _computable(label: str, values: NDArray[np.float64], rate: float, unit: str) -> NDArray[np.float64]:
     """Return values of a signal whose powers and derivatives are numbers; refuse others."""
     largest = float(np.abs(values).max(initial=0.0))
-    for what, size, its_unit in (
-        (f"{label}: largest value", largest, unit),
-        (f"{label}: sampling rate", rate, "Hz"),
-    ):
+    for what, size, its_unit in ((f"{label}: largest value", largest, unit), (f"{label}: sampling rate", rate, "Hz")):
         if size and not 1.0 / _LARGEST <= size <= _LARGEST:
             raise InputError(
                 f"{what} = {size:.3g} {its_unit}: must be from {1.0 / _LARGEST:g} to {_LARGEST:g}; check the unit"

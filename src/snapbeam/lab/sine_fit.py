@@ -236,9 +236,7 @@ def fit_sine(
         limit = math.pi / span
         omega += float(np.clip(step, -limit, limit))
         if abs(omega / (2.0 * math.pi) - guess) > 2.0 / span:
-            raise InputError(
-                f"signal: no steady sine near {guess:g} Hz; its frequency or amplitude may change"
-            )
+            raise InputError(f"signal: no steady sine near {guess:g} Hz; its frequency or amplitude may change")
         if abs(step) < 1e-11 * omega:
             break
     design = sines(where, omega / (2.0 * math.pi) * np.arange(1, count + 1))
@@ -337,9 +335,7 @@ def find_flaws(samples: SignalSamples, fit: SineFit, measured: NDArray[np.bool_]
     sigma = 1.4826 * float(np.median(np.abs(known - np.median(known))))
     far = np.abs(rest) > max(8.0 * sigma, 0.05 * fit.amplitude)
     # one sample in thousands strays by chance where the noise is not normal; a flaw is more, or farther out
-    single = (
-        far & ~np.roll(far, 1) & ~np.roll(far, -1) & (np.abs(rest) < max(12.0 * sigma, 0.1 * fit.amplitude))
-    )
+    single = far & ~np.roll(far, 1) & ~np.roll(far, -1) & (np.abs(rest) < max(12.0 * sigma, 0.1 * fit.amplitude))
     at = np.flatnonzero(far & ~single)
     if not at.size:
         return []

@@ -292,9 +292,7 @@ class AreaPicture:
     twice that.
     """
 
-    def __init__(
-        self, camera: SyntheticCamera, stage: SyntheticStage, texture: float = 0.0, seed: int = 0
-    ) -> None:
+    def __init__(self, camera: SyntheticCamera, stage: SyntheticStage, texture: float = 0.0, seed: int = 0) -> None:
         self.outline = shape = Outline(camera, stage)
         self.margin = int(np.ceil(2.0 * camera.blur)) + 1
         cells = (shape.width + 2 * self.margin) * CELLS_PER_PIXEL
@@ -328,20 +326,15 @@ class AreaPicture:
         top = (tip + 0.5 * shape.thickness + 0.5 + margin) * CELLS_PER_PIXEL
         thickness, upper, lower = (size * CELLS_PER_PIXEL for size in (shape.thickness, *shape.marker))
         beam_rows = far[:, None] + self.slope
-        light = (stage.beam - stage.background) * (
-            covered(beam_rows, rows) - covered(beam_rows + thickness, rows)
-        )
+        light = (stage.beam - stage.background) * (covered(beam_rows, rows) - covered(beam_rows + thickness, rows))
         rod = np.zeros_like(light)
         seen = np.flatnonzero(self.rod)
         if seen.size:
             near, tips = beam_rows[:, seen] + thickness, top[:, None]
-            change = (stage.shaker - stage.background) * covered(
-                np.maximum(tips + self.profile[seen], near), rows
-            )
+            change = (stage.shaker - stage.background) * covered(np.maximum(tips + self.profile[seen], near), rows)
             if stage.marker_thickness > 0.0:
                 change += (stage.marker - stage.shaker) * (
-                    covered(np.maximum(tips + upper, near), rows)
-                    - covered(np.maximum(tips + lower, near), rows)
+                    covered(np.maximum(tips + upper, near), rows) - covered(np.maximum(tips + lower, near), rows)
                 )
             rod[:, seen] = self.rod[seen] * change
         layers = [np.cumsum(layer, axis=0).astype(np.float32) for layer in (light, rod)]
@@ -441,9 +434,7 @@ class Defects:
         return chosen
 
 
-def with_fixture(
-    light: NDArray[np.float32], fixture: Fixture, shift: float, blur: float
-) -> NDArray[np.float32]:
+def with_fixture(light: NDArray[np.float32], fixture: Fixture, shift: float, blur: float) -> NDArray[np.float32]:
     """Lay a bar behind which nothing shows over a picture; *shift* [px] moves it with the camera.
 
     Its edges are ramps as wide as a disk of confusion of standard deviation *blur* [px].
@@ -574,13 +565,7 @@ class _Instants:
     """Rows of beam and tip at instants spread over each exposure, and their exact means."""
 
     def __init__(
-        self,
-        time: Floats,
-        beam: Floats,
-        shaker: Floats,
-        camera: SyntheticCamera,
-        start: float,
-        zero_row: float,
+        self, time: Floats, beam: Floats, shaker: Floats, camera: SyntheticCamera, start: float, zero_row: float
     ) -> None:
         self.time, self.beam, self.shaker = time, beam, shaker
         self.camera, self.start, self.zero_row = camera, start, zero_row
@@ -714,9 +699,7 @@ def render_recording(
     disturbed = np.zeros(count, dtype=np.int8)
     for frames in defects.frames(count).values():
         disturbed[list(frames)] = 1
-    truth = trajectory_dataset(
-        np.arange(count) / camera.frame_rate, attrs=_attributes(camera, stage, rest, row, seed)
-    )
+    truth = trajectory_dataset(np.arange(count) / camera.frame_rate, attrs=_attributes(camera, stage, rest, row, seed))
     for name, motion, long_name in (
         ("displacement_mm", sign * means[0], "beam displacement, mean over the exposure"),
         ("shaker_displacement_mm", sign * means[1], "shaker displacement, mean over the exposure"),
@@ -727,9 +710,7 @@ def render_recording(
     return SyntheticRecording(camera, stage, defects, truth, moving, seed)
 
 
-def _attributes(
-    camera: SyntheticCamera, stage: SyntheticStage, rest: int, row: float, seed: int
-) -> dict[str, Any]:
+def _attributes(camera: SyntheticCamera, stage: SyntheticStage, rest: int, row: float, seed: int) -> dict[str, Any]:
     values = {f"camera_{name}": getattr(camera, name) for name in camera.__dataclass_fields__}
     values |= {f"stage_{name}": getattr(stage, name) for name in stage.__dataclass_fields__}
     plain = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
@@ -787,9 +768,7 @@ def render_run(
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> synthetic = lab.render_run(run, camera=lab.SyntheticCamera(shape=(192, 64)))
     """
-    dataset = check_trajectory(
-        getattr(run, "dataset", run), ("displacement_at_striker", "striker_displacement")
-    )
+    dataset = check_trajectory(getattr(run, "dataset", run), ("displacement_at_striker", "striker_displacement"))
     attrs = dataset.attrs
     if "length_scale" not in attrs:
         raise InputError("run without the attribute length_scale: must say how many metres its unit b is")
@@ -868,9 +847,7 @@ def render_vibrometer(
     amplitude = positive("velocity_amplitude", velocity_amplitude, "m/s")
     rate = positive("sampling_frequency", sampling_frequency, "Hz")
     if rate <= 4.0 * freq:
-        raise InputError(
-            f"sampling_frequency = {rate:g}: must be more than 4 times the frequency, {4 * freq:g} Hz"
-        )
+        raise InputError(f"sampling_frequency = {rate:g}: must be more than 4 times the frequency, {4 * freq:g} Hz")
     length = positive("duration", duration, "s")
     begin = within("onset", onset, 0.0, length, closed="left", unit="s")
     time_constant = nonnegative("start_up", start_up, "s")

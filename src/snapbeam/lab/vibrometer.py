@@ -221,9 +221,7 @@ def find_drive_lines(samples: SignalSamples, first: int, last: int, rough: SineF
         line = Line(frequency, abs(here), float(np.angle(here)))
         alike = abs(here - there) < max(_HUM_ALIKE * abs(here), 4.0 * unsure)
         (hum if unsure < _SURE * abs(here) and alike else beside).append(line)
-    return DriveLines(
-        tuple(hum), tuple(line for line in beside if line.amplitude > 2.0 * _LEAST * rough.amplitude)
-    )
+    return DriveLines(tuple(hum), tuple(line for line in beside if line.amplitude > 2.0 * _LEAST * rough.amplitude))
 
 
 def beside_lines(steady: SineFit, lines: DriveLines) -> SineFit:
@@ -231,10 +229,7 @@ def beside_lines(steady: SineFit, lines: DriveLines) -> SineFit:
     span = steady.stop - steady.start
     pull = math.hypot(
         0.0,
-        *(
-            line.amplitude / max(1.0, math.pi * abs(line.frequency - steady.frequency) * span)
-            for line in lines.beside
-        ),
+        *(line.amplitude / max(1.0, math.pi * abs(line.frequency - steady.frequency) * span) for line in lines.beside),
     )
     if pull == 0.0:
         return steady
@@ -287,9 +282,7 @@ def _refined(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bo
     return [float(f) for f in start + step * solved.x]
 
 
-def _at_rest(
-    samples: SignalSamples, rest: slice, frequencies: list[float]
-) -> tuple[NDArray[np.complex128], _Array]:
+def _at_rest(samples: SignalSamples, rest: slice, frequencies: list[float]) -> tuple[NDArray[np.complex128], _Array]:
     """Complex amplitudes of lines before the motion, and their standard errors; infinite without such a rest."""
     time, values = samples.time[rest], samples.values[rest]
     count = len(frequencies)
@@ -408,9 +401,7 @@ def _quiet_end(samples: SignalSamples, first: int, rough: SineFit, width: int) -
     return int(below[-1]) if below.size else 0
 
 
-def _scan(
-    time: _Array, values: _Array, starts: _Array, frequency: float, degree: int, noise: float
-) -> _Array:
+def _scan(time: _Array, values: _Array, starts: _Array, frequency: float, degree: int, noise: float) -> _Array:
     """Chi-square of a motion that starts at each of *starts*."""
     total = float(values @ values)
     out = np.empty(starts.size)
@@ -435,9 +426,7 @@ def _scan(
     return out
 
 
-def _weighed(
-    starts: _Array, scans: list[_Array], count: int, step: float, width: float
-) -> tuple[float, float]:
+def _weighed(starts: _Array, scans: list[_Array], count: int, step: float, width: float) -> tuple[float, float]:
     """Mean instant and its standard error over all instants and degrees.
 
     What no degree explains is no noise: it is alike over a quarter of a cycle of *width* samples, so it counts
@@ -618,9 +607,7 @@ def measure_drive(
     outside = moves_outside(samples, guess, first, last)
     span = (last - first) / samples.sampling_frequency * guess
     if span < 8.0:
-        raise InputError(
-            f"signal: the shaker moves for {span:.1f} cycles of {guess:g} Hz: must be at least 8"
-        )
+        raise InputError(f"signal: the shaker moves for {span:.1f} cycles of {guess:g} Hz: must be at least 8")
     rough = _late_fit(samples, first, last, guess)
     lines = find_drive_lines(samples, first, last, rough)
     if lines.hum:
@@ -662,9 +649,7 @@ def measure_drive(
     if "few_bits" in kinds:
         clipping = Clipping(-math.inf, math.inf, 0.0, 0.0)  # whose levels are hit again and again
     for one in errors:
-        steady = widened(
-            steady, amplitude=(one.loss * steady.amplitude,), frequency=(one.shift * steady.frequency,)
-        )
+        steady = widened(steady, amplitude=(one.loss * steady.amplitude,), frequency=(one.shift * steady.frequency,))
         if one.kind == "low_pass":
             uncertainty = math.hypot(uncertainty, 1e-3 * one.numbers["delay_ms"])
         elif one.kind == "interpolated":
@@ -712,9 +697,7 @@ def measure_drive(
     )
 
 
-def _broken_start(
-    samples: SignalSamples, onset: float, end: float, steady: SineFit, clipping: Clipping
-) -> list[Flaw]:
+def _broken_start(samples: SignalSamples, onset: float, end: float, steady: SineFit, clipping: Clipping) -> list[Flaw]:
     """Values that stand still, or jump farther than the motion can, between the onset and the steady motion.
 
     The first quarter of a cycle may jump: a velocity can begin anywhere.
@@ -839,9 +822,7 @@ def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: flo
     return middle, found
 
 
-def displacement_from_velocity(
-    velocity: xr.DataArray, measurement: DriveMeasurement | None = None
-) -> xr.DataArray:
+def displacement_from_velocity(velocity: xr.DataArray, measurement: DriveMeasurement | None = None) -> xr.DataArray:
     """Integrate the shaker's velocity to its displacement [m] without drift.
 
     The velocity's cubic spline is integrated exactly.  Noise and offset add a slow drift, which is determined
@@ -954,9 +935,7 @@ def shaker_signal(tracked: xr.Dataset) -> xr.DataArray:
     from scipy.interpolate import CubicSpline
 
     if "shaker_displacement_mm" not in tracked or "time" not in tracked.coords:
-        raise InputError(
-            "tracked: has no shaker_displacement_mm over time; it must come from track() with a shaker"
-        )
+        raise InputError("tracked: has no shaker_displacement_mm over time; it must come from track() with a shaker")
     values = tracked["shaker_displacement_mm"].values
     time = tracked["time"].values
     known = np.flatnonzero(np.isfinite(values))

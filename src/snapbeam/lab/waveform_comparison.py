@@ -100,8 +100,7 @@ def run_of_signal(signal: xr.DataArray, length: float, at: str = "midspan_displa
     scale = positive("length", length, "m")
     samples = check_signal(signal, "m", "measured")
     return xr.Dataset(
-        {at: ("time", samples.values / scale, {"units": "1"})},
-        {"time": ("time", samples.time, {"units": "s"})},
+        {at: ("time", samples.values / scale, {"units": "1"})}, {"time": ("time", samples.time, {"units": "s"})}
     )
 
 
@@ -169,9 +168,7 @@ def compare_waveforms(
     ]
     if isinstance(measured, xr.DataArray):
         if "length_scale" not in simulated.attrs:
-            raise InputError(
-                "simulated: has no attribute length_scale, m, to compare a displacement in m with"
-            )
+            raise InputError("simulated: has no attribute length_scale, m, to compare a displacement in m with")
         measured = run_of_signal(measured, float(simulated.attrs["length_scale"]), at)
     shaker_seen = "striker_displacement" in measured
     needs = (at, "striker_displacement") if shaker_seen else (at,)
@@ -211,9 +208,7 @@ def compare_waveforms(
     for word, name in (("displacement", at), ("shaker", "striker_displacement")):
         for kind, run, cycle in (("measured", measured, clock), ("simulated", simulated, model_clock)):
             seen_here = name in run
-            columns[f"{kind}_{word}"] = (
-                _on(grid, cycle, run[name].values) if seen_here else np.full(grid.size, np.nan)
-            )
+            columns[f"{kind}_{word}"] = _on(grid, cycle, run[name].values) if seen_here else np.full(grid.size, np.nan)
     waveforms = xr.Dataset(
         {name: ("cycle", value, {"units": "1"}) for name, value in columns.items()},
         {"cycle": ("cycle", grid, {"long_name": "cycles of excitation", "units": "1"})},
@@ -422,9 +417,7 @@ class MeasuredResponse:
         counts = f"{self.zero_crossings} crossing(s) in {self.cycles:.1f} cycles"
         if self.response_class is ResponseClass.UNKNOWN:
             return f"class not told: {'; '.join(self.reasons)} ({counts})"
-        return (
-            f"{self.response_class.label} ({counts}, {self.zero_crossings_last_quarter} in the last quarter)"
-        )
+        return f"{self.response_class.label} ({counts}, {self.zero_crossings_last_quarter} in the last quarter)"
 
 
 def measure_response(
@@ -512,9 +505,7 @@ def measure_response(
     if longest > max(0.25, 4.0 * typical) and not certain_continuous:
         reasons.append(f"a dropout of {longest:.2f} cycles could hide crossings")
     told = (
-        ResponseClass.UNKNOWN
-        if reasons
-        else ResponseClass(int(classify(crossed.size, late, wanted, -first * final)))
+        ResponseClass.UNKNOWN if reasons else ResponseClass(int(classify(crossed.size, late, wanted, -first * final)))
     )
     return MeasuredResponse(
         response_class=told,
@@ -535,9 +526,7 @@ def _noise(values: _Array, good: NDArray[np.bool_]) -> float:
     whole = good[:-3] & good[1:-2] & good[2:-1] & good[3:]
     thirds = (values[3:] - 3.0 * values[2:-1] + 3.0 * values[1:-2] - values[:-3])[whole]
     if thirds.size < 8:
-        raise InputError(
-            "run: too few neighbouring valid samples to estimate the noise; state noise, in units of b"
-        )
+        raise InputError("run: too few neighbouring valid samples to estimate the noise; state noise, in units of b")
     return float(np.median(np.abs(thirds)) / 0.6745 / math.sqrt(20.0))
 
 

@@ -72,10 +72,7 @@ def test_refusals_are_one_line_and_leave_no_file(recorded, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     result = run(recorded[1], *arguments)
     assert result.exit_code == 2 and message in result.output
-    assert (
-        "Traceback" not in result.output
-        and [file for file in tmp_path.iterdir() if file.suffix != ".png"] == []
-    )
+    assert "Traceback" not in result.output and [file for file in tmp_path.iterdir() if file.suffix != ".png"] == []
 
 
 def test_a_recording_in_which_nothing_is_found_leaves_a_picture_with_rows_and_columns(recorded, tmp_path):

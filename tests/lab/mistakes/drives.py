@@ -37,9 +37,7 @@ def judged(signal, onset=0.1, one=True):
     )
     made = lab.recorded_drive(signal, 20_000.0, measurement=drive)
     highest = 0.5 * np.ptp(made["displacement"].values)
-    assert not one or abs(highest / SIZE - 1.0) < 0.03, (
-        f"drive of {1e6 * highest:.4g} um for {1e6 * SIZE:.4g}"
-    )
+    assert not one or abs(highest / SIZE - 1.0) < 0.03, f"drive of {1e6 * highest:.4g} um for {1e6 * SIZE:.4g}"
     return Outcome(drive.diagnostics, "", ratio)
 
 
@@ -97,9 +95,7 @@ def run(rest=0.0):
     shaker = -1.2 + 0.2 * np.sin(2.0 * np.pi * FREQ * since) * (1.0 - 0.4 * np.exp(-since / 0.01))
     beam = -1.0 + 0.3 * np.sin(2.0 * np.pi * FREQ * since) ** 3
     cycle = {} if rest else {"cycle": FREQ * time}
-    return trajectory_dataset(
-        time, attrs={}, displacement_at_striker=beam, striker_displacement=shaker, **cycle
-    )
+    return trajectory_dataset(time, attrs={}, displacement_at_striker=beam, striker_displacement=shaker, **cycle)
 
 
 def compared_upside_down(folder):

@@ -63,9 +63,7 @@ def jumping(folder):
     camera = lab.SyntheticCamera(frame_rate=FRAME_RATE, pixel_size=PIXEL, shape=(192, 96), lens="disk")
     stage = lab.SyntheticStage(shaker_width=0.8e-3)
     good = lab.render_recording(time, beam, shaker, camera=camera, stage=stage, rest_frames=24)
-    moved = lab.render_recording(
-        time, beam, shaker - 40.0 * PIXEL, camera=camera, stage=stage, rest_frames=24
-    )
+    moved = lab.render_recording(time, beam, shaker - 40.0 * PIXEL, camera=camera, stage=stage, rest_frames=24)
     wrong = (60, 130, 200)
     frames = [(moved if k in wrong else good).frame(k) for k in range(len(good))]
     path = lab.write_photron(

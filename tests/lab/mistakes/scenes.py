@@ -25,16 +25,7 @@ AFTERWARDS = "Pictures that were changed after they were taken"
 
 
 def scene(
-    folder,
-    *,
-    camera=None,
-    stage=None,
-    defects=None,
-    motion=None,
-    rest=24,
-    name="scene.cihx",
-    opened=None,
-    **settings,
+    folder, *, camera=None, stage=None, defects=None, motion=None, rest=24, name="scene.cihx", opened=None, **settings
 ):
     """Draw a scene with a lens that is not the tracker's, write, read and track it."""
     time, beam, shaker, *_ = impacts(4) if motion is None else motion
@@ -49,15 +40,10 @@ def scene(
     )
     path = write(drawn, folder / name)
     at_rest = {"rest_displacement": -BUCKLING_LEVEL} | settings
-    with open_recording(
-        path, **({"frame_rate": FRAME_RATE, "pixel_size": PIXEL} | (opened or {}))
-    ) as recording:
+    with open_recording(path, **({"frame_rate": FRAME_RATE, "pixel_size": PIXEL} | (opened or {}))) as recording:
         tracked = track(recording, **at_rest)
     truth, ratio = drawn.truth, 0.0
-    for value, error in (
-        ("displacement_mm", "displacement_stderr_mm"),
-        ("shaker_displacement_mm", "shaker_stderr_mm"),
-    ):
+    for value, error in (("displacement_mm", "displacement_stderr_mm"), ("shaker_displacement_mm", "shaker_stderr_mm")):
         if value in tracked:
             ratio = max(ratio, off(tracked[value], truth[value].values, tracked[error].values))
     return Outcome(tuple(diagnostics_of(tracked)), "", ratio)
@@ -103,9 +89,7 @@ def denoised(frames):
 def enlarged(frames):
     """Twice as many pixels, each between two that were taken."""
     for axis in (1, 2):
-        after = np.concatenate(
-            [frames.take(range(1, frames.shape[axis]), axis), frames.take([-1], axis)], axis
-        )
+        after = np.concatenate([frames.take(range(1, frames.shape[axis]), axis), frames.take([-1], axis)], axis)
         frames = np.stack([frames, 0.5 * (frames + after)], axis + 1)
         shape = list(frames.shape)
         frames = frames.reshape(*shape[:axis], -1, *shape[axis + 2 :])

@@ -14,10 +14,7 @@ def test_errors_stand_out_in_the_table_of_classes(synthetic_map):
     i, j = rng.integers(0, 40, 300), rng.integers(0, 25, 300)
     kinds = synthetic_map["response_class"].values[i, j].astype(np.int8)
     kinds[np.flatnonzero(kinds == ResponseClass.INTRAWELL)[:2]] = ResponseClass.TRANSIENT_1
-    ratio, velocity = (
-        synthetic_map["frequency_ratio"].values[i],
-        synthetic_map["velocity_amplitude"].values[j],
-    )
+    ratio, velocity = (synthetic_map["frequency_ratio"].values[i], synthetic_map["velocity_amplitude"].values[j])
     points = MeasuredPoints(ratio, velocity, np.full(300, 1 / 2.1), kinds)
     result = compare_measured_points(points, synthetic_map)
     ax = plot_map_comparison(synthetic_map, points, result).axes[1]

@@ -86,9 +86,7 @@ def test_the_video_plays_and_carries_the_edges(tracked, tmp_path):
 
     read, dataset, _ = tracked
     calls = []
-    path = annotated_video(
-        read, dataset, tmp_path / "a.mp4", every=3, progress=lambda done, total: calls.append(done)
-    )
+    path = annotated_video(read, dataset, tmp_path / "a.mp4", every=3, progress=lambda done, total: calls.append(done))
     with av.open(str(path)) as container:
         pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     assert len(pictures) == (len(read) + 2) // 3 and calls[-1] == len(read)

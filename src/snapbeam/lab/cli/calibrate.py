@@ -127,9 +127,7 @@ def calibrate(
     told: tuple[Diagnostic, ...] = ()
     if impacts is not None:
         if effective_mass is None:
-            raise InputError(
-                "effective_mass (--effective-mass): must be given with impacts (--impacts), in kg"
-            )
+            raise InputError("effective_mass (--effective-mass): must be given with impacts (--impacts), in kg")
         tests, told = _contact_tests(impacts, effective_mass)
         given["contact"] = (*given.get("contact", ()), *tests)
     if not given:
@@ -181,9 +179,7 @@ def _shapes(text: str) -> tuple[str, tuple[str, ...]]:
     )
 
 
-def _contact_tests(
-    path: Path, effective_mass: float
-) -> tuple[tuple[ContactTest, ...], tuple[Diagnostic, ...]]:
+def _contact_tests(path: Path, effective_mass: float) -> tuple[tuple[ContactTest, ...], tuple[Diagnostic, ...]]:
     """Contact stiffness from tracked impacts as one test, with its diagnostics."""
     from snapbeam.cli.console import open_result
     from snapbeam.lab.calibration import stiffness_from_impacts
@@ -202,7 +198,5 @@ def _contact_tests(
     duration = HERTZ_TIME * (1.25 * effective_mass / found.stiffness) ** 0.4
     # a test's error of both its numbers gives 2.69 times itself
     share = max(found.stiffness_se / found.stiffness / 2.69, 1e-6)
-    test = ContactTest(
-        closing_speed=1.0, duration=duration, effective_mass=effective_mass, relative_error=share
-    )
+    test = ContactTest(closing_speed=1.0, duration=duration, effective_mass=effective_mass, relative_error=share)
     return (test,), found.diagnostics

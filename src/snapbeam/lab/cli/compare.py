@@ -33,15 +33,11 @@ def compare(
             metavar="MEASURED",
         ),
     ],
-    simulated: Annotated[
-        Path, typer.Argument(help="NetCDF file of a map, or of a run.", metavar="SIMULATED")
-    ],
+    simulated: Annotated[Path, typer.Argument(help="NetCDF file of a map, or of a run.", metavar="SIMULATED")],
     frequency: Annotated[float | None, opt.number_option("Excitation frequency, Hz.", _RUN)] = None,
     start: Annotated[float | None, opt.number_option("Start of the excitation, s.", _RUN)] = None,
     cycles: Annotated[int, opt.count_option("Number of cycles for the response class (200).", _RUN)] = 200,
-    at: Annotated[
-        str, lab.option("Location of the measured displacement: striker or midspan.", _RUN)
-    ] = "striker",
+    at: Annotated[str, lab.option("Location of the measured displacement: striker or midspan.", _RUN)] = "striker",
     channel: lab.Channel = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
@@ -51,9 +47,7 @@ def compare(
     plot: opt.Plot = None,
     overlay: Annotated[
         bool,
-        lab.option(
-            "Superimpose the waveforms of --plot, and draw their difference.", lab.OUTPUT, None, "--overlay"
-        ),
+        lab.option("Superimpose the waveforms of --plot, and draw their difference.", lab.OUTPUT, None, "--overlay"),
     ] = False,
     strict: lab.Strict = False,
 ) -> None:

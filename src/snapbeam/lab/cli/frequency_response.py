@@ -19,9 +19,7 @@ def frequency_response(
     excitation: Annotated[
         str, option("Name of the channel of the excitation, or its number from 0.", _PAIR, "NAME")
     ] = "0",
-    response: Annotated[
-        str, option("Name of the channel of the response, or its number from 0.", _PAIR, "NAME")
-    ] = "1",
+    response: Annotated[str, option("Name of the channel of the response, or its number from 0.", _PAIR, "NAME")] = "1",
     resolution: Annotated[
         float | None, opt.number_option("Distance of the lines, Hz; 31 segments by default.", _PAIR)
     ] = None,
@@ -30,9 +28,7 @@ def frequency_response(
     ] = "h1",
     sampling_frequency: lab.SamplingFreq = None,
     columns: lab.Columns = None,
-    output: Annotated[
-        Path | None, option("NetCDF file to write.", lab.OUTPUT, "FILE", "--output", "-o")
-    ] = None,
+    output: Annotated[Path | None, option("NetCDF file to write.", lab.OUTPUT, "FILE", "--output", "-o")] = None,
     plot: opt.Plot = None,
     strict: lab.Strict = False,
 ) -> None:

@@ -34,8 +34,7 @@ def option(about: str, panel: str, metavar: str | None = None, *names: str) -> A
 SignalFile = Annotated[
     Path,
     typer.Argument(
-        help="Text table, WAV, UFF-58, TDMS, LVM, MATLAB, HDF5 or NumPy file of a time series.",
-        metavar="SIGNAL",
+        help="Text table, WAV, UFF-58, TDMS, LVM, MATLAB, HDF5 or NumPy file of a time series.", metavar="SIGNAL"
     ),
 ]
 Channel = Annotated[str | None, option("Name of the channel, or its number from 0.", _SIGNAL, "NAME")]
@@ -47,9 +46,7 @@ Sensitivity = Annotated[
         _SIGNAL,
     ),
 ]
-SamplingFreq = Annotated[
-    float | None, opt.number_option("Sampling frequency, Hz, if the file has none.", _SIGNAL)
-]
+SamplingFreq = Annotated[float | None, opt.number_option("Sampling frequency, Hz, if the file has none.", _SIGNAL)]
 Columns = Annotated[
     str | None,
     option(
@@ -95,12 +92,7 @@ def open_signal(
         names = [entry["name"] for entry in read_channels(path, sampling_frequency, columns)]
         chosen = channel if channel in names else int(channel)
     return read_signal(
-        path,
-        chosen,
-        units=units,
-        sensitivity=sensitivity,
-        sampling_frequency=sampling_frequency,
-        columns=columns,
+        path, chosen, units=units, sensitivity=sensitivity, sampling_frequency=sampling_frequency, columns=columns
     )
 
 

@@ -91,25 +91,18 @@ def process_tests(
     results = run_test_series(folder, wanted, target, table=table, strict=strict, progress=_tell)
     spoiled = [result for result in results if result.status == "spoiled"]
     short = [result for result in results if result.status == TOO_SHORT]
-    console.print(
-        f"{len(results)} tests, {len(spoiled)} spoiled" + (f", {len(short)} too short" if short else "")
-    )
+    console.print(f"{len(results)} tests, {len(spoiled)} spoiled" + (f", {len(short)} too short" if short else ""))
     import matplotlib
 
     matplotlib.use("Agg")
     from snapbeam.lab.plot.process_tests import plot_test_series
     from snapbeam.plot.style import save_figure
 
-    files = [
-        target / "tests.csv",
-        save_figure(plot_test_series(results, target / "tests"), target / "tests.png"),
-    ]
+    files = [target / "tests.csv", save_figure(plot_test_series(results, target / "tests"), target / "tests.png")]
     if simulated is not None and len(spoiled) + len(short) < len(results):
         files.append(_on_map(target, simulated))
     files.append(write_page(target / "tests.html", results, wanted, files[1:]))
-    add_json(
-        tests=[asdict(result) for result in results], spoiled=len(spoiled), too_short=len(short), files=files
-    )
+    add_json(tests=[asdict(result) for result in results], spoiled=len(spoiled), too_short=len(short), files=files)
     for path in files:
         console.print(f"Written: {file_line(path)}")
     if len(spoiled) == len(results):

@@ -308,7 +308,5 @@ def _picture(path: Path, recording: Recording) -> Any:
     if image.shape == recording.shape:
         return image
     if image.shape[0] < bottom or image.shape[1] < right:
-        raise InputError(
-            f"background = {str(path)!r}: of shape {image.shape}, smaller than the recording's region"
-        )
+        raise InputError(f"background = {str(path)!r}: of shape {image.shape}, smaller than the recording's region")
     return image[top:bottom, left:right]

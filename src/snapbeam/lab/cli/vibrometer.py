@@ -85,9 +85,7 @@ def vibrometer(
     console.print(f"  amplitude    {fit.amplitude:.6g} +- {fit.amplitude_se:.1g} {drive.units}")
     console.print(f"  phase        {fit.phase:.5g} +- {fit.phase_se:.1g} rad at time 0")
     console.print(f"  noise        {fit.snr:.1f} dB below the sine; with distortion {fit.sinad:.1f} dB")
-    console.print(
-        f"  distortion   {100.0 * fit.distortion:.3f} % (noise alone: {100.0 * fit.distortion_floor:.3f} %)"
-    )
+    console.print(f"  distortion   {100.0 * fit.distortion:.3f} % (noise alone: {100.0 * fit.distortion_floor:.3f} %)")
     console.print(f"  start-up     {summary['startup']}")
     if acceleration is None and (amplitude is None or frequency is None):
         console.print(

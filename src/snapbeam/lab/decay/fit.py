@@ -94,9 +94,7 @@ def fit_decay(
                 parts.append(np.array([(value["s0"] / square - known[0]) / known[1]]))
         return np.concatenate(parts)
 
-    search = lmfit.Minimizer(
-        lambda p: residual(p.valuesdict()), parameters, scale_covar=False, calc_covar=False
-    )
+    search = lmfit.Minimizer(lambda p: residual(p.valuesdict()), parameters, scale_covar=False, calc_covar=False)
     value = dict(search.leastsq(xtol=1e-9, ftol=1e-9).params.valuesdict())
     design = _design(t, value, len(guesses), soften, law)
     solution = solve(design, y, 1e-12)
@@ -126,11 +124,7 @@ def fit_decay(
                 softening=value[f"s{i}"] / first**2 if soften else 0.0,
                 softening_se=error[f"s{i}"] * stretch / first**2 if soften else 0.0,
                 method="fit",
-                damping=_VISCOUS
-                if i
-                else law._replace(strength=value["h"], strength_se=error["h"])
-                if named
-                else law,
+                damping=_VISCOUS if i else law._replace(strength=value["h"], strength_se=error["h"]) if named else law,
             )
         )
     rms = math.sqrt(float(rest @ rest) / max(y.size - free, 1))
@@ -144,11 +138,7 @@ def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, softe
     first = modes[0].amplitude ** 2
     value = {name: mean for name, (mean, _) in law_priors(units).items()}
     for i, mode in enumerate(modes):
-        value |= {
-            f"f{i}": mode.natural_frequency,
-            f"z{i}": mode.damping_ratio,
-            f"s{i}": mode.softening * first,
-        }
+        value |= {f"f{i}": mode.natural_frequency, f"z{i}": mode.damping_ratio, f"s{i}": mode.softening * first}
     design = _design(t, value, len(modes), soften, modes[0].damping)
     solution = solve(design, samples.values, 1e-12)
     rest = samples.values - design @ solution

@@ -31,7 +31,9 @@ from snapbeam.util.singular_values import polyfit
 from snapbeam.util.validation import InputError
 
 _MISFIT = 1.7  # times the noise that a fit may leave near the first mode
-_BEATS = 2.0  # times the noise that amplitudes of cycles must scatter about any monotone damping for two modes that beat
+_BEATS = (
+    2.0  # times the noise that amplitudes of cycles must scatter about any monotone damping for two modes that beat
+)
 _UNTOLD = 0.45  # of the damping ratio, where amplitudes show a law that the record does not
 _CANCEL = 1.0  # of the range of a record that the amplitude of a mode may reach; more is cancelled by another
 _MANY = 12_000  # samples from which a record is thinned before it is fitted
@@ -166,12 +168,7 @@ def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> boo
 
 
 def _with_law(
-    samples: SignalSamples,
-    result: FitResult,
-    left: float,
-    settings: FitSettings,
-    law: DampingLaw,
-    lowest: float,
+    samples: SignalSamples, result: FitResult, left: float, settings: FitSettings, law: DampingLaw, lowest: float
 ) -> tuple[FitResult, float, list[Diagnostic]]:
     """The fit with a second law of damping where that is told apart and leaves less; else as it was."""
     try:
@@ -255,11 +252,7 @@ def _own_cycles(samples: SignalSamples, noise: float, result: FitResult, otherwi
 
 
 def _with_close_mode(
-    samples: SignalSamples,
-    result: FitResult,
-    near: list[Pole],
-    settings: FitSettings,
-    diagram: Stabilisation | None,
+    samples: SignalSamples, result: FitResult, near: list[Pole], settings: FitSettings, diagram: Stabilisation | None
 ) -> tuple[FitResult | None, Stabilisation | None]:
     """The fit with one mode more, close to the first, if the pencil sees one and it explains what is left."""
     first = result.modes[0].natural_frequency

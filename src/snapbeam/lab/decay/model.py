@@ -45,7 +45,9 @@ _RARE, _RARER = (
     3.0,
     2.0,
 )  # logarithm of how much rarer than viscous damping alone dry friction or drag, and free forms, are
-_RAREST = 8.0  # the same of free forms that fall with amplitude, over those that rise: what falls is mostly dry friction
+_RAREST = (
+    8.0  # the same of free forms that fall with amplitude, over those that rise: what falls is mostly dry friction
+)
 _SIZE = 2.0  # of the viscous rate: a term of a form at the start, to a standard deviation
 _POWERS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
 _SCALES = (0.1, 0.15, 0.25, 0.4, 0.6, 1.0)
@@ -199,9 +201,7 @@ def _band(samples: SignalSamples, frequency: float) -> _Array:
     high = min(1.5 * frequency, 0.49 * samples.sampling_frequency)
     sections = butter(3, (0.5 * frequency, high), "bandpass", fs=samples.sampling_frequency, output="sos")
     pad = min(samples.values.size - 1, int(3 * samples.sampling_frequency / frequency))
-    return np.asarray(
-        sosfiltfilt(sections, samples.values - samples.values.mean(), padlen=pad), dtype=np.float64
-    )
+    return np.asarray(sosfiltfilt(sections, samples.values - samples.values.mean(), padlen=pad), dtype=np.float64)
 
 
 def hilbert_cycles(samples: SignalSamples, frequency: float, sigma: float) -> Cycles:
@@ -311,9 +311,7 @@ def regress(cycles: Cycles, start: float, units: str, method: str, soften: bool 
     )
 
 
-def _solve(
-    cycles: Cycles, start: float, q: float, r: float, soften: bool
-) -> tuple[_Array, float, float, _Array]:
+def _solve(cycles: Cycles, start: float, q: float, r: float, soften: bool) -> tuple[_Array, float, float, _Array]:
     """(omega_d, delta, ln a_0, s), phase at the start, the rate of decay, and the variances of the four."""
     t = cycles.time - start
     log_a = np.log(cycles.amplitude)
@@ -402,9 +400,7 @@ def _terms(x: _Array) -> _Array:
     """Terms of zeta over amplitude x, 1 at the start: of dry friction, of drag, and curves that rise ever later."""
     rising = [x**power for power in _POWERS]
     levelling = [
-        np.expm1(-((x / scale) ** power)) / math.expm1(-(scale**-power))
-        for scale in _SCALES
-        for power in (1.0, 2.0)
+        np.expm1(-((x / scale) ** power)) / math.expm1(-(scale**-power)) for scale in _SCALES for power in (1.0, 2.0)
     ]
     return np.column_stack([1.0 / x, x, *rising, *levelling])
 
@@ -465,9 +461,7 @@ def find_law(
     return DampingLaw(name, strength, error), doubt(float(usual.found[2]), float(usual.spread[2])), unit
 
 
-def _regressions(
-    design: _Array, aim: _Array, weight: _Array, bend: tuple[float, float]
-) -> tuple[list[_Form], float]:
+def _regressions(design: _Array, aim: _Array, weight: _Array, bend: tuple[float, float]) -> tuple[list[_Form], float]:
     """Regressions of all forms, the first three of viscous, dry and quadratic damping, and what they leave over the noise.
 
     What any smooth curve of time explains better is no noise, and widens all.
@@ -475,11 +469,7 @@ def _regressions(
     heavy, right = design * weight[:, None], aim * weight
     gram, moment, total = heavy.T @ heavy, heavy.T @ right, float(right @ right)
     rising = range(2, design.shape[1] - 3)
-    groups: list[list[tuple[int, ...]]] = [
-        [()],
-        [(0,), (1,), *((k,) for k in rising)],
-        list(combinations(rising, 2)),
-    ]
+    groups: list[list[tuple[int, ...]]] = [[()], [(0,), (1,), *((k,) for k in rising)], list(combinations(rising, 2))]
     share = np.cumsum(weight**2) / float(weight @ weight)
     curves = np.polynomial.legendre.legvander(2.0 * share - 1.0, _SMOOTH) * weight[:, None]
     onto = np.linalg.qr(curves)[0].T
@@ -502,9 +492,7 @@ def _regressions(
                 gone = smooth - heavy_smooth[:, used[k]] @ found[k]
                 least = float(chi[k]), float(gone @ gone)
             extra = found[:, 3:]
-            sound = (found[:, 2] > 0.0) & (
-                (extra >= 0.0).all(1) | ((extra <= 0.0).all(1) & (used[:, -1] > 3))
-            )
+            sound = (found[:, 2] > 0.0) & ((extra >= 0.0).all(1) | ((extra <= 0.0).all(1) & (used[:, -1] > 3)))
             evidence = -0.5 * (chi / unit + (((found - mean) / spread) ** 2).sum(1))
             evidence -= 0.5 * np.linalg.slogdet(precision)[1] + float(np.log(spread).sum())
             rare = _RARER + math.log(2.0 * len(sets))
@@ -602,10 +590,7 @@ class WellComparison:
 
 
 def compare_wells(
-    lower: DecayFit | float,
-    upper: DecayFit | float,
-    lower_se: float | None = None,
-    upper_se: float | None = None,
+    lower: DecayFit | float, upper: DecayFit | float, lower_se: float | None = None, upper_se: float | None = None
 ) -> WellComparison:
     """Compare the first natural frequency about the two wells.
 

@@ -109,9 +109,7 @@ def find_poles(samples: SignalSamples, noise: float) -> tuple[list[Pole], Stabil
     return sorted(weighed, key=lambda pole: -pole.energy), diagram
 
 
-def _stage(
-    samples: SignalSamples, low: float, high: float
-) -> tuple[list[Pole], list[tuple[int, float, float, bool]]]:
+def _stage(samples: SignalSamples, low: float, high: float) -> tuple[list[Pole], list[tuple[int, float, float, bool]]]:
     """Stable poles of one stage between two frequencies [Hz], and its part of the diagram."""
     values = samples.values - samples.values.mean()
     n = values.size

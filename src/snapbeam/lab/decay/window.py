@@ -192,8 +192,7 @@ def courses(cycles: Cycles, frequency: float) -> list[Hypothesis]:
     turns = 2.0 * math.pi * frequency * float(t[-1])
     line, creep = [np.ones_like(x), x], [x * x]
     soft, drag, friction = (
-        [cumulative_trapezoid(a**power, x, initial=0.0) for power in powers]
-        for powers in ((2, 4), (1,), (-1,))
+        [cumulative_trapezoid(a**power, x, initial=0.0) for power in powers] for powers in ((2, 4), (1,), (-1,))
     )
 
     def left(aim: _Array, columns: list[_Array]) -> tuple[float, _Array]:
@@ -354,9 +353,7 @@ def _decay_rate(samples: SignalSamples, frequency: float) -> float:
     return max(2.0 * math.pi * mode.natural_frequency * mode.damping_ratio, 0.0)
 
 
-def _on_course(
-    samples: SignalSamples, frequency: float, known: bool
-) -> tuple[SignalSamples, Doubt, list[Diagnostic]]:
+def _on_course(samples: SignalSamples, frequency: float, known: bool) -> tuple[SignalSamples, Doubt, list[Diagnostic]]:
     """The decay without what a stop or a creeping frequency does to it, and the doubt that is left."""
     cycles = _cycles(samples, frequency)
     told = [] if cycles is None else courses(cycles, frequency)
@@ -398,10 +395,7 @@ def _undisturbed(samples: SignalSamples, frequency: float) -> tuple[SignalSample
     before, after = at - margin, samples.values.size - at - margin
     least = 1.5 * _LEAST_CYCLES * samples.sampling_frequency / frequency
     early = before >= least and before >= 0.4 * after
-    kept, side = (
-        samples.part(slice(0, before) if early else slice(at + margin, None)),
-        "before" if early else "after",
-    )
+    kept, side = (samples.part(slice(0, before) if early else slice(at + margin, None)), "before" if early else "after")
     if max(before, after) < least:
         kept, side = samples, "about"
     return kept, [KINDS_DECAY["disturbed"].found(told=side, at=jump[0], jump_percent=percent)]
@@ -429,17 +423,11 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
     if asked is None and count == 1:
         center = dominant(samples)
         if center * span < 8.0:
-            raise InputError(
-                f"signal spans {center * span:.1f} cycles of {center:g} Hz: must span at least 8"
-            )
+            raise InputError(f"signal spans {center * span:.1f} cycles of {center:g} Hz: must span at least 8")
         _stands_out(samples, center, sigma)
         return Centres([center], [], [], [], None, [])
     poles, diagram = find_poles(samples, sigma)
-    modes = [
-        one
-        for one in poles
-        if one.energy > ENERGY and one.damping_ratio > -1e-3 and one.frequency * span >= 8.0
-    ]
+    modes = [one for one in poles if one.energy > ENERGY and one.damping_ratio > -1e-3 and one.frequency * span >= 8.0]
     told: list[Diagnostic] = []
     wanted: list[float] = []
     own: list[Pole] = []

@@ -203,20 +203,14 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
             label=rf"within {result.apart:.2g} $b$",
         )  # fmt: skip
         bottom.plot(cycle, difference, color=BEAM_COLOR, linewidth=0.7)
-        bottom.set(
-            xlabel=r"Cycles of excitation $\tau$", ylabel="difference ($b$)", xlim=(cycle[0], cycle[-1])
-        )
+        bottom.set(xlabel=r"Cycles of excitation $\tau$", ylabel="difference ($b$)", xlim=(cycle[0], cycle[-1]))
         if cycle[0] <= result.parted <= cycle[-1]:
             for ax in (top, middle, bottom):
                 ax.axvline(result.parted, color="0.45", linewidth=0.8, dashes=(2, 2))
         parted = "they never part" if np.isnan(result.parted) else f"they part at cycle {result.parted:.1f}"
         top.set_title(
             f"{parted}; RMS difference {result.rms_difference:.3f} $b$, correlation {result.correlation:.3f}"
-            + (
-                ""
-                if np.isnan(result.within)
-                else f"; {100.0 * result.within:.0f} % of the samples in the band"
-            ),
+            + ("" if np.isnan(result.within) else f"; {100.0 * result.within:.0f} % of the samples in the band"),
             loc="left",
         )
         parts = [ax.get_legend_handles_labels() for ax in (top, bottom)]

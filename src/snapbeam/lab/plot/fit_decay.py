@@ -68,9 +68,7 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
         left.semilogy(fit.envelope_time, scale * fit.envelope, ".", color=BEAM_COLOR, markersize=3)
         left.semilogy(time, scale * envelope, color=SHAKER_COLOR)
         left.set(xlabel="Time (s)", ylabel=f"Amplitude of a cycle ({unit})")
-        left.set_title(
-            f"damping ratio {mode.damping_ratio:.5f} $\\pm$ {mode.damping_ratio_se:.5f}", loc="left"
-        )
+        left.set_title(f"damping ratio {mode.damping_ratio:.5f} $\\pm$ {mode.damping_ratio_se:.5f}", loc="left")
 
         right = figure.add_subplot(grid[1, 1])
         right.errorbar(
@@ -86,9 +84,7 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
         )  # fmt: skip
         right.set(xlabel=f"Amplitude ({unit})", ylabel="Frequency (Hz)")
         right.margins(x=0.03)
-        right.set_title(
-            f"$f_0$ = {mode.natural_frequency:.3f} $\\pm$ {mode.natural_frequency_se:.3f} Hz", loc="left"
-        )
+        right.set_title(f"$f_0$ = {mode.natural_frequency:.3f} $\\pm$ {mode.natural_frequency_se:.3f} Hz", loc="left")
         right.legend(loc="best")
         fix_ticks(top, left, right)
     return figure

@@ -88,9 +88,7 @@ def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
     codes = dict.fromkeys(code for code, severity, _ in result.diagnostics if severity != "info")
     if told:
         lines = textwrap.wrap(f"{result.status}: {result.reason}", _WIDTH)
-        text = "\n".join(
-            lines if len(lines) <= _LINES else [*lines[: _LINES - 1], lines[_LINES - 1] + " ..."]
-        )
+        text = "\n".join(lines if len(lines) <= _LINES else [*lines[: _LINES - 1], lines[_LINES - 1] + " ..."])
         ax.text(0.04, 0.93, text, transform=ax.transAxes, fontsize=4.2, va="top", color=SHAKER_COLOR)
     elif codes:
         low, high = ax.get_ylim()

@@ -75,9 +75,7 @@ def found_edges(dataset: xr.Dataset, index: int, shape: tuple[int, int]) -> list
 
 def flag_words(flags: int) -> str:
     """The flags of a frame in words."""
-    names = [
-        str(flag.name).lower().replace("_", " ") for flag in FrameFlag if flag and flag in FrameFlag(flags)
-    ]
+    names = [str(flag.name).lower().replace("_", " ") for flag in FrameFlag if flag and flag in FrameFlag(flags)]
     return ", ".join(names) or "measured"
 
 
@@ -117,9 +115,7 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
     return figure
 
 
-def plot_first_look(
-    recording: Recording, look: FirstLook, settings: TrackingSettings, index: int = 0
-) -> Figure:
+def plot_first_look(recording: Recording, look: FirstLook, settings: TrackingSettings, index: int = 0) -> Figure:
     """One frame that was not tracked: objects at the threshold, and the regions in which a beam was found."""
     picture = recording.frame(index)
     with figure_style():
@@ -128,13 +124,8 @@ def plot_first_look(
         axes.contour(smooth, [look.level], colors=SHAKER_MARK, linewidths=0.4)
         axes.plot([], [], color=SHAKER_MARK, label=f"threshold {look.level:.4g}")
         for (top, bottom, left, right), words in look.options.items():
-            x, y = (
-                np.array([left, right]) - recording.region[2],
-                np.array([top, bottom]) - recording.region[0],
-            )
-            axes.plot(
-                x[[0, 1, 1, 0, 0]] - 0.5, y[[0, 0, 1, 1, 0]] - 0.5, color=BEAM_MARK, lw=1.2, label=words
-            )
+            x, y = (np.array([left, right]) - recording.region[2], np.array([top, bottom]) - recording.region[0])
+            axes.plot(x[[0, 1, 1, 0, 0]] - 0.5, y[[0, 0, 1, 1, 0]] - 0.5, color=BEAM_MARK, lw=1.2, label=words)
         axes.set_title(f"frame {index}, not tracked, side = {settings.side}")
         figure.legend(loc="outside lower center", handlelength=1.8)
     return figure
@@ -247,8 +238,7 @@ def annotated_video(
     dataset = check_tracked(dataset)
     if int(recording.numbers[-1]) + 1 != dataset.sizes["time"]:
         raise InputError(
-            f"dataset of {dataset.sizes['time']} frames: {recording.path} ends with frame "
-            f"{recording.numbers[-1]}"
+            f"dataset of {dataset.sizes['time']} frames: {recording.path} ends with frame {recording.numbers[-1]}"
         )
     low, high = (float(level) for level in np.percentile(recording.frame(0), (0.2, 99.8)))
     canvas = _Canvas(recording.shape, dataset, low, max(high, low + 1.0))

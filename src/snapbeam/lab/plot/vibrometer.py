@@ -99,8 +99,7 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
         right.set(xlabel="Frequency (Hz)", ylabel="Level (dB of the sine)", ylim=(floor - 25.0, 5.0))
         right.set_xlim(0.0, min(rate / 2.0, fit.frequency * (count + 1.5)))
         right.set_title(
-            f"SNR {fit.snr:.1f} dB, with distortion {fit.sinad:.1f} dB, THD {100.0 * fit.distortion:.2f} %",
-            loc="right",
+            f"SNR {fit.snr:.1f} dB, with distortion {fit.sinad:.1f} dB, THD {100.0 * fit.distortion:.2f} %", loc="right"
         )
         fix_ticks(top, left, right)
     return figure

@@ -372,9 +372,7 @@ def never_touching(penetration: np.ndarray, rows: TrackedRows) -> float:
     if not known.any() or not seen.any() or np.ptp(np.percentile(row[seen], (0.5, 99.5))) <= 2.0:
         return 0.0
     closest = -float(np.percentile(penetration[known], 99.5))
-    least = (
-        _CLOSE if rows.flagged(FrameFlag.MERGED) else _NEAR
-    )  # a tip that merges with the beam is not seen closer
+    least = _CLOSE if rows.flagged(FrameFlag.MERGED) else _NEAR  # a tip that merges with the beam is not seen closer
     return closest if closest > least else 0.0
 
 
@@ -456,9 +454,7 @@ def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float)
 
 def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Diagnostic]:
     if shape.clipped > CLIPPED:
-        return [
-            KINDS["overexposed"].found(share_percent=100.0 * shape.clipped, shift_px=2.0 * abs(shape.shift))
-        ]
+        return [KINDS["overexposed"].found(share_percent=100.0 * shape.clipped, shift_px=2.0 * abs(shape.shift))]
     if abs(shape.shift) > 0.02:
         gamma = settings.gamma * shape.gamma
         error = settings.gamma * shape.gamma_se

@@ -73,9 +73,7 @@ def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
     return _frames(off, alone, wave, whole, first) or _steps(part, off, noise, fit.frequency)
 
 
-def _frames(
-    off: Floats, alone: Floats, wave: Floats, noise: float, first: int
-) -> list[tuple[str, dict[str, float]]]:
+def _frames(off: Floats, alone: Floats, wave: Floats, noise: float, first: int) -> list[tuple[str, dict[str, float]]]:
     """Frames shown again, and frames exchanged with the next, from the residual and that without its slow part."""
     before, after = wave[:-2] - wave[1:-1], wave[2:] - wave[1:-1]
     limit = float(chi2.isf(_RATE / off.size, 1)) * noise**2
@@ -97,9 +95,7 @@ def _frames(
     return told
 
 
-def _steps(
-    part: SignalSamples, off: Floats, noise: float, frequency: float
-) -> list[tuple[str, dict[str, float]]]:
+def _steps(part: SignalSamples, off: Floats, noise: float, frequency: float) -> list[tuple[str, dict[str, float]]]:
     """A step of the time, or of the rows, from some frame on."""
     turn = 2.0 * np.pi * frequency * part.time
     wave = np.column_stack([np.cos(turn), np.sin(turn)])
@@ -144,7 +140,5 @@ def _jitter(off: Floats, slope: Floats) -> list[tuple[str, dict[str, float]]]:
     slow, fast = (float(np.median(off[part] ** 2)) / 0.455 for part in (order[:third], order[-third:]))
     if fast < slow * float(f.isf(_RATE, third / _MEDIAN, third / _MEDIAN)):
         return []
-    frames = math.sqrt(
-        (fast - slow) / float(np.mean(slope[order[-third:]] ** 2) - np.mean(slope[order[:third]] ** 2))
-    )
+    frames = math.sqrt((fast - slow) / float(np.mean(slope[order[-third:]] ** 2) - np.mean(slope[order[:third]] ** 2)))
     return [("scattered", {"size": frames})] if frames > _JITTER else []

@@ -62,9 +62,7 @@ def first_look(recording: Recording, settings: TrackingSettings) -> FirstLook:
         option = _tried(frames[:, top:bottom, left:right], settings.changed(threshold=threshold), recording)
         if option is None:
             continue
-        ends_of_rows, ends_of_columns = turn.back(
-            np.array([top, bottom - 1.0]), np.array([left, right - 1.0])
-        )
+        ends_of_rows, ends_of_columns = turn.back(np.array([top, bottom - 1.0]), np.array([left, right - 1.0]))
         first, last, left, right = (
             int(end) + start
             for ends, start in ((ends_of_rows, recording.region[0]), (ends_of_columns, recording.region[2]))

@@ -66,9 +66,7 @@ def find_order(row: Floats, shaker: Floats) -> FrameOrder:
             many.append(int(best[at]))
         size[max(at - _HALVES[0] + 1, 0) : at + _HALVES[0]] = 0.0
     order = np.argsort(missing)
-    return FrameOrder(
-        tuple(sorted(repeated)), tuple(missing[k] for k in order), tuple(many[k] for k in order)
-    )
+    return FrameOrder(tuple(sorted(repeated)), tuple(missing[k] for k in order), tuple(many[k] for k in order))
 
 
 def without_repeats(rows: TrackedRows, order: FrameOrder) -> TrackedRows:

@@ -294,10 +294,7 @@ def _beside(values: Floats, used: NDArray[np.intp], noise: float) -> float:
         return 0.0
     middle = float(values[used].mean())
     sides = [values[max(used[0] - short, 0) : used[-1] + 1], values[used[0] : used[-1] + 1 + short]]
-    return min(
-        (float(np.abs(side - middle).max()) / noise for side in sides if side.size == _QUIET),
-        default=math.inf,
-    )
+    return min((float(np.abs(side - middle).max()) / noise for side in sides if side.size == _QUIET), default=math.inf)
 
 
 def _still(values: Floats, length: int, noise: float) -> NDArray[np.bool_]:
@@ -430,9 +427,7 @@ def _first_band(level: Floats, thickness: float, longest: float) -> Floats:
     """
     out = np.full(level.shape[0], np.nan)
     for k, solid in enumerate(level > 0.0):
-        bands = (
-            first for first, last in stretches(solid) if 0.6 * thickness <= last - first <= longest and first
-        )
+        bands = (first for first, last in stretches(solid) if 0.6 * thickness <= last - first <= longest and first)
         out[k] = next(bands, np.nan) - 0.5
     return out
 
@@ -477,11 +472,7 @@ class ShakerRows(NamedTuple):
 
 
 def sticker_rows(
-    view: BeamView,
-    sticker: Sticker,
-    frames: NDArray[np.floating],
-    near: Floats,
-    tip_offset: float | None = None,
+    view: BeamView, sticker: Sticker, frames: NDArray[np.floating], near: Floats, tip_offset: float | None = None
 ) -> ShakerRows:
     """Rows of the sticker's middle in turned frames.
 
@@ -523,11 +514,7 @@ class _Edges(NamedTuple):
 
 
 def _both_edges(
-    view: BeamView,
-    sticker: Sticker,
-    frames: NDArray[np.floating],
-    near: Floats,
-    tip_offset: float | None,
+    view: BeamView, sticker: Sticker, frames: NDArray[np.floating], near: Floats, tip_offset: float | None
 ) -> _Edges:
     columns = sticker.columns
     half = int(np.clip(sticker.thickness // 2, 2, HALF))
@@ -628,9 +615,7 @@ class Follower:
         self._last: NDArray | None = None
         self._border = {"beam": False, "shaker": False}
 
-    def add(
-        self, frames: NDArray[np.floating], beam: BeamRows, tip: ShakerRows | None, drift: Drift | None
-    ) -> None:
+    def add(self, frames: NDArray[np.floating], beam: BeamRows, tip: ShakerRows | None, drift: Drift | None) -> None:
         """Add the measurements of a batch of turned frames; *drift* of the camera is taken out."""
         view, height = self.scene.beam, frames.shape[1]
         leaving = self._leaving("beam", beam.row, height)
@@ -694,18 +679,12 @@ class Follower:
         found = _with_missing(found, numbers)
         flags, row, shaker = found["flags"], found["row"], found["shaker"]
         miss, odd = distortion(
-            found["thickness"],
-            found["residual"],
-            found["width"],
-            self.scene.beam.edge_width,
-            self.scene.row_errors[0],
+            found["thickness"], found["residual"], found["width"], self.scene.beam.edge_width, self.scene.row_errors[0]
         )
         odd &= np.isfinite(row)
         flags[odd] |= np.uint16(FrameFlag.DISTORTED)
         blur = unexplained_blur(row, found["width"], self.scene.beam.edge_width, self.blur_limit)
-        error = np.hypot(
-            pooled(found["error"]), np.where(odd, np.fmax(miss, _SMEARED * blur), _SMEARED * blur)
-        )
+        error = np.hypot(pooled(found["error"]), np.where(odd, np.fmax(miss, _SMEARED * blur), _SMEARED * blur))
         shaker_error = np.hypot(pooled(found["shaker_error"]), _SMEARED * blur)
         row[odd & (miss > KEPT)] = np.nan
         strays = jumps(row)
@@ -856,9 +835,7 @@ def _within_windows(windows: Floats, position: Floats, width: float, centre: Flo
 
 
 _SURE_LAG = 4.0  # standard errors
-_LAG = (
-    0.04  # of the square of the speed by which the square of the blur must exceed what the exposure explains
-)
+_LAG = 0.04  # of the square of the speed by which the square of the blur must exceed what the exposure explains
 
 
 def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> tuple[float, float]:

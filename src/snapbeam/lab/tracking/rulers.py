@@ -101,14 +101,14 @@ def compare_rulers(rulers: Sequence[Ruler]) -> tuple[Severity, str, dict[str, fl
         words = f"{option_name(wrong.name)} disagrees with {listed}: a pixel size of {wrong}, and of {second} by those"
     else:
         first, second = max(pairs, key=lambda pair: abs(math.log(pair[0].size / pair[1].size)))
-        words = f"{option_name(first.name)} and {option_name(second.name)} disagree: pixel sizes of {first} and {second}"
+        words = (
+            f"{option_name(first.name)} and {option_name(second.name)} disagree: pixel sizes of {first} and {second}"
+        )
     ratio = first.size / second.size
     error = math.hypot(first.error, second.error)
     near = min(_FACTORS, key=lambda factor: abs(abs(math.log(ratio)) - math.log(factor)))
     unit = abs(abs(math.log(ratio)) - math.log(near)) < max(_SURE * error, _EXPLAINED)
     words += f", a factor {_FACTORS[near]}" if unit else f", a factor of {ratio:.4g}"
     numbers = {"ratio": ratio, "error": ratio * error}
-    numbers |= {
-        f"pixel_size_um_by_{one.name}".replace("_by_pixel_size", ""): 1e6 * one.size for one in rulers
-    }
+    numbers |= {f"pixel_size_um_by_{one.name}".replace("_by_pixel_size", ""): 1e6 * one.size for one in rulers}
     return (Severity.ERROR if unit else Severity.WARNING), words, numbers

@@ -233,9 +233,7 @@ class TrackingSettings:
         if self.rest_frames[1] == 0:
             stop = frames
         if not 0 <= first < stop <= frames:
-            raise InputError(
-                f"rest_frames = {self.rest_frames}: must be (first, last + 1) within the {frames} frames"
-            )
+            raise InputError(f"rest_frames = {self.rest_frames}: must be (first, last + 1) within the {frames} frames")
         return first, stop
 
     @property
@@ -476,9 +474,7 @@ class Scene:
     def row_errors(self) -> tuple[float, float]:
         """Standard error [px] of an edge by what all pixels of a row have in common, and by the fixed part of it."""
         rows = (self.noise.rows, self.noise.fixed_rows)
-        first, second = (
-            edge_noise(self.beam.edge_width, one, self.beam.contrast) if one else 0.0 for one in rows
-        )
+        first, second = (edge_noise(self.beam.edge_width, one, self.beam.contrast) if one else 0.0 for one in rows)
         return first, second
 
     @property
@@ -545,9 +541,7 @@ _ADVICE = {
         "light saturates the edge; turn the lamp or choose other columns (contact_column, --contact-column)"
     ),
     FrameFlag.MERGED: "beam and shaker touch and the shaker shows no edge of its own; put a sticker on it",
-    FrameFlag.LOW_CONTRAST: (
-        "the edge is too faint; add light or set objects (--objects) and threshold (--threshold)"
-    ),
+    FrameFlag.LOW_CONTRAST: ("the edge is too faint; add light or set objects (--objects) and threshold (--threshold)"),
     FrameFlag.OUT_OF_REGION: "the object left the region; make region (--region) taller",
     FrameFlag.JUMP: (
         "the position leaves its neighbours for a frame or few and comes back: something else was taken for "

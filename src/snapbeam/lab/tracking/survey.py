@@ -190,13 +190,7 @@ _GAMMAS = np.exp(np.linspace(math.log(0.25), math.log(4.0), 81))
 
 
 def edge_shape(
-    windows: Floats,
-    centre: Floats,
-    fit: EdgeFit,
-    good: NDArray[np.bool_],
-    width: float,
-    sign: float,
-    clipped: float,
+    windows: Floats, centre: Floats, fit: EdgeFit, good: NDArray[np.bool_], width: float, sign: float, clipped: float
 ) -> EdgeShape:
     """Judge the mean edge of many windows.
 
@@ -291,9 +285,7 @@ def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
     return float(found.fun), float(found.x)
 
 
-def _binned(
-    offset: Floats, share: Floats, groups: tuple[NDArray[np.intp], ...]
-) -> tuple[Floats, Floats, Floats]:
+def _binned(offset: Floats, share: Floats, groups: tuple[NDArray[np.intp], ...]) -> tuple[Floats, Floats, Floats]:
     """Mean offset, mean share and its standard error in steps of a fraction of a pixel.
 
     Windows of one frame, one column or one row may be off together, by uneven light, speckle or noise of rows: the
@@ -377,8 +369,7 @@ def placed(
     half = min(half, centre - 2.0, width - 3.0 - centre)
     if half < 2.0:
         raise InputError(
-            f"contact_column (--contact-column) = {centre:g}: must leave at least 4 columns on both sides in "
-            "the region"
+            f"contact_column (--contact-column) = {centre:g}: must leave at least 4 columns on both sides in the region"
         )
     columns = spread_columns(int(np.ceil(centre - half)), int(np.floor(centre + half)), count)
     if rod is None:
@@ -390,10 +381,7 @@ def placed(
 
 
 def beam_view(
-    frames: NDArray[np.floating],
-    smooth: NDArray[np.floating],
-    bands: BeamBands,
-    rough: BeamView,
+    frames: NDArray[np.floating], smooth: NDArray[np.floating], bands: BeamBands, rough: BeamView
 ) -> tuple[BeamView, EdgeShape]:
     """The beam to a fraction of a pixel, where it stands alone, and the shape of its edge.
 
@@ -401,9 +389,7 @@ def beam_view(
     """
     objects, alone = bands.objects, bands.alone
     background, inside = _levels(smooth, objects, alone)
-    clear = ~objects.follows | (
-        objects.after - objects.end >= 2 * HALF
-    )  # else the tip's light is in the windows
+    clear = ~objects.follows | (objects.after - objects.end >= 2 * HALF)  # else the tip's light is in the windows
     good = alone & (clear if (alone & clear).mean() > 0.02 else True)
     good[:, good.mean(0) < 0.1] = False
     columns = np.flatnonzero(good.any(0))
@@ -436,9 +422,7 @@ def beam_view(
         if abs(lean) * math.sqrt(independent / by_column.size) > _LEANS * left * math.sqrt(cover[0, 0]):
             thickness = float(level)
             error = max(left, _SURFACE) * math.sqrt(cover[1, 1] * by_column.size / independent)
-    clipped = max(
-        _hot(frames, rows, columns, good, rough.saturated) for rows in (0.5 * (far + near), far - half)
-    )
+    clipped = max(_hot(frames, rows, columns, good, rough.saturated) for rows in (0.5 * (far + near), far - half))
     hot = float((windows[1][good] >= rough.saturated).mean()) if good.any() else 0.0
     view = dataclasses.replace(
         rough,
@@ -451,34 +435,25 @@ def beam_view(
     )
     blur = masked_median(fits[1].width, usable)
     steady = usable
-    if np.isfinite(
-        blur
-    ).any():  # an edge that speeds up within the exposure is bent whatever the camera's curve
+    if np.isfinite(blur).any():  # an edge that speeds up within the exposure is bent whatever the camera's curve
         steady = usable & (blur <= _STEADY * np.nanpercentile(blur, 25.0))[:, None]
     return view, edge_shape(windows[1], np.rint(far), fits[1], steady, width, rough.sign, clipped)
 
 
 def _hot(
-    frames: NDArray[np.floating],
-    rows: Floats,
-    columns: NDArray[np.intp],
-    good: NDArray[np.bool_],
-    level: float,
+    frames: NDArray[np.floating], rows: Floats, columns: NDArray[np.intp], good: NDArray[np.bool_], level: float
 ) -> float:
     """Share of saturated pixels about the given rows."""
     windows, seen = gather(frames, rows, columns, 1)
     return float((windows[seen & good] >= level).mean()) if (seen & good).any() else 0.0
 
 
-def _levels(
-    smooth: NDArray[np.floating], objects: ColumnObjects, alone: NDArray[np.bool_]
-) -> tuple[float, float]:
+def _levels(smooth: NDArray[np.floating], objects: ColumnObjects, alone: NDArray[np.bool_]) -> tuple[float, float]:
     """Grey levels of the background beyond the beam and of the beam's middle."""
     k, x = np.nonzero(alone & (objects.start >= 4))
     if not k.size:
         raise InputError(
-            "recording: the beam touches the edge of the region in every sampled frame; make region (--region) "
-            "taller"
+            "recording: the beam touches the edge of the region in every sampled frame; make region (--region) taller"
         )
     middle = (objects.start[k, x] + objects.end[k, x]) // 2
     return float(np.median(smooth[k, objects.start[k, x] - 4, x])), float(np.median(smooth[k, middle, x]))
@@ -622,9 +597,7 @@ def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
     count = np.maximum(even.sum(1, keepdims=True), 1)
     own = [one - np.where(even, one, 0.0).sum(1, keepdims=True) / count for one in apart]
     along = _alike(own, even, 1) / float(np.median([np.var(one[even]) for one in own]))
-    in_time, along, across = (
-        min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in (in_time, along, across)
-    )
+    in_time, along, across = (min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in (in_time, along, across))
     return NoiseShape(in_time, along, across, rows, fixed)
 
 
@@ -639,9 +612,7 @@ def row_noise(frames: NDArray[np.floating], even: NDArray[np.bool_]) -> float:
     used = count >= _COLUMNS
     if np.count_nonzero(used) < _COLUMNS:
         return 0.0
-    bends = np.where(whole, frames[:, 2:] - 2.0 * frames[:, 1:-1] + frames[:, :-2], 0.0)[:, used].astype(
-        np.float64
-    )
+    bends = np.where(whole, frames[:, 2:] - 2.0 * frames[:, 1:-1] + frames[:, :-2], 0.0)[:, used].astype(np.float64)
     mean = bends.sum(-1) / count[used]
     single = ((bends**2).sum(-1) / count[used] - mean**2) / count[used]
     more = float(np.mean(mean**2 - single))
@@ -681,11 +652,7 @@ def rod_middle(rod: tuple[int, int], share: float = 0.5) -> NDArray[np.intp]:
 
 
 def find_sticker(
-    smooth: NDArray[np.floating],
-    columns: NDArray[np.intp],
-    begin: NDArray[np.intp],
-    contrast: float,
-    sign: float = 0.0,
+    smooth: NDArray[np.floating], columns: NDArray[np.intp], begin: NDArray[np.intp], contrast: float, sign: float = 0.0
 ) -> Sticker | None:
     """Look for a band in the middle columns of the shaker; None if there is none.
 
@@ -761,9 +728,7 @@ def _peaks_sticker(steps: NDArray[np.floating], begin: int, height: float) -> li
 _OFF_CENTRE = 0.05  # share of the shaker's width by which its tip may be off its middle, standard deviation
 
 
-def beam_light(
-    frames: NDArray[np.floating], columns: NDArray[np.intp], near: Floats, thickness: float
-) -> Floats:
+def beam_light(frames: NDArray[np.floating], columns: NDArray[np.intp], near: Floats, thickness: float) -> Floats:
     """Contrast of the beam in each column: its middle less the background beyond it, median over frames."""
     middle, inside = gather(frames, near - 0.5 * thickness, columns, 1)
     beyond, seen = gather(frames, near - thickness - 5.0, columns, 1)
@@ -818,9 +783,7 @@ def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) 
 
     spread = max(fitted(middle)[1], 1e-4)
     grid = middle + np.linspace(-0.5, 0.5, 201)
-    cost = [
-        independent * fitted(c)[1] / spread + ((c - middle) * half / (_OFF_CENTRE * size)) ** 2 for c in grid
-    ]
+    cost = [independent * fitted(c)[1] / spread + ((c - middle) * half / (_OFF_CENTRE * size)) ** 2 for c in grid]
     centre = float(grid[int(np.argmin(cost))])
     solution, variance = fitted(centre)
     full = np.zeros(5)
@@ -904,17 +867,13 @@ def shaker_view(
     shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, sides[:2], loose, turn, cut)
     if sticker is not None and wanted.tip_distance is not None:
         offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
-        return dataclasses.replace(
-            shown, tip_offset=offset, tip_source="distance to the sticker as given"
-        ), column
+        return dataclasses.replace(shown, tip_offset=offset, tip_source="distance to the sticker as given"), column
     upright = dataclasses.replace(outline, profile=outline.profile - turn * (outline.columns - column))
     apex = None if isolated else find_apex(upright, rod, column)
     if apex is not None:
         column += 0.0 if wanted.fixed_column else apex.column
         source = "tip seen apart from the beam"
-        return dataclasses.replace(
-            shown, tip_offset=apex.row, tip_error=apex.error, tip_source=source
-        ), column
+        return dataclasses.replace(shown, tip_offset=apex.row, tip_error=apex.error, tip_source=source), column
     if sticker is not None:
         offset = _offset_at_rest(beam, near, reference, wanted.head)
         source = "assumed to touch the beam in the first frames"
@@ -1057,9 +1016,7 @@ def _outline(
     if np.count_nonzero(whole) >= _TIPS:
         away = np.where(seen, rows - reference[:, None] - outline, 0.0)[whole]
         mean = away.sum(1) / count[whole]
-        within = float(
-            np.mean(((away - np.where(seen[whole], mean[:, None], 0.0)) ** 2).sum(1) / count[whole] ** 2)
-        )
+        within = float(np.mean(((away - np.where(seen[whole], mean[:, None], 0.0)) ** 2).sum(1) / count[whole] ** 2))
         # the smaller of both: a few blurred frames are no motion
         spread = min(float(np.std(mean)), 1.4826 * float(np.median(np.abs(mean - np.median(mean)))))
         loose = spread if spread > max(_LOOSE, 4.0 * math.sqrt(within)) else 0.0
@@ -1085,12 +1042,7 @@ def _offset_at_rest(beam: BeamRows, near: Floats, reference: Floats, head: int) 
 
 
 def survey(
-    frames: NDArray[np.floating],
-    settings: TrackingSettings,
-    *,
-    saturated: float,
-    pixel_size: float,
-    head: int,
+    frames: NDArray[np.floating], settings: TrackingSettings, *, saturated: float, pixel_size: float, head: int
 ) -> Scene:
     """Find everything in a sample of frames.
 

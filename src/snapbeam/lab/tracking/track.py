@@ -56,12 +56,7 @@ _CLIPPED_ERROR = 0.05  # px; an overexposed edge is sharper than pixels can foll
 
 
 def tracked_dataset(
-    rows: TrackedRows,
-    recording: Recording,
-    scene: Scene,
-    settings: TrackingSettings,
-    drift: float,
-    fields: VideoFields,
+    rows: TrackedRows, recording: Recording, scene: Scene, settings: TrackingSettings, drift: float, fields: VideoFields
 ) -> xr.Dataset:
     """The dataset of a tracked recording; see :func:`snapbeam.lab.track` for its variables.
 
@@ -108,9 +103,7 @@ def tracked_dataset(
     offset = math.hypot(_offset_error(rows.row, rest), scene.row_errors[1])
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(
-        rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0
-    )
+    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0)
     diagnostics = (
         *recording.diagnostics,
         *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate),
@@ -177,9 +170,7 @@ def _as_filtered(rows: TrackedRows, scene: Scene, fields: VideoFields, late: flo
     def widened(row: Floats, error: Floats) -> Floats:
         step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
         most = np.nan_to_num(np.fmax(step[1:], step[:-1]))
-        return np.hypot(
-            np.hypot(noise.factor * error, lag * most), math.hypot(fields.shift, scene.row_errors[0])
-        )
+        return np.hypot(np.hypot(noise.factor * error, lag * most), math.hypot(fields.shift, scene.row_errors[0]))
 
     if lag == 0.0 and noise.factor == 1.0 and fields.shift == 0.0 and scene.noise.rows == 0.0:
         return rows
@@ -197,11 +188,7 @@ def _offset_error(row: Floats, rest: Rest) -> float:
 
 
 def _attributes(
-    recording: Recording,
-    scene: Scene,
-    settings: TrackingSettings,
-    rest: Rest,
-    diagnostics: tuple[Diagnostic, ...],
+    recording: Recording, scene: Scene, settings: TrackingSettings, rest: Rest, diagnostics: tuple[Diagnostic, ...]
 ) -> dict[str, Any]:
     beam, shaker = scene.beam, scene.shaker
     attrs: dict[str, Any] = {
@@ -317,11 +304,7 @@ def track(
     saturated = saturation_level(sample, float(recording.max_value), noise)
     prepare = _Prepare(recording, turn, wanted, saturated)
     scene = survey(
-        prepare(sample),
-        wanted,
-        saturated=prepare.saturated,
-        pixel_size=_pixel(recording, wanted)[0],
-        head=head,
+        prepare(sample), wanted, saturated=prepare.saturated, pixel_size=_pixel(recording, wanted)[0], head=head
     )
     marks = _FixedMarks(sample[:head], wanted, turn)
     follower = Follower(scene, wanted.blur_limit)
@@ -331,11 +314,7 @@ def track(
         frames = prepare(batch)
         beam = measure_beam(scene.beam, frames)
         near = beam.row + scene.beam.thickness
-        tip = (
-            None
-            if scene.shaker is None
-            else measure_shaker(scene.beam, scene.shaker, frames, near, beam.slope)
-        )
+        tip = None if scene.shaker is None else measure_shaker(scene.beam, scene.shaker, frames, near, beam.slope)
         follower.add(frames, beam, tip, marks(batch))
         done += batch.shape[0]
         if progress is not None:
@@ -365,9 +344,7 @@ def _sample(recording: Recording) -> tuple[NDArray[np.integer], int]:
 class _Prepare:
     """Rotate a batch of frames so that the shaker is below, linearise grey levels, subtract the background."""
 
-    def __init__(
-        self, recording: Recording, turn: Orientation, settings: TrackingSettings, saturated: float
-    ) -> None:
+    def __init__(self, recording: Recording, turn: Orientation, settings: TrackingSettings, saturated: float) -> None:
         self.turn = turn
         self.full = float(recording.max_value)
         self.power = 1.0 / settings.gamma
@@ -436,15 +413,7 @@ def check_tracked(dataset: xr.Dataset) -> xr.Dataset:
 
     if not isinstance(dataset, xr.Dataset):
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
-    names = (
-        "time",
-        "displacement_mm",
-        "displacement_stderr_mm",
-        "flags",
-        "confidence",
-        "beam_row",
-        "beam_slope",
-    )
+    names = ("time", "displacement_mm", "displacement_stderr_mm", "flags", "confidence", "beam_row", "beam_slope")
     missing = [name for name in names if name not in dataset.variables]
     missing += [name for name in ("pixel_size", "frame_rate", "side") if name not in dataset.attrs]
     if missing:
@@ -561,9 +530,7 @@ def tracking_report(dataset: xr.Dataset, *, diagnostics: bool = True) -> str:
 # When contact begins and ends, from a tracked recording.
 
 
-def contact_onsets(
-    dataset: xr.Dataset, *, tolerance: float | None = None, minimum_frames: int = 1
-) -> xr.Dataset:
+def contact_onsets(dataset: xr.Dataset, *, tolerance: float | None = None, minimum_frames: int = 1) -> xr.Dataset:
     """Impacts in a tracked recording: where the tip reaches the beam and leaves it again.
 
     Contact begins when the penetration rises above ``-tolerance`` and ends when it falls below twice that, so
@@ -640,11 +607,7 @@ def contact_onsets(
         "bounded": ("1", "whether both ends of the contact were seen"),
     }
     data = {
-        name: (
-            "impact",
-            table[:, i].astype(np.int64 if name in ("frames", "bounded") else np.float64),
-            _label(*text),
-        )
+        name: ("impact", table[:, i].astype(np.int64 if name in ("frames", "bounded") else np.float64), _label(*text))
         for i, (name, text) in enumerate(names.items())
     }
     return xr.Dataset(data, attrs={"tolerance_mm": limit})
