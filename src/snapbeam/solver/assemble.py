@@ -310,9 +310,7 @@ def make_ensemble(
     )
     if integration.engine == "python":
         return dataclasses.replace(ensemble, systems=_systems(system, points or {}, runs))
-    return dataclasses.replace(
-        ensemble, channels=channels_of(system, ensemble, columns), on_gpu=integration.engine == "cuda"
-    )
+    return dataclasses.replace(ensemble, channels=channels_of(system, ensemble, columns))
 
 
 def _systems(system: System, points: Mapping[str, _Array], runs: int) -> tuple[System, ...]:

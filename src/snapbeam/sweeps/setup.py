@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -160,6 +160,9 @@ class SweepSetup:
                 columns_of_part = {name: values[part] for name, values in own.items()}
                 begun = state[part] if state is not None and state.batch else state
                 ensemble = make_ensemble(system, integration, columns_of_part, start=begun, step_factor=step_factor)
+                ensemble = replace(
+                    ensemble, on_gpu=integration.engine == "cuda"
+                )  # else the CPU: few runs, or one after the other
 
                 def report(inside: int, _: int, before: int = done) -> None:
                     if progress is not None:

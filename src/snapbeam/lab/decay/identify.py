@@ -82,8 +82,9 @@ def identify_decay(
     Returns
     -------
     DecayFit
-        Frequencies at zero amplitude, and viscous damping ratios. If the amplitude of the first mode shows dry
-        friction or quadratic drag in addition, its strength is fitted too. Standard errors follow the noise
+        Frequencies and damping ratios at zero amplitude. If the damping of the first mode depends on amplitude (dry friction,
+        quadratic drag, or a monotone curve), so that the record only approaches that value, the spread of all forms that fit it is in
+        the standard error, and ``decay.damping_curve`` states the lowest amplitude. Standard errors follow the noise
         near each mode and include the uncertainty of the softening law. If the residual exceeds the noise, they
         include the differences between parts of the decay, and a diagnostic reports it.
 
