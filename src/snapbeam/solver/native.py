@@ -441,7 +441,7 @@ def changed_accumulators(
     growth : array of shape (runs, parameters)
         Norm of the derivative of the state at the end, the square root of twice an energy, J^0.5, per unit of the parameter.
     accumulators : records
-        Of the runs themselves.
+        Records of the runs themselves.
     """
     arrays, n = _differentiated(ensemble), ensemble.structure.omega.size
     batch, pairs, growth = arrays.batch, [], np.empty((ensemble.size, len(beside)))

@@ -280,13 +280,14 @@ def _dataset(
     diagnostics = tuple(
         Diagnostic(
             "gradient.doubtful",
-            f"{name}: the derivative of {label} has an estimated relative error of {each:.1g}: an impact grazes, or begins or ends "
-            "with the run, or the motion is chaotic; change the parameter a little or the number of cycles",
-            {"relative_error": float(each)},
+            f"{label}: estimated relative error of the derivative by "
+            f"{', '.join(f'{name} {each:.1g}' for name, each in large.items())}: an impact grazes, or begins or ends with the run, or the "
+            "motion is chaotic; change the parameter a little or the number of cycles",
+            {"relative_error": max(large.values())},
         )
         for label, reason, errors in zip(labels, reasons, error, strict=True)
-        for name, each in zip(names, errors, strict=True)
-        if not (reason or each <= _DOUBTFUL)
+        if not reason
+        and (large := {name: float(each) for name, each in zip(names, errors, strict=True) if not each <= _DOUBTFUL})
     )
     tell(diagnostics)
     elasticity = np.divide(moved, values[:, None], out=np.full_like(moved, np.nan), where=values[:, None] != 0.0)
