@@ -97,7 +97,9 @@ def test_options_override_the_file_and_the_unit_of_its_text(run) -> None:
 
 
 def test_the_figure_of_the_file_is_that_of_the_command(run) -> None:
-    code, said = run("--statistic", "peak_force,striker_work", "--plot", "one.png", "--cycles", "2")
+    code, said = run(
+        "--parameters", "gap,location", "--statistic", "peak_force,striker_work", "--plot", "one.png", "--cycles", "2"
+    )
     assert code == 0 and Path("one.png").stat().st_size > 5_000, said
     for more in ([], ["--variable", "striker_work"]):
         result = CliRunner().invoke(app, ["plot", "gradient.nc", "-o", "two.png", *more])
@@ -122,9 +124,13 @@ def test_a_useless_derivative_has_a_warning(run) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--statistic", "impacts,response_class"), "quantity = response_class: is a class or a count"),
-        (("--statistic", "force"), "must be one of min_displacement"),
-        (("--statistic", "peak_force,peak_force"), "must be different statistics"),
+        ((), "parameters (--parameters): must name one or more of beam.length"),
+        (
+            ("--parameters", "gap", "--statistic", "impacts,response_class"),
+            "quantity = response_class: is a class or a count",
+        ),
+        (("--parameters", "gap", "--statistic", "force"), "must be one of min_displacement"),
+        (("--parameters", "gap", "--statistic", "peak_force,peak_force"), "must be different statistics"),
         (("--parameters", "drive.phase"), "drive.phase = 0: must not be 0"),
         (("--parameters", "model.modes"), "must be a number"),
         (("--parameters", "velocity_m_s,drive.velocity_m_s"), "must be different names"),

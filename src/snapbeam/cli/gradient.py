@@ -30,11 +30,11 @@ def gradient(
         Path | None, typer.Argument(help="TOML parameter file; options override it.", metavar="FILE")
     ] = None,
     parameters: Annotated[
-        str,
+        str | None,
         typer.Option(
             help="Parameters, of numbers that are not zero: name,name.", rich_help_panel=_PANEL, metavar="NAMES"
         ),
-    ] = "frequency_ratio,velocity_amplitude",
+    ] = None,
     statistic: Annotated[
         str, typer.Option(help="Statistics of a run: name,name.", rich_help_panel=_PANEL, metavar="NAMES")
     ] = "peak_midspan_displacement",
@@ -61,10 +61,14 @@ def gradient(
     --cycles 5 -o gradient.nc --plot gradient.png
     """  # fmt: skip
     from snapbeam.uncertainty.gradients import gradient as compute
+    from snapbeam.util.validation import InputError
 
     settings = configured(given | {"config": config})
     check_outputs(output, plot, (".nc", ".csv", ".json"), "statistic,")
     system = settings.system
+    if parameters is None:
+        known = [name for name, value in system.parameters.items() if isinstance(value, float) and value != 0.0]
+        raise InputError(f"parameters (--parameters): must name one or more of {', '.join(known)}")
     names = [settings.full_name(name.strip()) for name in parameters.split(",")]
     statistics = [name.strip() for name in statistic.split(",")]
     found = compute(system, statistics, names, integration=settings.integration.replace(threads=threads))
