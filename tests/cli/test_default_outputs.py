@@ -36,6 +36,7 @@ COMMANDS = {
     "basins.nc": "dynamics basins",
     "edge.nc": "dynamics edge",
     "design.nc": "design question.toml",
+    "gradient.nc": "gradient",
     "probability.nc": "probability question.toml",
 }
 REFUSED = "exists, and its parameters are not those of this command"

@@ -416,3 +416,18 @@ def test_axis_forms(text, value):
 def test_axis_refusals(text):
     with pytest.raises(InputError, match="location"):
         parse_axis("location", text)
+
+
+def test_values_beside_those_overridden_keep_the_unit_of_their_text():
+    """The text of a value that another replaces, or that a rival takes away, is gone."""
+    given = {
+        "drive": {"frequency_hz": "60 Hz", "velocity_m_s": "20 mm/s"},
+        "contact": {"gap": "2 um"},
+        "extends": "paper",
+    }
+    config = config_from_mapping(given)
+    texts = {"drive.frequency_hz": "60 Hz", "drive.velocity_m_s": "20 mm/s", "contact.gap": "2 um"}
+    assert override(config, {}).as_given == config.as_given == texts
+    other = override(config, {"drive": {"frequency_ratio": 1.1}, "contact": {"gap": 3e-6}})
+    assert other.as_given == {"drive.velocity_m_s": "20 mm/s"}
+    assert other.system.get("contact.gap") == 3e-6 and other.system.as_given == other.as_given

@@ -118,6 +118,10 @@ SLOW: dict[str, Callable[[], xr.Dataset]] = {
         CHAOTIC, "peak_force", SPREAD, "sobol", samples=64, integration=SHORT
     ),
     "gradient": lambda: sb.uncertainty.gradient(CHAOTIC, "peak_force", ["contact.stiffness", "location"], integration=SHORT),
+    "gradients of several statistics": lambda: sb.uncertainty.gradient(
+        SYSTEM, ["peak_force", "impacts", "rms_midspan_displacement", "striker_work"],
+        ["contact.stiffness", "location", "velocity_amplitude"], integration=SHORT,
+    ),
     "manifold": lambda: sb.dynamics.invariant_manifold(_saddle(), max_arclength=1.0),
     "force-displacement curve": lambda: sb.force_displacement(SYSTEM),
     "growth of a perturbation": lambda: sb.perturbation_growth(CHAOTIC, SHORT),

@@ -200,6 +200,31 @@ def test_posterior_and_gradient_state_units_and_intervals() -> None:
     assert [bar.get_width() for bar in bars] == [0.4, -2.0], "the most telling parameter on top"
 
 
+def test_gradients_of_several_statistics_have_panels_in_one_order() -> None:
+    """None for a statistic without a derivative; a bar whose error is not below its length is hatched and named."""
+    both = ("statistic", "parameter")
+    table = xr.Dataset(
+        {
+            "elasticity": (both, [[0.4, -2.0], [np.nan, np.nan], [30.0, 1.0]]),
+            "relative_error": (both, [[0.1, 0.01], [np.nan, np.nan], [np.inf, 0.0]]),
+            "no_derivative": ("statistic", ["", "is a count", ""]),
+        },
+        {"statistic": ["peak_force", "impacts", "impulse"], "parameter": ["beam.thickness", "contact.stiffness"]},
+    )
+    figure = table.snapbeam.plot().get_figure(root=True)
+    assert [ax.get_xlabel().split("\n")[0] for ax in figure.axes] == ["Change of peak force", "Change of impulse"]
+    names = [[text.get_text() for text in ax.get_yticklabels()] for ax in figure.axes]
+    assert names == [["contact stiffness", "thickness"]] * 2
+    widths = [{round(bar.get_width(), 6): bar.get_hatch() for bar in ax.patches} for ax in figure.axes]
+    assert widths[0] == {-2.0: None, 0.4: None} and widths[1][1.0] is None and widths[1][30.0]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "error not below the value: grazing or chaos"
+    ]
+    assert len(table.snapbeam.plot("impulse").get_figure(root=True).axes) == 1
+    with pytest.raises(sb.InputError, match="choose a statistic: peak_force, impulse"):
+        table.snapbeam.plot(ax=plt.figure().add_subplot())
+
+
 def test_scores_are_in_the_colours_of_the_measured_classes() -> None:
     kinds = np.array([0, 3, 3], dtype=np.int8)
     names = ("probability", "probability_low", "probability_high")

@@ -74,10 +74,35 @@ def test_a_grazing_impact_is_reported() -> None:
         ("peak_force", "model.modes", "must be a number, for a derivative by it"),
         ("peak_force", ["location", "contact.location"], "must be different names"),
         ("peak_force", [], "at least one"),
-        (3.0, "location", "must be text or callable"),
+        (3.0, "location", "must be text or a sequence or callable"),
+        (["peak_force", "peak_force"], "location", "must be different statistics"),
+        (
+            ["impacts", "early_stop_time"],
+            "location",
+            "impacts: is a class or a count.* early_stop_time: is the time of an event",
+        ),
         (lambda system: float("nan"), "location", "is nan for the system itself"),
     ],
 )
 def test_refusals(quantity: Any, parameters: Any, message: str) -> None:
     with pytest.raises((sb.InputError, TypeError), match=message):
         gradient(system_of(), quantity, parameters)
+
+
+def test_several_statistics_are_as_each_alone_and_jumps_are_stated() -> None:
+    """One table: numbers of the smooth ones, reasons of the others, without a number."""
+    names = ["drive.velocity_amplitude", "contact.stiffness", "beam.thickness"]
+    many = ["peak_force", "impacts", "striker_work", "last_zero_crossing"]
+    how = sb.Integration(cycles=3)
+    found = gradient(system_of(), many, names, integration=how)
+    for name in ("peak_force", "striker_work"):
+        alone, one = gradient(system_of(), name, names, integration=how), found.sel(statistic=name)
+        for each in ("derivative", "elasticity", "relative_error", "method"):
+            assert one[each].values.tolist() == alone[each].values.tolist()
+        assert float(one["value"]) == alone.attrs["value"] and str(one["statistic_unit"].values) == alone.attrs["units"]
+    assert found["method"].sel(statistic="peak_force").values.tolist() == ["exact", "exact", "differences"]
+    reasons = dict(zip(many, found["no_derivative"].values.tolist(), strict=True))
+    assert reasons["peak_force"] == "" and "changes by jumps" in reasons["impacts"]
+    assert "a crossing appears or vanishes" in reasons["last_zero_crossing"]
+    assert found["derivative"].sel(statistic=["impacts", "last_zero_crossing"]).isnull().all()
+    assert found["derivative"].sel(statistic=["peak_force", "striker_work"]).notnull().all()

@@ -19,6 +19,7 @@ _COMMANDS = {
     "threshold": "snapbeam.cli.threshold:threshold",
     "dynamics": "snapbeam.cli.dynamics:dynamics",
     "probability": "snapbeam.cli.uncertainty:probability",
+    "gradient": "snapbeam.cli.gradient:gradient",
     "design": "snapbeam.cli.uncertainty:design",
     "frequencies": "snapbeam.cli.frequencies:frequencies",
     "equilibria": "snapbeam.cli.equilibria:equilibria",

@@ -404,11 +404,14 @@ def check_pictures(*pictures: tuple[str, Path | None]) -> None:
             require_room(path, least_picture_size(path), name)
 
 
-def check_outputs(output: Path, plot: Path | None) -> None:
-    """Raise an error, before any computation, if the NetCDF file or the figure cannot be written."""
+def check_outputs(output: Path, plot: Path | None, suffixes: tuple[str, ...] = (".nc",), begin: str = "") -> None:
+    """Raise an error, before any computation, if the file of the results or the figure cannot be written.
+
+    *begin* is what a table of this kind begins with.
+    """
     from snapbeam.util.files import check_writable
 
-    check_writable(output, "output", (".nc",))
+    check_writable(output, "output", suffixes, begin)
     check_pictures(("plot", plot))
 
 
@@ -440,6 +443,19 @@ def write_map(dataset: xr.Dataset, path: Path) -> Path:
     from snapbeam.util.netcdf import write_netcdf
 
     write_netcdf(dataset, path)
+    return path
+
+
+def write_result(dataset: xr.Dataset, path: Path, found: Mapping[str, Any]) -> Path:
+    """Write a dataset to a NetCDF file or a table, or its plain values to a JSON file, by the suffix."""
+    from snapbeam.util.tables import write_table
+
+    if path.suffix.lower() == ".nc":
+        return write_map(dataset, path)
+    if path.suffix.lower() == ".json":
+        write_json(path, found)
+    else:
+        write_table(dataset, path)
     return path
 
 

@@ -113,7 +113,8 @@ _LISTS = ("model.damping_ratio",)
 def with_parameters(*names: str, axes: tuple[str, ...] = ()) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Give a command options for parameters, and for a parameter file and anything else by name.
 
-    The command gets a parameter ``given``, a mapping of what was given: values by dotted name, and the file.
+    The command gets a parameter ``given``, a mapping of what was given: values by dotted name, and the file.  A parameter of its
+    own, such as ``config``, replaces the general option of that name.
 
     Parameters
     ----------
@@ -130,7 +131,7 @@ def with_parameters(*names: str, axes: tuple[str, ...] = ()) -> Callable[[Callab
             if name != "given"
         }
         added = {_identifier(name): (name, _option(name, name in axes)) for name in names}
-        general = _general(bool(axes))
+        general = {key: each for key, each in _general(bool(axes)).items() if key not in own}
 
         def command(**arguments: Any) -> Any:
             given = {full: arguments.pop(key) for key, (full, _) in added.items()}

@@ -14,7 +14,7 @@ _WIDTH = 80
 _ALL = "snapbeam.help_all"
 _USUAL = (
     "config", "sweep", "drive__frequency_ratio", "drive__velocity_amplitude", "contact__location", "model__modes",
-    "integration__cycles", "integration__tolerance", "parameter", "values", "initial_conditions", "output", "plot", "checkpoint",
+    "integration__cycles", "integration__tolerance", "parameter", "parameters", "statistic", "values", "initial_conditions", "output", "plot", "checkpoint",
     "beam__thickness", "beam__buckling_level", "frequency", "buckling_level", "pixel_size", "frame_rate", "location",
     "camera", "drive_output", "picture", "units", "map",
 )  # fmt: skip
@@ -47,10 +47,11 @@ class ShortHelpGroup(TyperGroup):
         names = self.list_commands(ctx)
         column = max(len(name) for name in names) + 4
         about = {name: (self.get_command(ctx, name).help or "").split("\n\n")[0] for name in names}  # type: ignore[union-attr]
-        lines = [self.get_usage(ctx), "", *_wrapped(self.help or ""), ""]
-        lines += [f"  {name:<{column - 2}}{_clause(text, _width() - column)}" for name, text in about.items()]
+        head = [self.get_usage(ctx), "", *_wrapped(self.help or "")]
+        rows = [f"  {name:<{column - 2}}{_clause(text, _width() - column)}" for name, text in about.items()]
         end = f"Options of a command: {ctx.command_path} COMMAND --help"
-        formatter.write("\n".join([*lines, end]))
+        between = [""] if len(head) + len(rows) + 2 <= LINES else []
+        formatter.write("\n".join([*head, *between, *rows, end]))
 
 
 def _width() -> int:

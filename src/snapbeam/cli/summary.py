@@ -25,6 +25,8 @@ from snapbeam.util.validation import InputError, printable
 if TYPE_CHECKING:
     import xarray as xr
 
+    from snapbeam.model.system import System
+
 _SYMBOLS = {"frequency_ratio": "Omega", "velocity_amplitude": "V", "location": "x_s", "modes": "N"}
 _PAPER = ("frequency_ratio", "velocity_amplitude", "location")
 
@@ -209,16 +211,24 @@ def value_text(dataset: xr.Dataset, name: str, value: Any, digits: int = 4) -> s
         return str(value)
     if name in _SYMBOLS:
         return f"{value:.{digits}g}"
-    unit = dataset[name].attrs.get("units", "1")
+    return _with_unit(value, dataset[name].attrs.get("units", "1"), _long_name(dataset, name), digits)
+
+
+def _with_unit(value: float, unit: str, long_name: str, digits: int) -> str:
+    """Return a value with its unit, or with what the words say that it is over."""
     if unit in _WITH_PREFIX:
         return prefixed(value, unit, digits)
-    scale = _NORMALISED.search(_long_name(dataset, name))
-    if unit == "1":
-        unit = scale[1] if scale else ""
+    unit = unit_words(unit, long_name)
     text = f"{value:.{digits}g}"
     if "e+0" in text and abs(value) < 1e6:
         text = f"{float(text):.0f}"
     return f"{text} {unit}".rstrip()
+
+
+def unit_words(unit: str, long_name: str) -> str:
+    """Return a unit, or what the words of a number without a unit say that it is over, such as ``b``; empty without either."""
+    scale = _NORMALISED.search(long_name)
+    return unit if unit != "1" else scale[1] if scale else ""
 
 
 def statistic_text(dataset: xr.Dataset, name: str, value: Any) -> str:
@@ -227,6 +237,15 @@ def statistic_text(dataset: xr.Dataset, name: str, value: Any) -> str:
     if _NORMALISED.search(words):
         words, text = _without_scale(words), scale_text(dataset.attrs, text)
     return f"{words}: {text}"
+
+
+def statistic_value(name: str, value: float, system: System) -> str:
+    """Return a value of a statistic of a run with its unit, or over b with the size of b: ``0.5 b (b = 6 µm)``."""
+    from snapbeam.solver.statistics import STATISTICS
+
+    row = STATISTICS[name]
+    text = _with_unit(value, row.unit, row.long_name, 4)
+    return scale_text({"length_scale": system.scale.length}, text) if _NORMALISED.search(row.long_name) else text
 
 
 def _count(number: int, noun: str) -> str:

@@ -6,7 +6,7 @@ import difflib
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -881,12 +881,15 @@ def sections_as_given(system: System) -> dict[str, dict[str, Any]]:
 def override(config: Config, sections: Mapping[str, Mapping[str, Any]], source: str = "") -> Config:
     """The parameters with others laid over them; what they contradict is taken away, None is left alone.
 
-    A value takes an axis over the same parameter away.  Refusals begin with *source*.
+    A value takes an axis over the same parameter away.  Values that stay keep the unit of their text.  Refusals begin with *source*.
     """
     instance("config", config, Config, "a Config")
     for name, own in mapping("sections", sections).items():
         mapping(str(name), own)
-    return config_from_mapping(_merged(config.given, sections) | config.extension, source)
+    found = config_from_mapping(_merged(config.given, sections) | config.extension, source)
+    parts = {full: split_name(full) for full in config.as_given}
+    same = [full for full, (part, name) in parts.items() if found.section(part).get(name) == config.section(part)[name]]
+    return replace(found, as_given={**found.as_given, **{full: config.as_given[full] for full in same}})
 
 
 def _merged(given: Sections, sections: Sections) -> dict[str, dict[str, Any]]:

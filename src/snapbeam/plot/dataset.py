@@ -128,6 +128,14 @@ def _diagram(dataset: xr.Dataset) -> dict[str, _Draws]:
     return {name: partial(dynamics.plot_diagram, variable=name) for name in names}
 
 
+def _gradient(dataset: xr.Dataset) -> dict[str, _Draws]:
+    figures: dict[str, _Draws] = {"elasticity": uncertainty.plot_gradient}
+    if "statistic" in dataset.dims:
+        names = uncertainty.smooth_statistics(dataset)
+        figures |= {name: partial(uncertainty.plot_gradient, statistic=name) for name in names}
+    return figures
+
+
 _KINDS = (
     _Kind("run", {"displacement_at_striker"}, {"time"}, _run),
     _Kind("threshold", {"lower_threshold"}, set(), lambda _: {"threshold": plot_threshold}),
@@ -138,7 +146,7 @@ _KINDS = (
     ),
     _Kind("sensitivities", {"effect"}, {"parameter"}, lambda _: {"effect": uncertainty.plot_tornado}),
     _Kind("sensitivity indices", {"first_order"}, {"parameter"}, lambda _: {"first_order": uncertainty.plot_tornado}),
-    _Kind("gradient", {"elasticity"}, {"parameter"}, lambda _: {"elasticity": uncertainty.plot_gradient}),
+    _Kind("gradient", {"elasticity"}, {"parameter"}, _gradient),
     _Kind("posterior", {"weight"}, {"sample"}, lambda _: {"weight": uncertainty.plot_posterior}),
     _Kind("measured classes", {"most_likely"}, {"measurement"}, lambda _: {"probability": uncertainty.plot_scores}),
     _Kind("growth of a perturbation", {"separation"}, {"time"}, lambda _: {"separation": run.plot_perturbation}),

@@ -23,8 +23,12 @@ from snapbeam.plot.style import (
     color_bar,
     contains,
     extend_title,
+    figure_legend,
+    figure_style,
+    fix_ticks,
     frame,
     legend_below,
+    new_figure,
     plain_decades,
 )
 from snapbeam.plot.units import in_units, ratio_along, ratio_name, scale_text
@@ -375,18 +379,73 @@ def _with_unit(value: float, unit: str, digits: int) -> str:
 
 
 @checked
-def plot_gradient(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw the elasticities of a quantity, the result of :func:`snapbeam.uncertainty.gradient`, with their errors."""
+def plot_gradient(dataset: xr.Dataset, ax: Axes | None = None, *, statistic: str | None = None) -> Axes:
+    """Draw the elasticities of a quantity, the result of :func:`snapbeam.uncertainty.gradient`, with their errors.
+
+    Several statistics have a panel each, with the parameters in the same order; those without a derivative have none.  A bar whose
+    error is not below its length is hatched.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    statistic : str, optional
+        One of several statistics; by default all, which need a figure of their own.
+    """
     contains(dataset, "gradient", "elasticity", "relative_error")
-    data = dataset.isel(parameter=np.argsort(np.abs(dataset["elasticity"].values), kind="stable"))
-    with frame(ax, dataset, height=24.0 + 9.0 * data.sizes["parameter"]) as ax:
-        value, place = (data["elasticity"].values, _rows(ax, [_name(data, i) for i in range(data.sizes["parameter"])]))
-        error = np.nan_to_num(np.abs(value) * data["relative_error"].values)
-        ax.barh(place, value, xerr=error, height=0.62, color=_BLUE, error_kw=_BARS)
-        ax.axvline(0.0, color="black", linewidth=0.6)
-        words = str(data.attrs["quantity"]).replace("_", " ")
-        ax.set_xlabel(f"Change of {words}\nfor 1 % of the parameter (%)")
-    return ax
+    panels = smooth_statistics(dataset)
+    if statistic is not None:
+        if statistic not in panels:
+            raise InputError(f"statistic = {shown(statistic)}: must be one of {', '.join(panels) or 'none'}")
+        panels = {statistic: panels[statistic]}
+    size = np.max([np.abs(np.nan_to_num(each["elasticity"].values)) for each in panels.values()], axis=0)
+    order = np.argsort(size, kind="stable")
+    if len(panels) == 1:
+        (one,) = panels.values()
+        with frame(ax, dataset, height=24.0 + 9.0 * order.size) as ax:
+            legend_below(ax, _elasticities(one.isel(parameter=order), ax))
+        return ax
+    if ax is not None:
+        raise InputError(
+            f"ax: holds one panel, and the dataset has {len(panels)}; choose a statistic: {', '.join(panels)}"
+        )
+    with figure_style():
+        figure = new_figure("single", len(panels) * (20.0 + 6.0 * order.size))
+        axes = figure.subplots(len(panels), 1)
+        handles = [
+            _elasticities(one.isel(parameter=order), each) for one, each in zip(panels.values(), axes, strict=True)
+        ]
+        drawn = next(filter(None, handles), [])
+        if drawn:
+            figure_legend(figure, drawn)
+        fix_ticks(*axes)
+    first: Axes = axes[0]
+    return first
+
+
+def smooth_statistics(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
+    """The gradient of each statistic that has one, by its name; of a single quantity the dataset itself."""
+    if "statistic" not in dataset.dims:
+        return {str(dataset.attrs["quantity"]): dataset}
+    kept = dataset.isel(statistic=np.flatnonzero(dataset["no_derivative"].values == ""))
+    return {str(name): kept.sel(statistic=name) for name in kept["statistic"].values}
+
+
+def _elasticities(data: xr.Dataset, ax: Axes) -> list[Any]:
+    """Bars of one quantity; returns the entries of a legend."""
+    name = str(data["statistic"].item() if "statistic" in data.coords else data.attrs["quantity"])
+    value, error = data["elasticity"].values, data["relative_error"].values
+    place = _rows(ax, [_name(data, i) for i in range(value.size)])
+    sure = error <= 1.0
+    ax.barh(place[sure], value[sure], xerr=np.abs(value * error)[sure], height=0.62, color=_BLUE, error_kw=_BARS)
+    look: dict[str, Any] = {"facecolor": "white", "edgecolor": _BLUE, "hatch": "/////", "linewidth": 0.6}
+    doubtful = ax.barh(
+        place[~sure], value[~sure], height=0.62, label="error not below the value: grazing or chaos", **look
+    )
+    ax.axvline(0.0, color="black", linewidth=0.6)
+    if not np.isfinite(value).any():
+        ax.text(0.5, 0.5, "the quantity is 0", transform=ax.transAxes, ha="center", va="center")
+    ax.set_xlabel(textwrap.fill(f"Change of {name.replace('_', ' ')}", 44) + "\nfor 1 % of the parameter (%)")
+    return [doubtful] if np.isfinite(value[~sure]).any() else []
 
 
 @checked

@@ -41,12 +41,12 @@ _NOT_SMOOTH = {
 @checked
 def gradient(
     system: System,
-    quantity: str | Callable[[System], float],
+    quantity: str | Sequence[str] | Callable[[System], float],
     parameters: str | Sequence[str],
     *,
     integration: Integration | None = None,
 ) -> xr.Dataset:
-    """Derivatives of a smooth quantity by parameters of the system, with error estimates.
+    """Derivatives of smooth quantities by parameters of the system, with error estimates.
 
     Of a statistic the core takes exact derivatives through the run, with those of the times of impacts, by all parameters that
     leave the modes, the laws of a user and the times of jumps of a motion as they are, such as a frequency, an amplitude, a gap, a
@@ -60,9 +60,9 @@ def gradient(
     ----------
     system : System
         System at which derivatives are taken.
-    quantity : str or callable
-        A statistic of a run by its name, such as ``"peak_force"`` or ``"energy_harvested"``, or a function of a system that returns a
-        number, such as a natural frequency or the amplitude of an orbit.
+    quantity : str, sequence of str or callable
+        A statistic of a run by its name, such as ``"peak_force"`` or ``"energy_harvested"``, several of them, or a function of a system
+        that returns a number, such as a natural frequency or the amplitude of an orbit.
     parameters : str or sequence of str
         Numbers of the system that are not zero, by dotted or short name.
     integration : Integration, optional
@@ -78,10 +78,15 @@ def gradient(
         motion it grows exponentially with the number of cycles, and a derivative says little.
         The elasticity is NaN where the quantity is zero.  The attributes have the ``quantity``, its ``value`` and its ``units``.
 
+        Of several statistics ``derivative``, ``elasticity``, ``relative_error`` and ``method`` are over ``statistic`` and ``parameter``,
+        and ``value``, ``statistic_unit`` and ``no_derivative`` over ``statistic``.  The last is empty, or the reason why a statistic has
+        no derivative: a class, a count, or a value that is not finite.  Its numbers are NaN and its method is empty.
+
     Raises
     ------
     InputError
-        For a parameter that is zero or not a number, a quantity without a derivative (a class, a count), or a quantity that is not finite.
+        For a parameter that is zero or not a number, a quantity without a derivative (a class, a count), a quantity that is not finite, or
+        several statistics of which none has a derivative.
 
     See Also
     --------
@@ -106,35 +111,58 @@ def gradient(
     if not names or len(set(names)) < len(names):
         raise InputError(f"parameters = {shown(parameters)}: must be different names, at least one")
     here = np.array([_value(system, name) for name in names])
-    if isinstance(quantity, str):
-        label, units, evaluate = quantity, _unit(quantity), _by_runs(system, quantity, names, how)
-    else:
-        label, units = getattr(quantity, "__name__", "quantity"), "1"
+    if callable(quantity):
+        labels, units, reasons = [getattr(quantity, "__name__", "quantity")], ["1"], [""]
         evaluate = _by_systems(system, quantity, names)
-    value = float(evaluate(here[None])[0][0])
-    if not np.isfinite(value):
-        raise InputError(f"quantity = {label}: is {value} for the system itself; it must be finite")
+    else:
+        labels = [quantity] if isinstance(quantity, str) else list(quantity)
+        reasons = _reasons(labels)
+        units = [STATISTICS[label].unit for label in labels]
+        evaluate = _by_runs(system, labels, names, how)
+    values = evaluate(here[None])[0][0]
+    reasons = [
+        reason or ("" if np.isfinite(value) else f"is {value} for the system itself; it must be finite")
+        for reason, value in zip(reasons, values, strict=True)
+    ]
+    smooth = [k for k, reason in enumerate(reasons) if not reason]
+    if not smooth:
+        raise InputError("; ".join(f"quantity = {label}: {why}" for label, why in zip(labels, reasons, strict=True)))
 
-    def advance_rows(rows: _Array, runs: NDArray[np.intp]) -> tuple[_Array, _Array | None]:
-        found, impacts = evaluate(rows * here)
-        return found[:, None], impacts
+    moved, error = np.full((2, len(labels), here.size), np.nan)
+    growth = np.full(here.size, np.nan)
+    if not callable(quantity):
+        moved[smooth], error[smooth], growth = _exact(system, [labels[k] for k in smooth], names, here, how)
+    differenced = np.zeros(moved.shape, dtype=bool)
+    for k in smooth:
+        left = np.isnan(error[k])
+        if left.any():
 
-    moved, error, growth = np.full((3, here.size), np.nan)
-    if isinstance(quantity, str):
-        moved, error, growth = _exact(system, quantity, names, here, how)
-    left = np.isnan(error)
-    if left.any():
-        slopes, doubts = differences(advance_rows, np.ones((1, here.size)), np.eye(here.size)[None, left])
-        moved[left], error[left] = slopes[0, :, 0], doubts[0]
-    return _dataset(system, names, here, moved, error, left, growth, label, value, units)
+            def advance_rows(rows: _Array, runs: NDArray[np.intp], k: int = k) -> tuple[_Array, _Array | None]:
+                found, impacts = evaluate(rows * here)
+                return found[:, k : k + 1], impacts
+
+            slopes, doubts = differences(advance_rows, np.ones((1, here.size)), np.eye(here.size)[None, left])
+            moved[k, left], error[k, left], differenced[k, left] = slopes[0, :, 0], doubts[0], True
+    method = np.where(np.isnan(error), "", np.where(differenced, "differences", "exact"))
+    found = _dataset(system, names, here, moved, error, method, growth, (labels, values, units, reasons))
+    if not (callable(quantity) or isinstance(quantity, str)):
+        return found
+    only = {"quantity": labels[0], "value": float(values[0]), "units": units[0]}
+    found = found.isel(statistic=0, drop=True).drop_vars(["value", "statistic_unit", "no_derivative"])
+    return found.assign_attrs(only)
 
 
 def _exact(
-    system: System, quantity: str, names: list[str], here: _Array, how: Integration
+    system: System, quantities: list[str], names: list[str], here: _Array, how: Integration
 ) -> tuple[_Array, _Array, _Array]:
-    """Derivatives per relative change, their relative errors and the growth of the state; NaN where the core takes none."""
-    moved, error, growth = np.full((3, here.size), np.nan)
-    if how.engine == "python" or how.tolerance is not None or STATISTICS[quantity].update is not None:
+    """Derivatives per relative change, their relative errors, of shape (quantities, parameters), and the growth of the state.
+
+    NaN where the core takes none.
+    """
+    moved, error = np.full((2, len(quantities), here.size), np.nan)
+    growth = np.full(here.size, np.nan)
+    exact = [k for k, name in enumerate(quantities) if STATISTICS[name].update is None]
+    if how.engine == "python" or how.tolerance is not None or not exact:
         return moved, error, growth
     sides = (1.0 + _STEP, 1.0 - _STEP)
     found, impacts = [], []
@@ -156,26 +184,28 @@ def _exact(
         beside = [pair for pair, each in zip(beside, same, strict=True) if each]
         pairs, grown, whole = native.changed_accumulators(ensemble, beside, how.threads)
         with np.errstate(invalid="ignore"):  # chaos: a sum of squares may become negative; the error says so
-            values = [
-                [float(statistics_of(near, rows)[quantity][0]) for near, rows in zip(both, each, strict=False)]
+            of_runs = [
+                [statistics_of(near, rows) for near, rows in zip(both, each, strict=False)]
                 for both, each in zip(beside, pairs, strict=True)
             ]
+        values = np.array([[[run[quantities[k]][0] for run in both] for both in of_runs] for k in exact], dtype=float)
         far = [
             any(abs(high[name][0] - low[name][0]) > _FAR * whole[name][0] for name in _SQUARES) for high, low in pairs
         ]
-        found.append((np.array(values) @ (1.0, -1.0)) / (2.0 * _STEP))
+        found.append((values @ (1.0, -1.0)) / (2.0 * _STEP))
         counts = np.array(
             [[native.run_ensemble(near, how.threads)["impacts"][0] for near in each[:2]] for each in beside]
         )
         impacts.append((int(whole["impacts"][0]), counts))
         size = np.linalg.norm(ensemble.structure.omega * ensemble.structure.shift)
         growth[which] = grown[0] * np.abs(here[which]) / (size or np.nan)
-    moved[which] = found[1]
     change = np.abs(found[1] - found[0]) / 3.0  # of first order in the step, at least
-    error[which] = np.where(change == 0.0, 0.0, change / np.maximum(np.abs(found[1]), 1e-300))
     (one, some), (other, others) = impacts
     grazes = (np.hstack((some, others)) != one).any(axis=1) | (one != other) | np.array(far) | ~np.isfinite(found[1])
-    error[which] = np.where(grazes, np.inf, error[which])
+    at = np.ix_(exact, which)
+    moved[at] = found[1]
+    error[at] = np.where(change == 0.0, 0.0, change / np.maximum(np.abs(found[1]), 1e-300))
+    error[at] = np.where(grazes, np.inf, error[at])
     return moved, error, growth
 
 
@@ -191,29 +221,34 @@ def _value(system: System, name: str) -> float:
     return found
 
 
-def _unit(quantity: str) -> str:
-    """Unit of a statistic that has a derivative."""
-    if quantity not in STATISTICS:
-        smooth = [name for name, row in STATISTICS.items() if row.dtype == "float64" and name not in _NOT_SMOOTH]
-        raise InputError(f"quantity = {shown(quantity)}: must be one of {', '.join(smooth)}, or a function of a system")
-    row = STATISTICS[quantity]
-    if row.dtype != "float64" or quantity in _NOT_SMOOTH:
-        why = _NOT_SMOOTH.get(quantity, "is a class or a count, which changes by jumps")
-        raise InputError(f"quantity = {quantity!r}: {why}, so that it has no derivative")
-    return row.unit
+def _reasons(quantities: list[str]) -> list[str]:
+    """Reasons why statistics have no derivative; empty texts where they have one."""
+    if not quantities or len({*quantities}) < len(quantities):
+        raise InputError(f"quantity = {shown(quantities)}: must be different statistics, at least one")
+    for name in quantities:
+        if name not in STATISTICS:
+            smooth = [each for each, row in STATISTICS.items() if row.dtype == "float64" and each not in _NOT_SMOOTH]
+            raise InputError(f"quantity = {shown(name)}: must be one of {', '.join(smooth)}, or a function of a system")
+    jumps = {
+        name: "is a class or a count, which changes by jumps"
+        for name in quantities
+        if STATISTICS[name].dtype != "float64"
+    }
+    reasons = jumps | {name: _NOT_SMOOTH[name] for name in quantities if name in _NOT_SMOOTH}
+    return [f"{reasons[name]}, so that it has no derivative" if name in reasons else "" for name in quantities]
 
 
 _Evaluation = Callable[[_Array], tuple[_Array, _Array | None]]
 
 
-def _by_runs(system: System, quantity: str, names: list[str], how: Integration) -> _Evaluation:
-    """Evaluate a statistic at rows of parameters by runs."""
+def _by_runs(system: System, quantities: list[str], names: list[str], how: Integration) -> _Evaluation:
+    """Evaluate statistics at rows of parameters by runs."""
 
     def evaluate(rows: _Array) -> tuple[_Array, _Array | None]:
         different, back = np.unique(rows, axis=0, return_inverse=True)
         points = PointList({name: different[:, i] for i, name in enumerate(names)})
         found = sweep(system, points, how)
-        values = np.asarray(found[quantity].values, dtype=np.float64)
+        values = np.stack([np.asarray(found[name].values, dtype=np.float64) for name in quantities], axis=1)
         return values[back.ravel()], np.asarray(found["impacts"].values)[back.ravel()]
 
     return evaluate
@@ -224,7 +259,7 @@ def _by_systems(system: System, quantity: Callable[[System], float], names: list
 
     def evaluate(rows: _Array) -> tuple[_Array, _Array | None]:
         found = [float(quantity(system.replace(**dict(zip(names, row.tolist(), strict=True))))) for row in rows]
-        return np.array(found), None
+        return np.array(found)[:, None], None
 
     return evaluate
 
@@ -235,40 +270,47 @@ def _dataset(
     here: _Array,
     moved: _Array,
     error: _Array,
-    differenced: NDArray[np.bool_],
+    method: NDArray[np.str_],
     growth: _Array,
-    label: str,
-    value: float,
-    units: str,
+    quantities: tuple[list[str], _Array, list[str], list[str]],
 ) -> xr.Dataset:
     from snapbeam.util.datasets import xr
 
+    labels, values, units, reasons = quantities
     diagnostics = tuple(
         Diagnostic(
             "gradient.doubtful",
-            f"{name}: the derivative of {label} has an estimated relative error of {each:.1g}: an impact grazes, or begins or ends "
-            "with the run, or the motion is chaotic; change the parameter a little or the number of cycles",
-            {"relative_error": float(each)},
+            f"{label}: estimated relative error of the derivative by "
+            f"{', '.join(f'{name} {each:.1g}' for name, each in large.items())}: an impact grazes, or begins or ends with the run, or the "
+            "motion is chaotic; change the parameter a little or the number of cycles",
+            {"relative_error": max(large.values())},
         )
-        for name, each in zip(names, error, strict=True)
-        if not each <= _DOUBTFUL
+        for label, reason, errors in zip(labels, reasons, error, strict=True)
+        if not reason
+        and (large := {name: float(each) for name, each in zip(names, errors, strict=True) if not each <= _DOUBTFUL})
     )
     tell(diagnostics)
-    elasticity = moved / value if value != 0.0 else np.full_like(moved, np.nan)
-    text = {"units": "1", "long_name": "relative change of the quantity per relative change of the parameter"}
+    elasticity = np.divide(moved, values[:, None], out=np.full_like(moved, np.nan), where=values[:, None] != 0.0)
+    both, text = (
+        ("statistic", "parameter"),
+        {"units": "1", "long_name": "relative change of the quantity per relative change of the parameter"},
+    )
     return xr.Dataset(
         {
-            "derivative": ("parameter", moved / here, {"long_name": f"derivative of {label} by the parameter"}),
-            "elasticity": ("parameter", elasticity, text),
-            "relative_error": ("parameter", error, {"units": "1", "long_name": "estimated error of the derivative"}),
-            "method": ("parameter", np.where(differenced, "differences", "exact"), {"long_name": "way in which the derivative was taken"}),
+            "derivative": (both, moved / here, {"long_name": "derivative of the quantity by the parameter"}),
+            "elasticity": (both, elasticity, text),
+            "relative_error": (both, error, {"units": "1", "long_name": "estimated error of the derivative"}),
+            "method": (both, method, {"long_name": "way in which the derivative was taken"}),
             "growth": ("parameter", growth, {"units": "1", "long_name": "change of the state at the end per relative change of the parameter"}),
             "unit": ("parameter", [lookup(name).quantity.unit for name in names], {"long_name": "unit of the parameter"}),
             "nominal_value": ("parameter", here, {"long_name": "value of the parameter"}),
+            "value": ("statistic", values, {"long_name": "value of the statistic"}),
+            "statistic_unit": ("statistic", units, {"long_name": "unit of the statistic"}),
+            "no_derivative": ("statistic", reasons, {"long_name": "reason why the statistic has no derivative"}),
         },
-        {"parameter": names},
+        {"statistic": labels, "parameter": names},
         {
-            "title": "gradient", "quantity": label, "value": value, "units": units, "system_hash": system.hash,
-            "snapbeam_system": canonical_json(system.to_mapping()), "diagnostics": to_json(diagnostics),
+            "title": "gradient", "system_hash": system.hash, "snapbeam_system": canonical_json(system.to_mapping()),
+            "diagnostics": to_json(diagnostics),
         },
     )  # fmt: skip

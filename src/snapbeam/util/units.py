@@ -81,6 +81,19 @@ def number_in_unit(text: str, unit: str) -> float | None:
     return _converted([(found[1], False), (found[2] or "1", True)], found[3] or "", unit)
 
 
+def unit_in_text(text: str) -> str:
+    """The unit of a number as it is written, such as ``mm/s``; empty without one, and of a product of numbers.
+
+    Examples
+    --------
+    >>> from snapbeam.util.units import unit_in_text
+    >>> unit_in_text("20 mm/s"), unit_in_text("0.3"), unit_in_text("200 um * 30 um")
+    ('mm/s', '', '')
+    """
+    found = _TEXT.fullmatch(text)
+    return "" if found is None or not found[3] or _OPERATOR.search(found[3]) else found[3]
+
+
 def _converted(numbers: list[tuple[str, bool]], given: str, unit: str) -> float:
     """The product of numbers, each of which may be a divisor, from the unit *given* to *unit*."""
     value = math.prod(1.0 / float(text) if divides else float(text) for text, divides in numbers)
