@@ -240,7 +240,7 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         on_a_base(sb.DisplacementSine(frequency_ratio=0.9, displacement_amplitude=0.25)),
         {"base_excitation.frequency_ratio": (0.4, 2.0), "base_excitation.displacement_amplitude": (0.05, 0.5)},
     ),
-    "a base of two sines": ExtendedSystem(on_a_base(TWO), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
+    "a base of two sines": ExtendedSystem(on_a_base(TWO), {"base_excitation.velocity_amplitude_1": (0.05, 0.5)}),
     "a burst of the base": ExtendedSystem(on_a_base(BURST), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
     "a swept base": ExtendedSystem(on_a_base(CHIRP), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
     "a noisy base": ExtendedSystem(on_a_base(NOISE), {"base_excitation.velocity_rms": (0.02, 0.3)}),

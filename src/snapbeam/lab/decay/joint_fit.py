@@ -188,7 +188,7 @@ def _with_law(
 
 
 def _bend(mode: ModeEstimate, settings: FitSettings) -> tuple[float, float]:
-    """What softening adds to the logarithm of the amplitude at the start, and its standard deviation."""
+    """Share of softening in the logarithm of the amplitude at the start, and its standard deviation."""
     softening = mode.softening * mode.amplitude**2 if settings.soften else 0.0
     mean, error = law_priors(settings.units)["r"]
     return mean * softening, error * abs(softening)
