@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 CONSTRAINTS = ROOT / "constraints.txt"
-EXTRAS = ("lab", "video", "cluster", "explorer", "laws")
+EXTRAS = ("lab", "video", "cluster", "explorer", "laws", "cuda")
 """What users install; the others are for working on snapbeam."""
 
 _SYSTEM = (
@@ -45,6 +45,12 @@ _LAWS = (
     "register_statistic(row)\n"
     "print(sb.simulate(system, sb.Integration(cycles=2)))\n"
 )
+# without a GPU the kernels compile
+_KERNELS = (
+    f"{_SYSTEM}from snapbeam.solver import cuda, native; from snapbeam.solver.assemble import make_ensemble; "
+    "problem = native._Arrays(make_ensemble(system, sb.Integration(cycles=1))).problem; "
+    "assert cuda.compiled('sm_90', cuda.definitions(problem)).code"
+)
 _GRID = "--frequency-ratio 1:1.5:3 --velocity-amplitude 0.1:0.4:3"
 USES = {
     "": (
@@ -70,6 +76,7 @@ USES = {
     ),
     "explorer": (f"snapbeam map --modes 1 --cycles 4 {_GRID}", "page: snapbeam explore map.nc --no-browser"),
     "laws": (("python", "-c", _LAWS),),
+    "cuda": (("python", "-c", _KERNELS),),
 }  # fmt: skip
 
 
