@@ -62,6 +62,11 @@ def test_any_system_opens_with_its_axes_fields_and_views(name, axes):
     try:
         page = Page(shared, {})
         assert list(page.card.plane.names) == axes == list(page.fields)
+        own = {name: shared.system.parameters[name] for name in axes}
+        assert page.points[0].values == own, "opens with its own run"
+        assert [float(field.value) for field in page.fields.values()] == pytest.approx(
+            list(own.values()), rel=1e-5
+        )
         middle = [float(np.mean(axis.span)) for axis in (page.card.plane.x, page.card.plane.y)]
         found = answer(page.card, page.card.point(*middle), page.card.system, HOW, Token(), lambda _: None)
         assert found.same and found.run.summary.status is RunStatus.OK

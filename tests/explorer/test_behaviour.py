@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam.explorer.maps import opened
+from snapbeam.explorer.maps import brief, opened
 
 
 def _turn(page, title):
@@ -35,7 +35,7 @@ def test_a_changed_system_says_what_is_old(tab, served, small_map, system):
     page.page.get_by_role("button", name="Use this system").click()
     page.wait(lambda: "map is old" in page.text("old-words"), "what is old")
     assert "%" not in page.text("key-box"), "nothing of the changed system is drawn yet"
-    assert "beam.thickness = 0.0005" in page.text("old-words")
+    assert "Beam: thickness 0.0005 m" in page.text("old-words")
     again = {"beam.thickness": 0.0005, "drive.frequency_ratio": x, "drive.velocity_amplitude": y}
     found = sb.simulate(system.replace(**again), sb.Integration(cycles=30)).summary
     page.wait(
@@ -150,6 +150,16 @@ def test_two_points_side_by_side(tab, served, small_map):
     page.wait(lambda: "crossings" in page.head(1), "the run of B")
     assert f"{ratio[3]:.6g}" in page.head(0) and f"{ratio[18]:.6g}" in page.head(1)
     assert page.data("map-mark", "text") == ["A", "B"]
+    # two points that six digits do not tell apart: a letter on either side, both waveforms in one axis
+    near = float(velocity[3]) * (1.0 + 1e-10)
+    page.page.get_by_label("frequency ratio").fill(repr(float(ratio[3])))
+    page.page.get_by_label("velocity amplitude").fill(repr(near))
+    page.page.get_by_label("velocity amplitude").press("Enter")
+    page.wait(lambda: brief(near, float(velocity[3])) in page.head(1), "B beside A")
+    page.wait(lambda: brief(float(velocity[3]), near) in page.head(0), "A in as many digits")
+    assert page.data("map-mark", "align") == ["right", "left"]
+    page.wait(lambda: 0.0 < min(page.data("apart", "y"), default=0.0) < 1e-8, "a small separation")
+    assert len(page.data("waveform-second", "x")) > 0
 
 
 @pytest.mark.slow

@@ -207,10 +207,23 @@ def test_the_page_uses_the_height_of_the_window_and_the_width_of_a_phone(tab, se
         const view = model && Bokeh.index.find_one(model);
         return view ? view.el.getBoundingClientRect().height : 0; }"""
     page.wait(lambda: page.js(height, ["map"]) > 600, "a tall map")
-    page.wait(lambda: page.js(height, ["waveform-plot"]) > 450, "a tall waveform")
+    page.wait(lambda: page.js(height, ["waveform-plot"]) > 350, "a tall waveform")
+    page.wait(lambda: page.js(height, ["beam-small"]) > 200, "the beam below it")
     assert page.js("() => document.scrollingElement.scrollHeight <= window.innerHeight")
     page.page.set_viewport_size({"width": 390, "height": 844})
     page.wait(lambda: page.js("() => document.scrollingElement.scrollWidth") <= 390, "no horizontal scroll")
+    title, button = page.page.locator("h1"), page.page.get_by_role("button", name="Two points")
+    assert title.bounding_box()["y"] + title.bounding_box()["height"] <= button.bounding_box()["y"]
+    for name, shown in (("Beam", "beam-plot"), ("Numbers", "")):
+        _turn(page, name)
+        page.wait(
+            lambda shown=shown: (
+                page.js(height, [shown]) > 0 if shown else page.page.locator("table.numbers").count()
+            ),
+            name,
+        )
+        page.page.wait_for_timeout(300)
+        assert page.js("() => document.scrollingElement.scrollWidth") <= 390, name
     assert page.page.locator('meta[name="viewport"]').count() == 1
 
 

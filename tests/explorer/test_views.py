@@ -9,7 +9,7 @@ import snapbeam as sb
 
 pytest.importorskip("panel")
 
-from snapbeam.explorer.run_view import WaveformPanel
+from snapbeam.explorer.run_view import BeamPanel, WaveformPanel
 from snapbeam.explorer.style import LIGHT, Cursor
 
 
@@ -59,7 +59,8 @@ def test_every_view_shows_the_run(opened):
 def test_the_beam_moves_and_is_that_of_the_modes(opened):
     page, run = opened
     _turn(page, "Beam")
-    page.wait(lambda: len(page.data("beam", "top")) == 121, "the beam")
+    model = "() => !!Bokeh.documents[0].get_model_by_name('beam-plot')"
+    page.wait(lambda: page.js(model) and len(page.data("beam", "top")) == 121, "the beam")
     place = "Bokeh.documents[0].get_model_by_name('frames').data.t"
     first = page.data("beam", "top")
     at = page.js(f"() => {place}[0]")
@@ -100,14 +101,15 @@ def test_the_force_of_a_link_has_all_samples(tab, served, small_map, system):
     page = tab(f"{served.url}?at=drive.frequency_ratio:{x!r},drive.velocity_amplitude:{y!r}&theme=dark")
     page.wait(lambda: "bitwise identical" in page.notes(), "the run")
     exact = system.replace(**{"drive.frequency_ratio": x, "drive.velocity_amplitude": y})
-    peak = sb.simulate(exact, sb.Integration(cycles=30)).summary.peak_force
+    peak = float(sb.simulate(exact, sb.Integration(cycles=30)).dataset["contact_force"].max())
     page.wait(lambda: max(page.data("force", "y"), default=0.0) == pytest.approx(peak, rel=1e-6), "the peak")
 
 
 def test_no_curve_of_the_waveform_hides_another_and_impacts_are_curves(system):
-    panel = WaveformPanel(LIGHT, Cursor(LIGHT, "", lambda work, milliseconds: None))
+    cursor = Cursor(LIGHT, "", lambda work, milliseconds: None)
+    panel = WaveformPanel(LIGHT, cursor, BeamPanel(LIGHT, cursor))
     panel.activate()
-    _, center, striker, _ = (each.glyph for each in panel.top.renderers)
+    _, center, striker, *_ = (each.glyph for each in panel.top.renderers)
     assert striker.line_dash and not center.line_dash, "the dashed thin line lies on the wide one"
     assert striker.line_width < center.line_width
     point = {"drive.frequency_ratio": 1.14, "drive.velocity_amplitude": 0.4}

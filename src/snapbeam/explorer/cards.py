@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -27,6 +28,7 @@ from snapbeam.explorer.shared import Shared
 from snapbeam.model.parameter_axes import CHANGES_UNITS
 from snapbeam.model.parameter_file import Config, config_from_mapping
 from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters
+from snapbeam.model.quantity import split_name
 from snapbeam.plot.dataset import plot_dataset
 from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
 from snapbeam.plot.style import CLASS_COLORS, save_figure
@@ -59,6 +61,8 @@ class WindowControl:
         self.card = card
         self._token: jobs.Token | None = None
         self._moved, self._pushed = 0, 0.0
+        self._allowed: dict[Any, float] = {}
+        """Seconds that were agreed to for each window: no question is asked twice."""
         self._awake = False
         self._waiting = jobs.Waiting(card.later)
 
@@ -113,6 +117,7 @@ class WindowControl:
         if bounds is None:
             return
         key = (self.card.plane_key, bounds)
+        self._allowed[key] = seconds = max(seconds, self._allowed.get(key, 0.0))
         self.cancel("")
         self.card.own.add(key)
         try:
@@ -307,7 +312,7 @@ class MapCard:
         self.again = style.button(
             "Compute view",
             self.post,
-            lambda: self.control.compute_view(force=True),
+            lambda: self.control.more() if self.more.visible else self.control.compute_view(force=True),
             width=110,
             align="center",
         )
@@ -622,6 +627,25 @@ class MapCard:
                 held = {name: found[at].item() for name, found in window.values.items()}
                 return maps.Point(values | self.plane.fixed_values(), held)
         return self.plane.at(*self.plane.index(x, y))
+
+    def start(self) -> maps.Point:
+        """The point that is shown first: of a system its own, of a map one whose beam moves most, in the middle."""
+        names = self.plane.parameters
+        if self.system is not None and not self.source.skeleton.data_vars:
+            own = maps.values_of(names, self.system, self.integration)
+            if len(own) == len(names):
+                return maps.Point(own)
+        left, right, low, high = self.view.view
+        middle = self.plane.index(0.5 * (left + right), 0.5 * (low + high))
+        kinds = None
+        if "response_class" in self.source.numbers() and not self.changed:
+            with suppress(InputError):  # the file is gone; a run can be computed
+                kinds = self.plane.values("response_class")
+        if kinds is None:
+            return self.plane.at(*middle)
+        places = np.argwhere(kinds == kinds.max())
+        away = (places - np.array(middle)) / np.array(kinds.shape)
+        return self.plane.at(*places[np.argmin((away**2).sum(axis=1))].tolist())
 
     def expected(self, point: maps.Point) -> dict[str, Any]:
         """Results of the map at a point; empty if the point is not on the map, or the system has changed."""
@@ -943,8 +967,16 @@ class SystemCard:
     def _open(self, config: Config) -> None:
         given = {f"{section}.{name}" for section, values in config.given.items() for name in values}
         given |= {PHYSICAL[name].parameter for name in given & PHYSICAL.keys()}
+        of_run = {
+            name: value
+            for name, value in config.given.get("integration", {}).items()
+            if hasattr(config.integration, name)
+        }
+        how = self.page.shared.integration.replace(
+            **{name: getattr(config.integration, name) for name in of_run}
+        )
         try:
-            self.page.use(config.system, config.integration, given)
+            self.page.use(config.system, how, given)
         except InputError as error:
             self.refuse(str(error))
 
@@ -990,6 +1022,25 @@ class SystemCard:
         found = [each.message for each in self.system.diagnostics()]
         doubts = Markup("").join(style.REFUSED.format(each) for each in found)
         self.facts.object = Markup('<table class="facts"><tr>{}</tr></table>{}').format(cells, doubts)
+
+
+def changed_words(changes: Mapping[str, Any]) -> str:
+    """Changed parameters in the words of their fields; of a section with lists, and of one that is gone, its title."""
+    found: dict[str, None] = {}
+    for name, value in changes.items():
+        section, key = split_name(name)
+        title = _SECTIONS.get(section.partition(".")[0], section.replace("_", " "))
+        if isinstance(value, (list, tuple, dict)):
+            found[title] = None
+        elif key:
+            row = parameters().get(name)
+            unit = "" if row is None or row.quantity.unit == "1" or value is None else f" {row.quantity.unit}"
+            text = "the default" if value is None else maps.brief(value)
+            found[f"{title}: {key.replace('_', ' ')} {text}{unit}"] = None
+        else:
+            found[f"default {title.lower()}" if section in _ALWAYS else f"no {title.lower()}"] = None
+    more = f" and {len(found) - 6} more" if len(found) > 6 else ""
+    return ", ".join(list(found)[:6]) + more
 
 
 def _group(row: Parameter) -> str:
@@ -1082,7 +1133,7 @@ class TakeCard:
     def refresh(self) -> None:
         """Write the command and the lines of what is shown."""
         page = self.page
-        run, point, card = page.runs[page.which].run, page.points[page.which], page.card
+        run, point, card = page.runs[page.which].current, page.points[page.which], page.card
         part, texts = Markup('<h2>{}</h2><pre class="{}">{}</pre>'), []
         beside = " (with the system saved as system.toml beside it)"
         if run is not None and point is not None:
@@ -1100,7 +1151,15 @@ class TakeCard:
             texts.append(
                 part.format(f"The command that makes the finest window{beside}", "map-command", command)
             )
-        self.text.object = Markup("").join(texts) or style.NOTE.format("Click on a point of the map first.")
+        old = page.runs[page.which].old
+        none = (
+            "The run is old: that of the present system is not computed."
+            if old
+            else "Click on a point of the map first."
+        )
+        self.text.object = Markup("").join(
+            ([] if run or not old else [style.REFUSED.format(none)]) + texts
+        ) or style.NOTE.format(none)
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
@@ -1143,10 +1202,12 @@ class TakeCard:
 
     def _run(self) -> Run:
         """The run that is shown; refused (InputError) if there is none."""
-        run = self.page.runs[self.page.which].run
-        if run is None:
+        view = self.page.runs[self.page.which]
+        if view.old:
+            raise InputError("the run is old: that of the present system is not computed")
+        if view.run is None:
             raise InputError("there is no run: click on a point of the map first")
-        return run
+        return view.run
 
     def _run_picture(self) -> None:
         """Give the figure of the view that is seen, of the part of the run that is seen."""

@@ -72,12 +72,14 @@ class MapView:
             self.plot.scatter(
                 "x", "y", color="color", source=source, size=size, line_color=color, line_width=width
             )
-        self.mark = models.ColumnDataSource({"x": [], "y": [], "text": []}, name="map-mark")
+        self.mark = models.ColumnDataSource(
+            {name: [] for name in ("x", "y", "text", "away", "align")}, name="map-mark"
+        )
         for color, width in (("#000000", 3.6), ("#ffffff", 1.6)):
             ring = {"size": 17, "marker": "circle_cross", "fill_color": None}
             self.plot.scatter("x", "y", source=self.mark, line_color=color, line_width=width, **ring)
         self.plot.text(
-            "x", "y", "text", source=self.mark, x_offset=10, y_offset=-6, text_color="#ffffff",
+            "x", "y", "text", source=self.mark, x_offset="away", y_offset=-6, text_align="align", text_color="#ffffff",
             text_outline_color="#000000", text_font_style="bold", text_font_size=look.font(14),
         )  # fmt: skip
         self.mapper = models.LinearColorMapper(
@@ -247,6 +249,8 @@ class MapView:
         """Mark the points whose runs are shown."""
         self.mark.data = {
             "x": [each[0] for each in marks], "y": [each[1] for each in marks], "text": [each[2] for each in marks],
+            "away": [-10 if each[2] == "A" else 10 for each in marks],  # A left and B right of what may be one place
+            "align": ["right" if each[2] == "A" else "left" for each in marks],
         }  # fmt: skip
 
     def show_quasi_static(self, visible: bool, fixed: dict[str, Any]) -> str:

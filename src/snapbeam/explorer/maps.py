@@ -529,10 +529,11 @@ class Point:
             system = system.replace(**ratios_of(system, physical))
         return system, integration.replace(**of_run) if of_run else integration
 
-    def words(self) -> str:
-        """The point for a person, in few digits."""
+    def words(self, other: Point | None = None) -> str:
+        """The point for a person, in few digits, but all that tell it from an *other* one."""
         return ", ".join(
-            f"{lookup(name).short.replace('_', ' ')} {_brief(value)}" for name, value in self.values.items()
+            f"{lookup(name).short.replace('_', ' ')} {brief(value, other and other.values.get(name))}"
+            for name, value in self.values.items()
         )
 
 
@@ -545,8 +546,13 @@ def short_names(parameters: Iterable[str]) -> dict[str, str]:
     }
 
 
-def _brief(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def brief(value: Any, other: Any = None) -> str:
+    """A value in six digits, or in as many as tell it from an *other* one."""
+    if not isinstance(value, float):
+        return str(value)
+    apart = isinstance(other, float) and other != value
+    digits = next((n for n in range(6, 17) if not apart or f"{value:.{n}g}" != f"{other:.{n}g}"), 17)
+    return f"{value:.{digits}g}"
 
 
 def system_of(attrs: Mapping[str, Any], name: str) -> sb.System:

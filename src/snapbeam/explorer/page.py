@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 from urllib.parse import parse_qs
 
@@ -18,7 +18,7 @@ import snapbeam as sb
 from snapbeam import InputError, Integration, Run, RunStatus, System
 from snapbeam.explorer import jobs, maps
 from snapbeam.explorer.address import Address, typed
-from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard
+from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard, changed_words
 from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
@@ -98,6 +98,8 @@ _PATIENT = 150
 """Milliseconds after which a run that is still computed is said to be."""
 _SENT = 40
 """Milliseconds that what was drawn needs to be on its way to the browser."""
+_EARLY = 0.5
+"""Seconds for which a page that is not sent yet waits for its first run."""
 _DRAGGED = 30
 """Cycles of the run that is shown while a slider is dragged."""
 _LONGEST = 1.0
@@ -130,7 +132,7 @@ class Page(jobs.Tab):
         self.card.cut_moved = self._cut_moved
         self.waiting = jobs.Waiting(self.later)
         self.runs = [RunView(self.look, "A", self.post, self.later)]
-        self.runs[0].turned = self.write_address
+        self.runs[0].turned = self._turned
         self.points: list[maps.Point | None] = [None, None]
         self._tokens: list[jobs.Token | None] = [None, None]
         self._dragged: Mapping[str, Any] = {}
@@ -166,23 +168,62 @@ class Page(jobs.Tab):
         self.changes: dict[str, Any] = {}
         self._take: TakeCard | None = None
         self._system: SystemCard | None = None
-        self.layout = framed(self)
-        self._version = shared.source.version
         if self.address.changes:
             self._take_changes(self.address.changes)
+        early = self._early()
+        self.runs[0].stand()
+        self.layout = framed(self)
+        self._version = shared.source.version
+        early()
         pn.state.onload(self._stands)
+
+    def _early(self) -> Callable[[], None]:
+        """Begin the first run; what is returned shows it, if it is ready, in the page as it is sent."""
+        names, at = set(self.card.plane.parameters), self.address.at
+        base, how = self.card.system, self.card.integration
+        if base is None:
+            return lambda: None
+        known = names <= at.keys()
+        point = maps.Point({name: at[name] for name in at if name in names}) if known else self.card.start()
+        self.address, self.points[0] = replace(self.address, at=point.values), point
+        self._fill_fields(point)  # before somebody can type
+        found: list[Run] = []
+        ended, token = threading.Event(), jobs.Token(jobs.RUN_SECONDS)
+
+        def work(token: jobs.Token) -> None:
+            system, integration = point.system(base, how.replace(engine="auto", threads=None))
+            jobs.check_run(system, integration)
+            found.append(
+                _quick(system, integration, token) or sb.simulate(system, integration, progress=token.check)
+            )
+
+        def show() -> None:
+            ended.wait(_EARLY)
+            token.cancel()
+            for run in found:
+                self.runs[0].show(run, point.words(), fresh=True)
+
+        def work_and_end(token: jobs.Token) -> None:
+            try:
+                work(token)
+            finally:
+                ended.set()
+
+        self.shared.jobs.run(work_and_end, lambda _, __: None, token)
+        return show
 
     def _stands(self) -> None:
         """The map is on the screen: now for the rest."""
-        self.card.control.wake()
         if self.shared.source.growing and self.doc is not None:
             self._look_for_more()
             self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         with self._together():
-            self.runs[0].stand()
-            self._show_runs(self.address)  # changes made before the browser is connected may be lost
+            self._show_runs(
+                self.address, again=True
+            )  # changes made before the browser is connected may be lost
             self._quiet = False
             self.write_address()  # the state to which Back returns
+        self.card.control.wake()  # after the run, for which windows wait
         self.later(self._at_rest, _AFTER)
 
     def _at_rest(self) -> None:
@@ -283,6 +324,7 @@ class Page(jobs.Tab):
         self.points[which] = None
         self.waiting.end(which)
         self.runs[which].forget()
+        self._pair()
         self._mark()
 
     def _look_for_more(self) -> None:
@@ -313,7 +355,7 @@ class Page(jobs.Tab):
     def ask(self, point: maps.Point, which: int | None = None) -> None:
         """Compute the run of a point; earlier requests are cancelled."""
         which = self.which if which is None else which
-        view, words = self.runs[which], point.words()
+        view = self.runs[which]
         if self.card.system is None:
             self._fill_fields(point)
             view.fail(self.shared.why_not)
@@ -323,6 +365,7 @@ class Page(jobs.Tab):
             before.cancel()
         self._tokens[which] = token = jobs.Token(jobs.RUN_SECONDS)
         self.points[which] = point
+        words = self._words(which)
         base, how = self.card.system, self.card.integration
 
         def work(token: jobs.Token) -> Answer:
@@ -343,6 +386,30 @@ class Page(jobs.Tab):
             self._mark()
             self.write_address()
 
+    def _words(self, which: int) -> str:
+        """A point in words, with all digits in which it differs from the other one."""
+        point, other = self.points[which], self.points[1 - which]
+        return "" if point is None else point.words(other if self.compare.value else None)
+
+    def _turned(self) -> None:
+        """Another view of A: B shows the same, or is drawn over A's waveform."""
+        self._pair()
+        self.write_address()
+
+    def _pair(self) -> None:
+        """Draw both waveforms in one axis, and the other views of B below those of A."""
+        first, second = self.runs[0], self.runs[-1]
+        two = self.compare.value and len(self.runs) > 1
+        first.waveform.beside(second.current if two else None)
+        if two:
+            second.tabs.visible = first.tabs.active > 0
+            second.tabs.active = first.tabs.active
+            for which, view in enumerate(self.runs):
+                if self.points[which] is not None:
+                    view.rename(self._words(which))
+        below = ["two" if first.tabs.active else "over"] if two else []
+        self.runs_box.css_classes = ["right", *below]
+
     def _cut_moved(self, cut: dict[str, Any]) -> None:
         """Let the point that the fields hold follow the sliders."""
         point = self.points[self.which]
@@ -360,7 +427,8 @@ class Page(jobs.Tab):
     ) -> None:
         if not token.cancelled and self.points[which] is point:
             self.waiting.end(which)
-            self.runs[which].show(run, point.words(), fresh=True)
+            self.runs[which].show(run, self._words(which), fresh=True)
+            self._pair()
         self.later(sent.set, _SENT)
 
     def _done(
@@ -371,11 +439,13 @@ class Page(jobs.Tab):
         self.waiting.end(which)
         view = self.runs[which]
         if found is None:
-            view.fail(f"{point.words()}: {error}")
+            view.fail(f"{self._words(which)}: {error}")
+            self._pair()
             return
         run, shown = found.run, view.run
         fresh = shown is None or shown.system.hash != run.system.hash
-        view.show(run, point.words(), fresh=fresh)
+        view.show(run, self._words(which), fresh=fresh)
+        self._pair()
         view.say("map", found.words, bad=not found.same)
         view.say("chances", found.chances)
         view.say("conditioning", "")
@@ -445,7 +515,10 @@ class Page(jobs.Tab):
         for which in sorted({0, 1}, key=lambda each: each == self.which):
             point = self.points[which]
             if point is not None:
+                self.runs[which].outdate()
                 self.ask(maps.Point(point.values), which)
+        if self._take is not None:
+            self._take.refresh()
         self.write_address()
 
     def _adopt(self, changes: Mapping[str, Any]) -> None:
@@ -459,10 +532,9 @@ class Page(jobs.Tab):
             )
         self.changes = dict(changes)
         self.card.use(system, integration, bool(changes))
-        names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(changes.items())[:6])
-        old = f"The map is old: it is of the system before. Changed: {names}" if changes else ""
-        if not self.shared.source.skeleton.data_vars:
-            old = f"Changed: {names}" if changes else ""
+        old = f"Changed: {changed_words(changes)}" if changes else ""
+        if old and self.shared.source.skeleton.data_vars:
+            old = f"The map is old: it is of the system before. {old}"
         self.old.object = Markup('<p class="old" role="status">{}</p>').format(old) if old else ""
         if self._system is not None:
             self._system.fill()
@@ -484,7 +556,7 @@ class Page(jobs.Tab):
             self.later(self.runs[1].complete, _AFTER)
         if len(self.runs) > 1:
             self.runs[1].layout.visible = self.compare.value
-            self.runs_box.css_classes = ["right", "two"] if self.compare.value else ["right"]
+        self._pair()
         if self.compare.value:
             self.target.value = "B"
         self._mark()
@@ -503,9 +575,10 @@ class Page(jobs.Tab):
     def _fill_fields(self, point: maps.Point) -> None:
         if set(point.values) - set(self.fields):
             self._make_fields()
+        other = self.points[1 - self.which] if self.compare.value else None
         for name, value in point.values.items():
             if name in self.fields:
-                text = f"{value:.6g}" if isinstance(value, float) else str(value)
+                text = maps.brief(value, other and other.values.get(name))
                 typed_so = str(self.fields[name].value_input or self.fields[name].value)
                 if isinstance(value, float) and typed_so.strip() and _same(typed_so, value):
                     text = typed_so
@@ -579,7 +652,3 @@ def _same(text: str, value: float) -> bool:
         return float(text) == value
     except ValueError:
         return False
-
-
-def _brief(value: Any) -> str:
-    return "none" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -375,7 +375,9 @@ def _shared(what: Any, system: System | None, integration: Integration | None) -
     settings.resources = "server"  # whatever a page is made of comes from this machine
     pn.extension()
     file = Path(what) if isinstance(what, (str, Path)) else None
-    return Shared(opened(what, system=system, integration=integration), file)
+    shared = Shared(opened(what, system=system, integration=integration), file)
+    shared.warm()
+    return shared
 
 
 def explore(what: Any = None, *, integration: Integration | None = None, height: int = 900) -> Explorer:
