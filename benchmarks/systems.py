@@ -51,8 +51,8 @@ MODELS: dict[str, Parts] = {
     "a gap": {"strikers": [{"gap": 4e-5}]},
     "`burst`": {"drive": sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.2, duration_cycles=1e6, ramp_up_cycles=2.0, ramp_down_cycles=1.0)},
     "`chirp`": {"drive": sb.Chirp(start_ratio=0.5, stop_ratio=3.0, velocity_amplitude=0.2, sweep_cycles=40.0)},
-    "`two_tone`": {
-        "drive": sb.TwoTone(frequency_ratio=1.0, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1)
+    "`sine+sine`": {
+        "drive": sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2) + sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.1)
     },
     "`band_limited_noise`": {"drive": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2)},
     "a body of 20 g": {"strikers": [{"mass": 0.02, "suspension_stiffness": 700.0, "suspension_damping": 0.7}]},

@@ -134,14 +134,14 @@ def _physical() -> str:
     found: dict[tuple[str, str, str], list[str]] = {}
     for name, row in PHYSICAL.items():
         section, field = split_name(name)
-        if numbered(section)[1] == 1:
+        if numbered(section)[1] == 1 and not field.endswith(tuple("1234")):
             key = field, split_name(row.parameter)[1], row.unit.replace("um", "µm")
             found.setdefault(key, []).append(section)
     rows = [(f"`{one}`", f"`{ratio}`", unit, _listed(own)) for (one, ratio, unit), own in found.items()]
     return (
         "## Names in physical units\n\n"
         "Files, options, axes, uncertainties and Python accept these names in place of the ratios, of every contact and force by "
-        "its number or label too (`drive.2.frequency_hz`). The last part alone names the parameter if one part of the system alone "
+        "its number or label and of every term of a sum too (`drive.2.frequency_hz`, `frequency_hz_2`). The last part alone names the parameter if one part of the system alone "
         "has it.\n\n" + _table(("name", "in place of", "unit", "sections"), rows)
     )
 
@@ -451,7 +451,6 @@ def _parts() -> dict[str, Any]:
     )  # fmt: skip
     burst = sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.1, duration_cycles=9.0)
     noise = sb.BandLimitedNoise(low_ratio=0.8, high_ratio=1.4, velocity_rms=0.1, seed=1)
-    second = {"second_ratio": 1.8, "second_amplitude": 0.02}
     ends = beam.replace(
         boundary=sb.BoundaryConditions(left_rotational_stiffness=50.0, right_rotational_stiffness=50.0)
     )
@@ -474,10 +473,9 @@ def _parts() -> dict[str, Any]:
         "contact `restitution`": struck(contact=sb.Restitution(0.9), of=sb.ReducedModel.from_beam(beam, modes=1)),
         "drive `displacement_sine`": struck(sb.DisplacementSine(frequency_ratio=1.2, displacement_amplitude=0.1)),
         "drive `acceleration_sine`": struck(sb.AccelerationSine(frequency_ratio=1.2, acceleration_amplitude=0.1)),
-        "drive `two_tone`, in a ratio of small whole numbers": struck(
-            sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.1, **second)
+        "drive `sine+sine`, in a ratio of small whole numbers": struck(
+            sine + sb.Sine(frequency_ratio=1.8, velocity_amplitude=0.1)
         ),
-        "drive `sine+sine`, in such a ratio": struck(sine + sb.Sine(frequency_ratio=1.8, velocity_amplitude=0.1)),
         "drive `burst`": struck(burst),
         "drive `chirp`": struck(chirp),
         "drive `half_sine`": struck(sb.HalfSine(displacement_amplitude=0.5, duration=0.5)),

@@ -33,7 +33,6 @@ from .model.drive.sine import AccelerationSine as AccelerationSine
 from .model.drive.sine import DisplacementSine as DisplacementSine
 from .model.drive.sine import Sine as Sine
 from .model.drive.sum import SumDrive as SumDrive
-from .model.drive.two_tone import TwoTone as TwoTone
 from .model.external_force import ConstantForce as ConstantForce
 from .model.external_force import ExternalForce as ExternalForce
 from .model.external_force import HarmonicForce as HarmonicForce

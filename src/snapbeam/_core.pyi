@@ -13,6 +13,11 @@ def integrate(
 ) -> None:
     """Integrate runs; writes into the arrays of *batch*."""
 
+def moved_arguments(
+    problem: Mapping[str, Any], batch: Mapping[str, Any], moved: Mapping[int, int]
+) -> tuple[bytes, bytes]:
+    """A problem and a batch as bytes, whose arrays lie at other addresses."""
+
 def integrate_tangents(
     problem: Mapping[str, Any],
     batch: Mapping[str, Any],

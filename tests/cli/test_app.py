@@ -14,17 +14,7 @@ from typer.testing import CliRunner
 from snapbeam._version import __version__
 from snapbeam.cli.app import app
 
-MAP = (
-    "map",
-    "--modes",
-    "1",
-    "--cycles",
-    "8",
-    "--frequency-ratio",
-    "0.3:1.5:4",
-    "--velocity-amplitude",
-    "0.05:0.6:3",
-)
+MAP = ("map", "--modes", "1", "--cycles", "8", "--frequency-ratio", "0.3:1.5:4", "--velocity-amplitude", "0.05:0.6:3")
 
 
 @pytest.fixture
@@ -150,25 +140,11 @@ def test_file_and_options_together(cli, tmp_path):
     assert result.exit_code == 0, result.output
     dataset = xr.load_dataset(tmp_path / "map.nc", engine="h5netcdf")
     assert dict(dataset.sizes) == {"frequency_ratio": 2, "location": 2}
-    assert (dataset.attrs["modes"], dataset.attrs["cycles"], dataset.attrs["contact_stiffness"]) == (
-        2,
-        6,
-        1e8,
-    )
+    assert (dataset.attrs["modes"], dataset.attrs["cycles"], dataset.attrs["contact_stiffness"]) == (2, 6, 1e8)
 
 
 def test_simulate(cli, tmp_path):
-    run = (
-        "simulate",
-        "--modes",
-        "2",
-        "--cycles",
-        "5",
-        "--frequency-ratio",
-        "0.5",
-        "--velocity-amplitude",
-        "0.4",
-    )
+    run = ("simulate", "--modes", "2", "--cycles", "5", "--frequency-ratio", "0.5", "--velocity-amplitude", "0.4")
     result = cli(*run, "-o", "run.nc", "--plot", "run.png", "--window", "0:5")
     assert result.exit_code == 0, result.output
     assert re.search(r"intrawell|interwell", result.stdout.splitlines()[0])
@@ -206,9 +182,7 @@ def test_interrupt_leaves_nothing_behind(tmp_path):
     """Ctrl-C while a long map is computed: status 130, no traceback, no file."""
     command = [sys.executable, "-m", "snapbeam", "map", "--modes", "1"]
     command += ["--cycles", "30000", "--frequency-ratio", "0.5:4:20", "--velocity-amplitude", "0.01:0.65:20"]
-    process = subprocess.Popen(
-        command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stderr.readline() == "400 points to compute\n"
     first = process.stderr.readline()
     assert re.match(r"\d+ of 400 points, [\d.]+ points/s, .* left", first), first + process.stderr.read()

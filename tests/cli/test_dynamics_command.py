@@ -14,10 +14,7 @@ from snapbeam.util import diagnostics
 BEAM = ["--modes", "1", "--damping-ratio", "0.05", "--frequency-ratio", "1.6", "--velocity-amplitude", "0.03"]
 CASES = {
     "lifetimes": (["--initial-conditions", "4", "--cycles", "120", "--settling-cycles", "20"], "lifetime"),
-    "bifurcation-diagram": (
-        ["--values", "0.02:0.04:3", "--transient", "40", "--periods", "8"],
-        "midspan_displacement",
-    ),
+    "bifurcation-diagram": (["--values", "0.02:0.04:3", "--transient", "40", "--periods", "8"], "midspan_displacement"),
     "lyapunov-spectrum": (["--periods", "40", "--transient", "10"], "exponent"),
     "poincare-section": (["--at", "impact", "--periods", "20"], "drive_phase"),
     "branch": (["--bounds", "0.02:0.05", "--max-points", "6"], "multiplier_real"),
@@ -26,9 +23,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize(
-    "options", [["--velocity-amplitude", "0.15:0.2:4"], ["--sweep", "beam.thickness=3e-4:4e-4:2"]]
-)
+@pytest.mark.parametrize("options", [["--velocity-amplitude", "0.15:0.2:4"], ["--sweep", "beam.thickness=3e-4:4e-4:2"]])
 @pytest.mark.parametrize("verb", ["hysteresis", "bifurcation-diagram", "branch"])
 def test_a_range_beside_the_values_is_refused(verb: str, options: list[str], tmp_path) -> None:
     """The parameter and its values are stated by options of their own; another range would not be used."""
@@ -54,9 +49,7 @@ def test_bad_input_is_refused_first(tmp_path) -> None:
     runner = CliRunner()
     result = runner.invoke(app, ["dynamics", "branch", *BEAM, "--bounds", "0.05:0.02"])
     assert result.exit_code != 0
-    result = runner.invoke(
-        app, ["dynamics", "bifurcation-diagram", *BEAM, "-o", str(tmp_path / "none" / "d.nc")]
-    )
+    result = runner.invoke(app, ["dynamics", "bifurcation-diagram", *BEAM, "-o", str(tmp_path / "none" / "d.nc")])
     assert result.exit_code != 0
 
 
@@ -97,10 +90,7 @@ def test_undecided_states_are_reported(tmp_path) -> None:
     assert result.exit_code == 0, result.output
     assert "over the decided states" in result.output and "basin entropy over all states" in result.output
     assert "% of the sampled region, at 95 % (12 states)" in result.output
-    assert (
-        "are undecided after 10 periods" in result.output
-        and "stopped: 10 periods (as given)" in result.output
-    )
+    assert "are undecided after 10 periods" in result.output and "stopped: 10 periods (as given)" in result.output
 
 
 def test_a_section_of_the_command_leaves_out_the_transient(tmp_path) -> None:
@@ -115,16 +105,7 @@ def test_a_section_of_the_command_leaves_out_the_transient(tmp_path) -> None:
 @pytest.mark.slow
 def test_the_example_of_the_edge_is_driven(tmp_path) -> None:
     """Its orbit strikes the tip: one impact a period, one multiplier outside, far from the hilltop."""
-    options = [
-        "--modes",
-        "1",
-        "--damping-ratio",
-        "0.05",
-        "--frequency-ratio",
-        "0.7",
-        "--velocity-amplitude",
-        "0.14",
-    ]
+    options = ["--modes", "1", "--damping-ratio", "0.05", "--frequency-ratio", "0.7", "--velocity-amplitude", "0.14"]
     text = CliRunner().invoke(app, ["dynamics", "edge", "--help"]).output.replace("\n", " ")
     assert all(option in text for option in options)
     result = CliRunner().invoke(app, ["dynamics", "edge", *options, "-o", str(tmp_path / "e.nc")])

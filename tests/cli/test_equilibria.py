@@ -91,12 +91,7 @@ def test_the_displacement_of_an_eccentric_force_is_named(tmp_path) -> None:
     curve = read_netcdf(path, "file")
     assert all(
         "displacement at the force's location" in curve[name].attrs["long_name"]
-        for name in (
-            "displacement",
-            "critical_displacement",
-            "snap_through_displacement",
-            "snap_back_displacement",
-        )
+        for name in ("displacement", "critical_displacement", "snap_through_displacement", "snap_back_displacement")
     )
     beam = BEAM.replace(axial_load=0.0)
     model = sb.ReducedModel.from_beam(beam, modes=3, imperfection=sb.Imperfection(midspan_amplitude=1e-3))

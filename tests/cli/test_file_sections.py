@@ -67,18 +67,14 @@ def test_every_section_is_valid_where_it_belongs(name):
 
 @pytest.mark.parametrize("start", ["own", "paper", "changed"])
 def test_every_combination_makes_a_system_or_names_the_section(tmp_path, capsys, start):
-    for number, chosen in enumerate(
-        subsets(MOVING)[0 if start == "own" else 1 :: 1 if start == "own" else 3]
-    ):
+    for number, chosen in enumerate(subsets(MOVING)[0 if start == "own" else 1 :: 1 if start == "own" else 3]):
         sections = sections_of((*chosen, *STATIC[number % 5 :]), start)
         if number % 2 and "contact" in sections:
             sections["contact"] = [sections["contact"], {"side": "above", "gap": 2e-5}]
         # every command reads its parameters by this function; its options differ in whether a drive and axes are known
         file = tmp_path / "system.toml"
         file.write_text(tomli_w.dumps(sections))
-        given = ({"drive.frequency_ratio": None}, {}, {"drive.frequency_ratio": None, "sweep": None})[
-            number % 3
-        ]
+        given = ({"drive.frequency_ratio": None}, {}, {"drive.frequency_ratio": None, "sweep": None})[number % 3]
         try:
             config = parameter_options.configured({"config": file} | given)
             system = config.system
@@ -168,9 +164,7 @@ def test_commands_before_the_first_run(cli, monkeypatch, command):
         monkeypatch.setattr(f"snapbeam.solver.{place}", reached)
     chosen = SAMPLED[:3] if command in ("schematic", "force-displacement") else SAMPLED  # those two compute
     files = [file_of(each, command) for each in chosen]
-    accepted = [
-        each for each, file in zip(chosen, files, strict=True) if works(cli(file, COMMANDS[command]), file)
-    ]
+    accepted = [each for each, file in zip(chosen, files, strict=True) if works(cli(file, COMMANDS[command]), file)]
     assert accepted
 
 
@@ -181,11 +175,7 @@ SHORT = {
     "threshold": ("threshold", "--parameter"),
     "poincare-section": ("dynamics", "poincare-section", "--periods", "3", "--transient", "2"),
 }  # fmt: skip
-VARIED = {
-    "drive": "velocity_amplitude",
-    "base_excitation": "acceleration_amplitude",
-    "axial_load": "amplitude",
-}
+VARIED = {"drive": "velocity_amplitude", "base_excitation": "acceleration_amplitude", "axial_load": "amplitude"}
 
 
 @pytest.mark.slow

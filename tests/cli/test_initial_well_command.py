@@ -66,14 +66,8 @@ def test_a_point_of_a_map_begins_in_its_well(cli):
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (
-            ("simulate", "--initial-well", "top"),
-            "initial_well = 'top': must be 'lower', 'upper' or the index",
-        ),
-        (
-            ("simulate", "--initial-well", "2"),
-            "initial_well = 2: the system has 2 wells; must be 0, 1, 'lower'",
-        ),
+        (("simulate", "--initial-well", "top"), "initial_well = 'top': must be 'lower', 'upper' or the index"),
+        (("simulate", "--initial-well", "2"), "initial_well = 2: the system has 2 wells; must be 0, 1, 'lower'"),
         (("map", "--sweep", "initial_well=lower,upper"), "initial_well: cannot be an axis"),
     ],
 )

@@ -36,9 +36,7 @@ main()
 @pytest.mark.parametrize("name", ["typer", *(pytest.param(name, marks=pytest.mark.slow) for name in LATER)])
 def test_while_modules_are_imported(tmp_path, number, name):
     code = AT_IMPORT.format(name=name, number=int(number))
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 128 + number, done.stderr
     assert done.stderr.splitlines()[-1] == SENTENCE
     assert "Traceback" not in done.stderr
@@ -101,17 +99,7 @@ def test_a_terminal_that_is_closed(tmp_path):
     import pty
     import termios
 
-    command = [
-        "map",
-        "--modes",
-        "1",
-        "--cycles",
-        "30000",
-        "--frequency-ratio",
-        "0.5:4:20",
-        "--checkpoint",
-        "store",
-    ]
+    command = ["map", "--modes", "1", "--cycles", "30000", "--frequency-ratio", "0.5:4:20", "--checkpoint", "store"]
     here, there = pty.openpty()
     process = subprocess.Popen(
         [sys.executable, "-m", "snapbeam", *command, "--points-per-task", "1"], cwd=tmp_path, stdin=there, stdout=there,
@@ -133,9 +121,7 @@ def test_a_background_job_ignores_what_its_shell_says(tmp_path):
     code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n" + AT_IMPORT.format(
         name="typer", number=int(signal.SIGINT)
     ).replace('"map", "--modes", "1", "--cycles", "2", "-o", "map.nc"', '"frequencies"')
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 

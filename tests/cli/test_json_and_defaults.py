@@ -76,9 +76,7 @@ def test_every_suggestion_runs_and_is_of_the_same_system(name, tmp_path, monkeyp
     for words in see:
         told = json.loads(run(*[w for w in words[1:] if w not in ("--plot", "run.png")], "--json", "-"))
         at = (
-            dict(part.split("=") for part in words[words.index("--point") + 1].split(","))
-            if "--point" in words
-            else {}
+            dict(part.split("=") for part in words[words.index("--point") + 1].split(",")) if "--point" in words else {}
         )
         point = ds
         for axis, value in at.items():
@@ -165,11 +163,7 @@ def test_what_the_paper_lent_is_told(tmp_path):
     text = "[beam]\nlength = 0.2\n[model]\nmodes = 1\n[integration]\ncycles = 4\n"
     file.write_text('extends = "paper"\n' + text, encoding="utf-8")
     told = RUNNER.invoke(app, ["simulate", "--config", str(file)]).stderr
-    for value in (
-        "beam.thickness = 0.0004 m",
-        "beam.density = 7800 kg/m^3",
-        "contact.stiffness = 4e+08 N/m^1.5",
-    ):
+    for value in ("beam.thickness = 0.0004 m", "beam.density = 7800 kg/m^3", "contact.stiffness = 4e+08 N/m^1.5"):
         assert value in told
     assert "beam.length" not in told
     assert "taken from" not in RUNNER.invoke(app, ["simulate", *SMALL]).stderr
@@ -180,19 +174,7 @@ def test_what_the_paper_lent_is_told(tmp_path):
 
 def test_damping_of_each_mode_and_samples(tmp_path):
     file = tmp_path / "run.nc"
-    run(
-        "simulate",
-        "--modes",
-        "2",
-        "--damping-ratio",
-        "0.01,0.02",
-        "--cycles",
-        "4",
-        "--samples",
-        "50",
-        "-o",
-        file,
-    )
+    run("simulate", "--modes", "2", "--damping-ratio", "0.01,0.02", "--cycles", "4", "--samples", "50", "-o", file)
     read = sb.load(file)
     np.testing.assert_array_equal(read.system.model.damping_ratio, [0.01, 0.02])
     assert read.dataset.sizes["time"] == 4 * 50 + 1
@@ -230,9 +212,7 @@ def test_a_point_of_a_list_is_gone_on_from(tmp_path):
     done = RUNNER.invoke(app, command)
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)["summary"]
-    assert told["peak_force"] == float(found.peak_force[3]) and told["zero_crossings"] == int(
-        found.zero_crossings[3]
-    )
+    assert told["peak_force"] == float(found.peak_force[3]) and told["zero_crossings"] == int(found.zero_crossings[3])
     refused = RUNNER.invoke(app, ["simulate", "--from", str(tmp_path / "list.nc"), "--point", "location=0.3"])
     assert refused.exit_code == 2
 
@@ -262,17 +242,12 @@ def test_options_complete_a_file(tmp_path):
         '[harvester]\ntype = "coil"\nforce_factor = 0.1\n'
     )
     swept = configured(
-        {
-            "config": path,
-            "sweep": ["base_excitation.acceleration_amplitude=0.1,0.2", "harvester.resistance=1e3:1e6:3"],
-        }
+        {"config": path, "sweep": ["base_excitation.acceleration_amplitude=0.1,0.2", "harvester.resistance=1e3:1e6:3"]}
     )
     assert swept.axes()["harvester.resistance"].size == 3
     both = ["base_excitation.acceleration_amplitude=0.1", "harvester.resistance=1e4"]
     assert configured({"config": path, "set_": both}).system.get("harvester.resistance") == 1e4
-    with pytest.raises(
-        InputError, match=r"harvester\.toml: \[base_excitation\] acceleration_amplitude: missing"
-    ):
+    with pytest.raises(InputError, match=r"harvester\.toml: \[base_excitation\] acceleration_amplitude: missing"):
         configured({"config": path})
 
 

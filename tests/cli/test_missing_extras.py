@@ -20,17 +20,7 @@ BLOCKED = sorted(module for modules in _EXTRAS.values() for module in modules if
 """Pillow is there: Matplotlib needs it."""
 WITHOUT = f"import sys; sys.modules.update(dict.fromkeys({BLOCKED!r}))\n"
 RUN = ["simulate", "--modes", "1", "--cycles", "1"]
-MAP = [
-    "map",
-    "--modes",
-    "1",
-    "--frequency-ratio",
-    "1",
-    "--velocity-amplitude",
-    "0.1:0.2:2",
-    "--checkpoint",
-    "store",
-]
+MAP = ["map", "--modes", "1", "--frequency-ratio", "1", "--velocity-amplitude", "0.1:0.2:2", "--checkpoint", "store"]
 
 
 def without_extras(folder, program, *words):
@@ -64,9 +54,7 @@ def files(tmp_path):
     (tmp_path / "map.nc").write_bytes(b"\x89HDF" * 300)
     time = np.arange(4000) / 1e4
     decay = np.exp(-3.0 * time) * np.sin(2.0 * np.pi * 120.0 * time)
-    np.savetxt(
-        tmp_path / "a.csv", np.column_stack((time, decay)), delimiter=",", header="time,x", comments=""
-    )
+    np.savetxt(tmp_path / "a.csv", np.column_stack((time, decay)), delimiter=",", header="time,x", comments="")
     return tmp_path
 
 
@@ -145,8 +133,6 @@ def test_functions_of_the_laboratory(files):
 
 def test_every_package_of_an_extra_is_known():
     """The table of modules names as many extras as the distribution has."""
-    stated = {
-        each.partition("extra ==")[2].strip(" '\"") for each in requires("snapbeam") if "extra ==" in each
-    }
+    stated = {each.partition("extra ==")[2].strip(" '\"") for each in requires("snapbeam") if "extra ==" in each}
     assert stated == set(_EXTRAS)
     assert extra_of("cv2.gapi") == "lab" and extra_of("numpy") is None and extra_of(None) is None

@@ -19,17 +19,7 @@ from snapbeam.util.validation import InputError
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes, pipes with a name")
 
 RUN = ["simulate", "--modes", "1", "--cycles", "3", "--quiet"]
-MAP = [
-    "map",
-    "--modes",
-    "1",
-    "--cycles",
-    "3",
-    "--frequency-ratio",
-    "1:1.2:2",
-    "--velocity-amplitude",
-    "0.1:0.2:2",
-]
+MAP = ["map", "--modes", "1", "--cycles", "3", "--frequency-ratio", "1:1.2:2", "--velocity-amplitude", "0.1:0.2:2"]
 
 
 def command(folder, *words):

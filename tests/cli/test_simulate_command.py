@@ -16,9 +16,7 @@ RECORD = [0.0, 1.0, 2.0, 1.0, 0.0, -1.0, -2.0, -1.0] * 20
 SPRING = {"forces": [sb.LocalSpring(stiffness=1.0, location=0.5)]}
 FORCE = {"forces": [sb.ExternalForce(history=sb.ConstantForce(force=0.01), location=0.5)]}
 SHAKEN = {
-    "base_excitation": sb.BaseExcitation(
-        motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.02)
-    )
+    "base_excitation": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.02))
 }
 
 
@@ -64,9 +62,7 @@ def test_a_recorded_drive_needs_a_striker(folder, parts, way):
 def test_the_advised_record_is_accepted(folder, part):
     """The types that the message names, in a file."""
     parts = {
-        "base_excitation": sb.BaseExcitation(
-            motion=sb.RecordedAcceleration(record=RECORD, sampling_frequency=2e3)
-        ),
+        "base_excitation": sb.BaseExcitation(motion=sb.RecordedAcceleration(record=RECORD, sampling_frequency=2e3)),
         "forces": [
             sb.ExternalForce(
                 history=sb.RecordedForce(record=1e-3 * np.array(RECORD), sampling_frequency=2e3), location=0.5
@@ -83,23 +79,11 @@ def test_a_recorded_drive_leaves_the_gap_of_the_striker(folder):
     system = sb.System(
         MODEL,
         contacts=[
-            sb.Contact(
-                CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-3)
-            )
+            sb.Contact(CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-3))
         ],
     )
     system.save("system.toml")
-    command = [
-        "simulate",
-        "--config",
-        "system.toml",
-        "--recorded-drive",
-        "drive.nc",
-        "--cycles",
-        "2",
-        "-o",
-        "run.nc",
-    ]
+    command = ["simulate", "--config", "system.toml", "--recorded-drive", "drive.nc", "--cycles", "2", "-o", "run.nc"]
     answer = CliRunner().invoke(app, command, catch_exceptions=False)
     assert answer.exit_code == 0, answer.output
     run = sb.load("run.nc")

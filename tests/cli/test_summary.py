@@ -44,9 +44,7 @@ def test_lowest_interwell_and_notch(synthetic_map):
 
 def test_points_of_unknown_class_are_not_taken_for_intrawell(synthetic_map):
     said = text(map_summary(synthetic_map, []))
-    assert "unknown response class may be" not in said, (
-        "the unknown point lies above the lowest interwell run"
-    )
+    assert "unknown response class may be" not in said, "the unknown point lies above the lowest interwell run"
     low = lowest_interwell(synthetic_map)
     failed = synthetic_map.copy(deep=True)
     failed.response_class.loc[{"frequency_ratio": low["frequency_ratio"]}][:2] = ResponseClass.UNKNOWN
@@ -106,9 +104,7 @@ def test_what_was_there_before_is_no_part_of_the_rate(monkeypatch) -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("name", "following"), [("map", "closer"), ("closer", "closer_2"), ("closer_2", "closer_3")]
-)
+@pytest.mark.parametrize(("name", "following"), [("map", "closer"), ("closer", "closer_2"), ("closer_2", "closer_3")])
 def test_a_suggested_map_does_not_replace_the_map_it_starts_from(synthetic_map, tmp_path, name, following):
     file = tmp_path / f"{name}.nc"
     synthetic_map.to_netcdf(file, engine="h5netcdf")
@@ -128,13 +124,7 @@ def harvester_map(kinds, **more):
     power = {"units": "W", "long_name": "power in the harvester's load, last quarter of the run"}
     dims, values = ("harvester_resistance", "base_excitation_acceleration_amplitude"), [1e3, 1e4, 1e5]
     table = np.array([[1e-6, 8e-4], [9e-6, 1.42e-3], [2e-6, np.nan]])
-    attrs = {
-        "modes": 2,
-        "cycles": 4,
-        "reference_frequency": 80.0,
-        "length_scale": 1e-3,
-        "harvester_type": "piezo",
-    }
+    attrs = {"modes": 2, "cycles": 4, "reference_frequency": 80.0, "length_scale": 1e-3, "harvester_type": "piezo"}
     data = {"response_class": (dims, np.array(kinds, dtype=np.int8))}
     data["harvested_power_last_quarter"] = (dims, table, power)
     data["status"] = (dims, np.zeros((3, 2), dtype=np.int8))
@@ -173,10 +163,7 @@ def test_a_map_without_an_amplitude_has_no_lowest_amplitude(tmp_path):
     said = text(map_summary(struck, [path]))
     assert "--point harvester_resistance=100000.0 " in said, "without a power the first interwell point"
     fixed = {"base_excitation_acceleration_amplitude": 0.4}
-    for attrs, advice in (
-        ({}, "through."),
-        (fixed, "through: raise the acceleration amplitude of the base."),
-    ):
+    for attrs, advice in (({}, "through."), (fixed, "through: raise the acceleration amplitude of the base.")):
         quiet = one.assign(response_class=xr.zeros_like(one["response_class"])).assign_attrs(attrs)
         assert f"No run snapped {advice}" in text(map_summary(quiet, [])).splitlines()
 

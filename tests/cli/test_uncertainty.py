@@ -62,9 +62,7 @@ def test_probability_names_the_initial_well(tmp_path, section: str, words: str) 
 
 def test_probability(tmp_path) -> None:
     target, picture = tmp_path / "p.nc", tmp_path / "p.png"
-    result = run(
-        tmp_path, SYSTEM + PROBABILITY, "probability", "-o", str(target), "--plot", str(picture), "--yes"
-    )
+    result = run(tmp_path, SYSTEM + PROBABILITY, "probability", "-o", str(target), "--plot", str(picture), "--yes")
     assert result.exit_code == 0, result.output
     with xr.open_dataset(target, engine="h5netcdf") as dataset:
         snap = dataset["probability"].sel(outcome="snap").values
@@ -78,16 +76,7 @@ def test_probability(tmp_path) -> None:
 def test_design(tmp_path) -> None:
     target, picture, told = tmp_path / "d.nc", tmp_path / "d.png", tmp_path / "d.json"
     result = run(
-        tmp_path,
-        SYSTEM + DESIGN,
-        "design",
-        "-o",
-        str(target),
-        "--plot",
-        str(picture),
-        "--json",
-        str(told),
-        "--yes",
+        tmp_path, SYSTEM + DESIGN, "design", "-o", str(target), "--plot", str(picture), "--json", str(told), "--yes"
     )
     assert result.exit_code == 0, result.output
     with xr.open_dataset(target, engine="h5netcdf") as dataset:

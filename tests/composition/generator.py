@@ -27,11 +27,11 @@ __all__ = ["Composition", "Features", "composed", "features_of"]
 Array = NDArray[np.float64]
 Rng = np.random.Generator
 DRIVES = (
-    "sine", "sine", "displacement_sine", "two_tone", "chirp", "burst", "half_sine", "fixed", "sum", "constant_velocity",
+    "sine", "sine", "displacement_sine", "sine+sine", "chirp", "burst", "half_sine", "fixed", "sum", "constant_velocity",
     "recorded_motion", "noise",
 )  # fmt: skip
 BASES = (
-    "acceleration_sine", "displacement_sine", "two_tone", "chirp", "burst", "shock", "recorded_acceleration", "noise",
+    "acceleration_sine", "displacement_sine", "sine+sine", "chirp", "burst", "shock", "recorded_acceleration", "noise",
     "sum",
 )  # fmt: skip
 FORCES = ("harmonic_force", "constant_force", "recorded_force")
@@ -264,12 +264,11 @@ def moving(kind: str, number: Numbers, side: float = 1.0) -> tuple[sb.Drive, Mot
             frequency_ratio=ratio, acceleration_amplitude=velocity * ratio, phase=phase
         )
         return drive, sine(rate, reach, phase), []
-    if kind == "two_tone":
+    if kind == "sine+sine":
         other, more = number(0.5, 3.0), number(0.01, 0.1)
-        drive = sb.TwoTone(
-            frequency_ratio=ratio, velocity_amplitude=velocity, second_ratio=other, second_amplitude=more,
-            second_phase=phase,
-        )  # fmt: skip
+        drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity) + sb.Sine(
+            frequency_ratio=other, velocity_amplitude=more, phase=phase
+        )
         return drive, added(sine(rate, reach), sine(other * first, more * unit / other, phase)), []
     if kind == "chirp":
         stop, cycles, log = ratio * number(0.6, 1.8), number(0.6, 3.0), bool(number(0.0, 1.0) < 0.5)

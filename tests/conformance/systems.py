@@ -133,7 +133,7 @@ BURST = sb.Burst(
 )
 CHIRP = sb.Chirp(start_ratio=0.8, stop_ratio=2.0, velocity_amplitude=0.25, sweep_cycles=8.0)
 NOISE = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2, seed=3, ramp_up_cycles=1.0)
-TWO = sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.4, second_amplitude=0.1)
+TWO = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2) + sb.Sine(frequency_ratio=2.4, velocity_amplitude=0.1)
 SPRUNG = default_values.BEAM.replace(
     boundary=sb.BoundaryConditions(
         left_rotational_stiffness=40.0, right_rotational_stiffness=5.0, axial_support_stiffness=2e7
@@ -194,7 +194,9 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         struck(NOISE), {"drive.velocity_rms": (0.02, 0.4), "drive.low_ratio": (0.2, 1.0)}
     ),
     "two_tone": ExtendedSystem(
-        struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
+        struck(TWO),
+        {f"{name}_1": bounds for name, bounds in SINE.items()}
+        | {"drive.velocity_amplitude_2": (0.0, 0.3), "drive.phase_2": (-3.0, 3.0)},
     ),
     "recorded": ExtendedSystem(record, PLACE, cycles=11),
     "still": ExtendedSystem(struck(sb.FixedStop(), gap=-1e-4), {"contact.gap": (-3e-4, 1e-4)} | PLACE),

@@ -93,9 +93,9 @@ def noise(first: float) -> Case:
     return Case(drive, motion, cycle, (rise,))
 
 
-def two_tone(first: float) -> Case:
-    drive = sb.TwoTone(
-        frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.7, second_amplitude=0.1, second_phase=0.7
+def two_sines(first: float) -> Case:
+    drive = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2) + sb.Sine(
+        frequency_ratio=2.7, velocity_amplitude=0.1, phase=0.7
     )
     one, two, unit = 1.2 * first, 2.7 * first, LEVEL * first
     # the second begins at zero displacement too
@@ -133,7 +133,7 @@ CASES: dict[str, Callable[[float], Case]] = {
     "logarithmic sweep": lambda first: chirp(first, "log"),
     "shock": shock,
     "noise": noise,
-    "two sines": two_tone,
+    "two sines": two_sines,
     "record": record,
 }
 CYCLES: dict[object, int] = {1: 3, 3: 3, 8: 1} | {("logarithmic sweep", 1): 2, ("shock", 3): 2}

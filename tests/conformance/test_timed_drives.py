@@ -102,8 +102,8 @@ def test_going_on_is_going_on() -> None:
 @pytest.mark.slow
 def test_one_tone_alone_is_the_sine() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
-    two = sb.TwoTone(frequency_ratio=1.3, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.0)
     one = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.2)
+    two = one + sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.0)
     ends = [
         sb.simulate(
             sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))]),

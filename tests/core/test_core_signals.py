@@ -31,7 +31,7 @@ MOTIONS = [
     SINE + PULSE,
     PULSE,
     BURST,
-    sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.1, second_ratio=1.8, second_amplitude=0.02, second_phase=0.9),
+    sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1) + sb.Sine(frequency_ratio=1.8, velocity_amplitude=0.02, phase=0.9),
     sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=4.0),
     sb.Shock(acceleration_g=20.0, duration_ms=11.0),
     sb.Shock(acceleration_g=20.0, duration_ms=11.0, shape="trapezoid", rise_fraction=0.2),

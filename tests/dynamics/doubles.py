@@ -62,12 +62,7 @@ def lorenz(interval: float = 0.1, pieces: int = 20) -> KnownMap:
 
     def rate(x):
         return np.stack(
-            [
-                sigma * (x[:, 1] - x[:, 0]),
-                x[:, 0] * (rho - x[:, 2]) - x[:, 1],
-                x[:, 0] * x[:, 1] - beta * x[:, 2],
-            ],
-            1,
+            [sigma * (x[:, 1] - x[:, 0]), x[:, 0] * (rho - x[:, 2]) - x[:, 1], x[:, 0] * x[:, 1] - beta * x[:, 2]], 1
         )
 
     def matrix(x):
@@ -99,9 +94,7 @@ def grebogi() -> KnownMap:
     """Two fixed points, (0, -0.3) and (pi, 0.3), and a fractal border (Grebogi et al. 1983)."""
 
     def step(x, of):
-        angle = (
-            x[:, 0] + 1.32 * np.sin(2.0 * x[:, 0]) - 0.9 * np.sin(4.0 * x[:, 0]) - x[:, 1] * np.sin(x[:, 0])
-        )
+        angle = x[:, 0] + 1.32 * np.sin(2.0 * x[:, 0]) - 0.9 * np.sin(4.0 * x[:, 0]) - x[:, 1] * np.sin(x[:, 0])
         angle = (angle + 0.5 * np.pi) % (2.0 * np.pi) - 0.5 * np.pi
         return np.stack([angle, -0.3 * np.cos(x[:, 0])], axis=1)
 

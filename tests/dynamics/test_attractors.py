@@ -126,9 +126,7 @@ def test_the_edge_of_a_map_is_its_saddle() -> None:
 def test_the_edge_between_snapping_and_not() -> None:
     """One damped mode: the border runs to an unstable orbit near the hilltop."""
     system = system_of(1, 1.6, 0.03, 0.05)
-    edge = sb.dynamics.edge_tracking(
-        system, np.array([-0.9, 0.0]), np.array([-1.0, 1.3]), periods=25, horizon=60
-    )
+    edge = sb.dynamics.edge_tracking(system, np.array([-0.9, 0.0]), np.array([-1.0, 1.3]), periods=25, horizon=60)
     assert (edge.distance < 1e-3).all()
     assert edge.orbit is not None and edge.orbit.unstable == 1
 
@@ -165,13 +163,7 @@ def test_scipy_finds_no_third_attractor_of_the_double_well() -> None:
         return np.concatenate([y[800:], -0.15 * y[800:] + y[:800] - y[:800] ** 3 + 0.2 * math.cos(t)])
 
     ends = solve_ivp(
-        rate,
-        (0.0, 400.0 * math.pi),
-        x.ravel(),
-        "DOP853",
-        [120.0 * math.pi, 400.0 * math.pi],
-        rtol=1e-8,
-        atol=1e-8,
+        rate, (0.0, 400.0 * math.pi), x.ravel(), "DOP853", [120.0 * math.pi, 400.0 * math.pi], rtol=1e-8, atol=1e-8
     ).y.reshape(2, 800, 2)
     away = np.min([np.hypot(ends[0] - a, ends[1] - b) for a, b in DUFFING], axis=0)
     assert 0.002 < (away[:, 0] > 0.4).mean() < 0.03, "a slow transient"
@@ -271,9 +263,7 @@ def test_labels_state_whether_the_error_of_the_integration_changes_them(drive, f
 
 def test_labels_of_a_map_without_steps_are_not_tested() -> None:
     """A map of one's own has no step that could be halved, and says nothing about sensitivity."""
-    found = sb.dynamics.find_attractors(
-        grebogi(), np.array([[0.1, 0.1], [3.0, 0.2], [1.0, -0.1]]), transient=300
-    )
+    found = sb.dynamics.find_attractors(grebogi(), np.array([[0.1, 0.1], [3.0, 0.2], [1.0, -0.1]]), transient=300)
     grid = {"x[1]": np.linspace(-1.0, 4.0, 6), "x[2]": np.linspace(-0.4, 0.4, 5)}
     ds = sb.dynamics.basins_of_attraction(found, grid)
     assert "sensitive" not in ds and "sensitive_share" not in ds.attrs

@@ -61,9 +61,7 @@ def balanced(model: sb.ReducedModel, amplitude: np.ndarray, frequency: float, ha
     def residual(x):
         omega, a = x[-1] * frequency * 2.0 * np.pi, x[:-1].reshape(harmonics + 1, n)
         alpha, speeding = unit * table @ a, -unit * omega**2 * table @ (order[:, None] ** 2 * a)
-        force = (
-            -alpha * model.stiffness - model.nonlinear_stiffness * np.sum(alpha**2, axis=1)[:, None] * alpha
-        )
+        force = -alpha * model.stiffness - model.nonlinear_stiffness * np.sum(alpha**2, axis=1)[:, None] * alpha
         off = (speeding - force @ inverse) / (unit * (2.0 * np.pi * frequency) ** 2)
         return np.concatenate((off.ravel(), a.sum(axis=0)[:1] - begun[:1]))
 
@@ -216,8 +214,7 @@ def test_a_striker_on_its_suspension_comes_back(further: bool) -> None:
 
 def test_refusals() -> None:
     shaken = sb.System(
-        ONE,
-        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
+        ONE, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))]
     )
     with pytest.raises(InputError, match="system with drive: a backbone curve is of free motion"):
         sb.dynamics.backbone_curve(shaken)

@@ -55,9 +55,7 @@ def apart(a: float, b: float) -> KnownMap:
 @pytest.mark.parametrize(("kind", "factor"), [("fold", -0.25), ("flip", 0.75)])
 def test_curves_of_the_henon_map(kind: str, factor: float) -> None:
     """a = -(1 - b)^2/4 at the folds and 3 (1 - b)^2/4 at the flips, within the stated errors."""
-    begun = point_of(
-        henon(0.1), [0.8, 0.2], "a", (-0.4, 1.4), kind, direction="down" if kind == "fold" else "up"
-    )
+    begun = point_of(henon(0.1), [0.8, 0.2], "a", (-0.4, 1.4), kind, direction="down" if kind == "fold" else "up")
     curve = sb.dynamics.bifurcation_curve(begun, ("a", "b"), ((-0.6, 1.8), (-0.5, 0.6)))
     b = curve["b"].values
     np.testing.assert_allclose(curve["a"], factor * (1.0 - b) ** 2, rtol=0.0, atol=1e-8)
@@ -106,13 +104,9 @@ def test_strong_resonances_of_a_neimark_sacker_curve() -> None:
     begun = point_of(planar(0.0, 0.9, 0.5), [0.0, 0.0], "d", (0.8, 1.2), "Neimark-Sacker")
     curve = sb.dynamics.bifurcation_curve(begun, ("d", "t"), ((0.8, 1.2), (-3.0, 3.0)))
     np.testing.assert_allclose(curve["d"], 1.0, rtol=0.0, atol=1e-8)
-    found = dict(
-        zip(curve["special_point_kind"].values.tolist(), curve["special_point_t"].values, strict=True)
-    )
+    found = dict(zip(curve["special_point_kind"].values.tolist(), curve["special_point_t"].values, strict=True))
     assert found == pytest.approx({"resonance 1:3": -1.0, "resonance 1:4": 0.0}, abs=1e-7)
-    assert curve["t"].min() == pytest.approx(-2.0, abs=0.1) and curve["t"].max() == pytest.approx(
-        2.0, abs=0.1
-    )
+    assert curve["t"].min() == pytest.approx(-2.0, abs=0.1) and curve["t"].max() == pytest.approx(2.0, abs=0.1)
     assert curve.attrs["termination_reason"].count("resonances 1:1 and 1:2") == 2
 
 
@@ -165,9 +159,7 @@ def grazing_amplitude(ratio: np.ndarray) -> np.ndarray:
 )
 def test_the_grazing_curve_of_an_oscillator_before_a_stop(law: sb.ContactLaw, points: int) -> None:
     """It is the resonance curve, to 1e-9, under any law of contact, through the resonance itself."""
-    model = sb.ReducedModel.from_matrices(
-        [[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0, damping_ratio=DAMPING
-    )
+    model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0, damping_ratio=DAMPING)
     stop = sb.Contact(law, sb.Striker(drive=sb.FixedStop(), gap=1.0))
     force = float(0.98 * grazing_amplitude(np.array(1.1)))
     history = sb.HarmonicForce(amplitude=force, frequency_ratio=1.1)
@@ -176,9 +168,7 @@ def test_the_grazing_curve_of_an_oscillator_before_a_stop(law: sb.ContactLaw, po
     light = sb.dynamics.periodic_orbit(system.replace(**{"force.amplitude": 1e-3 * force}))
     orbit = sb.dynamics.periodic_orbit(system, 1e3 * light.coordinates)
     assert orbit.contact_summary.clearance == pytest.approx(0.02, abs=1e-9)
-    branch = sb.dynamics.continuation(
-        orbit, "force.amplitude", (0.9 * force, 1.1 * force), step=0.05, max_step=0.1
-    )
+    branch = sb.dynamics.continuation(orbit, "force.amplitude", (0.9 * force, 1.1 * force), step=0.05, max_step=0.1)
     grazing = branch.special_points[-1]
     assert grazing.kind == "grazing"
     names, bounds = ("force.frequency_ratio", "force.amplitude"), ((0.9, 1.3), (0.02, 2.0))
@@ -222,9 +212,7 @@ def test_folds_of_the_beam_are_those_of_its_branches() -> None:
     """At another frequency, continued along the velocity, the fold is where the curve says."""
     options = {"transient": 100}
     orbit = sb.dynamics.periodic_orbit(struck(1.6, 0.03), **options)
-    begun = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12).special_points[
-        0
-    ]
+    begun = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12).special_points[0]
     names = ("frequency_ratio", "velocity_amplitude")
     curve = sb.dynamics.bifurcation_curve(begun, names, ((1.45, 1.7), (0.02, 0.1)))
     assert (np.diff(curve["frequency_ratio"]) < 0.0).all() or (np.diff(curve["frequency_ratio"]) > 0.0).all()

@@ -112,25 +112,14 @@ def follow_to_grazing(ratio: float, restitution: float, periods: int, longest: f
 @pytest.mark.slow
 def test_restitution_orbits_are_followed_to_grazing() -> None:
     branch = follow_to_grazing(3.6, 0.8, 2, 0.1)
-    assert (
-        branch.special_points[-1].orbit.contact_summary.clearance < 1e-4
-        and branch.special_points[-1].error < 1e-4
-    )
+    assert branch.special_points[-1].orbit.contact_summary.clearance < 1e-4 and branch.special_points[-1].error < 1e-4
     ds = branch.to_dataset()
-    assert set(ds["special_point_kind"].values) <= {
-        "fold",
-        "flip",
-        "Neimark-Sacker",
-        "branch point",
-        "grazing",
-    }
+    assert set(ds["special_point_kind"].values) <= {"fold", "flip", "Neimark-Sacker", "branch point", "grazing"}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("ratio", "restitution", "periods"), EXACT)
-def test_orbits_of_twenty_points_are_followed_to_grazing(
-    ratio: float, restitution: float, periods: int
-) -> None:
+def test_orbits_of_twenty_points_are_followed_to_grazing(ratio: float, restitution: float, periods: int) -> None:
     follow_to_grazing(ratio, restitution, periods, 0.1)
 
 
@@ -140,9 +129,7 @@ def test_orbits_of_twenty_points_are_followed_to_grazing(
 
 def damped(ratio: float, velocity: float) -> sb.System:
     """Mass and stiffness 1, a damping ratio of 0.05, a coefficient of restitution of 0.8."""
-    model = sb.ReducedModel.from_matrices(
-        [[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0, damping_ratio=0.05
-    )
+    model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0, damping_ratio=0.05)
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
     return sb.System(model, contacts=[sb.Contact(sb.Restitution(0.8), sb.Striker(drive=drive, gap=1.0))])
 
@@ -179,16 +166,9 @@ FOLD = 0.40663746
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("velocity", "which", "direction"),
-    [
-        (0.44, 0, "down"),
-        (0.43, 1, "down"),
-        (0.42495795, 0, "down"),
-        (0.415, 0, "up"),
-    ],
+    [(0.44, 0, "down"), (0.43, 1, "down"), (0.42495795, 0, "down"), (0.415, 0, "up")],
 )
-def test_an_impact_at_the_phase_of_observation_is_no_bifurcation(
-    velocity: float, which: int, direction: str
-) -> None:
+def test_an_impact_at_the_phase_of_observation_is_no_bifurcation(velocity: float, which: int, direction: str) -> None:
     """At 0.424958 the faster impact is at the phase at which a run begins; the only fold is at 0.40663746."""
     assert fold_of(1.4) == pytest.approx(FOLD, abs=1e-8)
     system = damped(1.4, velocity)
@@ -196,9 +176,7 @@ def test_an_impact_at_the_phase_of_observation_is_no_bifurcation(
     if velocity == 0.42495795:
         values = orbit.multipliers
         np.testing.assert_allclose([values.real, np.abs(values.imag)], [[0.616] * 2, [0.171] * 2], atol=1e-3)
-    branch = sb.dynamics.continuation(
-        orbit, "velocity_amplitude", (0.38, 0.46), direction=direction, max_step=0.1
-    )
+    branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.38, 0.46), direction=direction, max_step=0.1)
     assert branch.termination_reason == "limit of the parameter"
     folds = branch.special_points
     assert [point.kind for point in folds] == ([] if direction == "up" else ["fold"])
@@ -214,9 +192,7 @@ def test_an_impact_at_the_phase_of_observation_is_no_bifurcation(
 def test_the_phase_of_observation_changes_along_a_branch() -> None:
     """The impact comes within 0.27 rad of the phase given; the dataset keeps that phase, and so does a curve."""
     orbit = sb.dynamics.periodic_orbit(damped(1.4, 0.415), damped_orbits(1.4, 0.415, 0.9)[0], phase=0.9)
-    branch = sb.dynamics.continuation(
-        orbit, "velocity_amplitude", (0.38, 0.46), direction="down", max_step=0.1
-    )
+    branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.38, 0.46), direction="down", max_step=0.1)
     phases = [each.flow.clock.striker_phase for each in branch.orbits]
     assert phases[0] == 0.9 and len(set(phases)) == 2
     for state, value in zip(branch.to_dataset()["state"].values, branch.values, strict=True):

@@ -124,9 +124,7 @@ def test_orbit_of_a_system_with_all_parts() -> None:
     flow = Stroboscope(system_of(**WHOLE), PRECISE)
     orbit = sb.dynamics.periodic_orbit(flow, flow.advance(flow.coordinates(), 200).states[0])
     assert orbit.residual < 1e-9
-    assert math.log(abs(np.prod(orbit.multipliers))) == pytest.approx(
-        -contraction(flow.system) * flow.period, abs=1e-7
-    )
+    assert math.log(abs(np.prod(orbit.multipliers))) == pytest.approx(-contraction(flow.system) * flow.period, abs=1e-7)
     apart = orbit.coordinates + 1e-3 * np.random.default_rng(1).normal(size=flow.dimension)
     back = flow.advance(apart[None], 200).states[0]
     assert orbit.is_stable
@@ -226,10 +224,7 @@ def test_tangents_of_a_state_with_a_damped_force() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("restitution", [0.6, 0.9])
 def test_exponents_under_newtons_law_are_those_of_the_orbit(restitution: float) -> None:
-    law, drive = (
-        sb.Restitution(coefficient=restitution),
-        sb.Sine(frequency_ratio=1.6, velocity_amplitude=0.03),
-    )
+    law, drive = (sb.Restitution(coefficient=restitution), sb.Sine(frequency_ratio=1.6, velocity_amplitude=0.03))
     flow = Stroboscope(system_of(1, law, drive, damping=0.05, striker={"gap": 2e-5}), PRECISE)
     orbit = sb.dynamics.periodic_orbit(flow, flow.advance(flow.coordinates(), 400).states[0])
     found = sb.dynamics.lyapunov_spectrum(flow, 2, 20, transient=0, states=orbit.coordinates)

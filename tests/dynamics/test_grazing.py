@@ -63,9 +63,7 @@ def exact(over: float) -> float:
 def test_the_clearance_of_a_motion_that_does_not_repeat(start: tuple[float, float]) -> None:
     """The first swing of a damped oscillator towards the stop, in closed form; the ends of the run are no turning points."""
     zeta = 0.05
-    model = sb.ReducedModel.from_matrices(
-        [[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0, damping_ratio=zeta
-    )
+    model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0, damping_ratio=zeta)
     stop = sb.Striker(drive=sb.FixedStop(), gap=1.0)
     history = sb.HarmonicForce(amplitude=1e-9, frequency_ratio=0.25)
     system = sb.System(
@@ -76,9 +74,7 @@ def test_the_clearance_of_a_motion_that_does_not_repeat(start: tuple[float, floa
     found = passage_of(flow, np.array(start) / flow.space.scales, 1)
     w = math.sqrt(1.0 - zeta**2)
     time = np.linspace(0.0, flow.period, 400_001)
-    x = np.exp(-zeta * time) * (
-        start[0] * np.cos(w * time) + (start[1] + zeta * start[0]) / w * np.sin(w * time)
-    )
+    x = np.exp(-zeta * time) * (start[0] * np.cos(w * time) + (start[1] + zeta * start[0]) / w * np.sin(w * time))
     inner = x[1:-1]
     least = inner[(inner <= x[:-2]) & (inner < x[2:])].min()
     assert found.clearance == pytest.approx(1.0 + least, abs=1e-7)

@@ -48,8 +48,7 @@ def test_the_runs_after_a_failed_one_are_marked(shaken, monkeypatch):
     """A run without a last state ends the sweeps; the runs that follow are not computed."""
     done = sb.simulate(shaken, STEPS, sample_times=[0.0])
     failed = done.summary.__class__(
-        dict(done.summary)
-        | {"status": sb.RunStatus.DIVERGED, "response_class": -1, "harvested_power": np.nan}
+        dict(done.summary) | {"status": sb.RunStatus.DIVERGED, "response_class": -1, "harvested_power": np.nan}
     )
     of_failed = dataclasses.replace(done, summary=failed, final_state=None)
     monkeypatch.setattr("snapbeam.dynamics.swept.simulate", lambda *_, **__: of_failed)
@@ -116,9 +115,7 @@ def test_a_record_restarts_at_every_value(shaken):
     state, power = None, []
     for value in (1e4, 1e5, 1e5, 1e4):
         run = sb.simulate(
-            system.replace(**{"harvester.resistance": value, "initial_state": state}),
-            STEPS,
-            sample_times=[0.0],
+            system.replace(**{"harvester.resistance": value, "initial_state": state}), STEPS, sample_times=[0.0]
         )
         end = run.final_state
         state = sb.State(amplitude=end.amplitude, velocity=end.velocity, circuit=end.circuit)

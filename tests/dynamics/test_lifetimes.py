@@ -18,8 +18,7 @@ MEASURED = {(1.21, 0.25): 32.0, (1.625, 0.3): 46.0, (2.5, 0.55): 89.0, (3.5, 0.6
 def system_of(modes: int, ratio: float = 1.625, velocity: float = 0.3) -> sb.System:
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
     return sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes),
-        contacts=[sb.Contact(default_values.CONTACT, shaker)],
+        sb.ReducedModel.from_beam(default_values.BEAM, modes), contacts=[sb.Contact(default_values.CONTACT, shaker)]
     )
 
 
@@ -38,16 +37,10 @@ def test_nothing_depends_on_threads_order_or_the_other_points(tmp_path) -> None:
     for other in (one, kept):
         for name in whole.data_vars:
             np.testing.assert_array_equal(whole[name].values, other[name].values, err_msg=str(name))
-    points = xr.Dataset(
-        {"frequency_ratio": ("point", [1.625, 1.2]), "velocity_amplitude": ("point", [0.3, 0.2])}
-    )
+    points = xr.Dataset({"frequency_ratio": ("point", [1.625, 1.2]), "velocity_amplitude": ("point", [0.3, 0.2])})
     some = sb.dynamics.lifetime_map(system, points, SHORT, **TELL)
-    np.testing.assert_array_equal(
-        some.last_snap[0], whole.last_snap.sel(frequency_ratio=1.625, velocity_amplitude=0.3)
-    )
-    np.testing.assert_array_equal(
-        some.last_snap[1], whole.last_snap.sel(frequency_ratio=1.2, velocity_amplitude=0.2)
-    )
+    np.testing.assert_array_equal(some.last_snap[0], whole.last_snap.sel(frequency_ratio=1.625, velocity_amplitude=0.3))
+    np.testing.assert_array_equal(some.last_snap[1], whole.last_snap.sel(frequency_ratio=1.2, velocity_amplitude=0.2))
 
 
 def test_a_store_is_resumed_and_refuses_other_starts(tmp_path) -> None:
@@ -94,11 +87,7 @@ def test_the_tip_stands_still_in_space() -> None:
     phases = [float(starts.state(system, s).phase) for s in range(8)]
     assert len(set(phases)) == 8 and all(np.pi <= phase <= 2.0 * np.pi for phase in phases)
     ds = sb.dynamics.lifetime_map(
-        system,
-        None,
-        SHORT,
-        initial_conditions=starts,
-        settings=sb.dynamics.LifetimeSettings(settling_cycles=20.0),
+        system, None, SHORT, initial_conditions=starts, settings=sb.dynamics.LifetimeSettings(settling_cycles=20.0)
     )
     assert ds.last_snap.dims == ("start",)
     assert len(np.unique(ds.last_snap)) > 1
@@ -121,9 +110,7 @@ def test_runs_that_snap_on_are_followed_to_the_end() -> None:
 @pytest.mark.parametrize("point", MEASURED)
 def test_measured_lifetimes_come_again(point) -> None:
     """Measured twice, once with some 210 runs and here with 400: within both errors, and all of them end in well 2."""
-    ds = sb.dynamics.lifetime_map(
-        system_of(32, *point), None, sb.Integration(cycles=1000), initial_conditions=400
-    )
+    ds = sb.dynamics.lifetime_map(system_of(32, *point), None, sb.Integration(cycles=1000), initial_conditions=400)
     assert int(ds.runs_snapping) == 0
     assert float(ds.end_probability.sel(well="other")) == 1.0
     relative = float(ds.lifetime) / MEASURED[point] - 1.0
@@ -137,10 +124,7 @@ def test_measured_lifetimes_come_again(point) -> None:
     [
         ({"initial_conditions": 0}, "count = 0"),
         ({"initial_conditions": 2.5}, "initial_conditions = 2.5"),
-        (
-            {"settings": sb.dynamics.LifetimeSettings(settling_cycles=500.0)},
-            "must be more than settling_cycles",
-        ),
+        ({"settings": sb.dynamics.LifetimeSettings(settling_cycles=500.0)}, "must be more than settling_cycles"),
         ({"after": [50, 20]}, "after = [50, 20]"),
         ({"after": [1000]}, "after[0]"),
         ({"axes": {"velocity_amplitde": [0.1, 0.2]}}, "did you mean"),
@@ -173,7 +157,5 @@ def test_no_start_presses_the_tip() -> None:
             rest = rest_state(turned.model, turned.striker)
             moved = np.sum(turned.model.shape_at(place) * (many.amplitude - rest.amplitude), axis=-1)
             assert (away * moved > 0.0).all()
-            one = sb.dynamics.InitialConditions(count=6).state(
-                turned.replace(**{"contact.location": 0.35}), number
-            )
+            one = sb.dynamics.InitialConditions(count=6).state(turned.replace(**{"contact.location": 0.35}), number)
             np.testing.assert_array_equal(one.amplitude, many.amplitude[1])

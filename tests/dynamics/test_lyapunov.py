@@ -39,9 +39,7 @@ def test_the_sum_of_all_exponents_is_that_of_damping(modes: int) -> None:
     ds = sb.dynamics.lyapunov_spectrum(system, 2 * modes, 20, transient=3, integration=fine)
     exact = -2.0 * float((system.model.damping_ratio * system.model.omega).sum())
     assert float(ds["exponent"].sum()) == pytest.approx(exact, rel=2e-7)
-    assert bool(
-        (ds["exponent"].values[0, :-1] >= ds["exponent"].values[0, 1:] - 2.0 * abs(exact) / modes).all()
-    )
+    assert bool((ds["exponent"].values[0, :-1] >= ds["exponent"].values[0, 1:] - 2.0 * abs(exact) / modes).all())
 
 
 def test_a_periodic_orbit_has_the_exponents_of_its_multipliers() -> None:

@@ -153,9 +153,7 @@ def test_bracket_of_a_tangency() -> None:
     assert 1.0 <= apart < crossing <= 1.4 and crossing - apart <= 0.08 + 1e-12
     assert found.attrs["termination_reason"] == "tolerance"
     crosses = found["crosses"].values
-    assert (
-        not crosses[found["value"].values <= apart].any() and crosses[found["value"].values >= crossing].all()
-    )
+    assert not crosses[found["value"].values <= apart].any() and crosses[found["value"].values >= crossing].all()
     assert told == sorted(told) and told[-1] == 1.0 and len(told) > 10
 
 
@@ -183,9 +181,7 @@ def test_a_manifold_that_is_stopped_keeps_its_points(monkeypatch: pytest.MonkeyP
     from snapbeam.dynamics import manifolds
 
     asked: list[int] = []
-    monkeypatch.setattr(
-        manifolds._Clock, "is_over", property(lambda clock: asked.append(1) or len(asked) > 12)
-    )
+    monkeypatch.setattr(manifolds._Clock, "is_over", property(lambda clock: asked.append(1) or len(asked) > 12))
     saddle = sb.dynamics.periodic_orbit(henon(1.4, 0.3), [0.6, 0.19])
     curve = sb.dynamics.invariant_manifold(saddle, "stable", max_seconds=1.0, max_arclength=100.0)
     assert curve.attrs["termination_reason"] == "max_seconds; max_seconds"
@@ -219,12 +215,7 @@ def test_melnikovs_threshold() -> None:
     system = sb.System(model, forces=[sb.ExternalForce(location=0.5, history=history)])
     saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0], integration=sb.Integration())
     found = sb.dynamics.homoclinic_tangency(
-        saddle,
-        "force.amplitude",
-        (0.95 * force, 1.05 * force),
-        max_arclength=4.5,
-        max_distance=0.05,
-        tolerance=0.1,
+        saddle, "force.amplitude", (0.95 * force, 1.05 * force), max_arclength=4.5, max_distance=0.05, tolerance=0.1
     )
     assert found.attrs["termination_reason"] == "tolerance"
     without, crossing = found["bracket"].values

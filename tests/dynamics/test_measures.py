@@ -128,14 +128,8 @@ def test_bounds_of_small_boxes_are_exact() -> None:
             filled.flat[at] = labels
             values.append(sb.dynamics.basin_entropy(filled, 2)[:2])
         basin, border = np.array(values).T
-        assert (
-            found.basin_bounds[0] == pytest.approx(basin.min())
-            and found.basin_bounds[1] >= basin.max() - 1e-12
-        )
-        assert (
-            found.boundary_bounds[0] <= border.min() + 1e-12
-            and found.boundary_bounds[1] >= border.max() - 1e-12
-        )
+        assert found.basin_bounds[0] == pytest.approx(basin.min()) and found.basin_bounds[1] >= basin.max() - 1e-12
+        assert found.boundary_bounds[0] <= border.min() + 1e-12 and found.boundary_bounds[1] >= border.max() - 1e-12
 
 
 def test_classes_of_a_map_are_labels_too() -> None:
@@ -155,10 +149,7 @@ def test_classes_of_a_map_are_labels_too() -> None:
             lambda: sb.dynamics.dynamical_integrity(np.zeros((4, 4), dtype=int), 0, attractor=(9, 0)),
             "attractor = (9, 0)",
         ),
-        (
-            lambda: sb.dynamics.dynamical_integrity(np.zeros((4, 4), dtype=int), 0, spacing=[0.0, 1.0]),
-            "spacing",
-        ),
+        (lambda: sb.dynamics.dynamical_integrity(np.zeros((4, 4), dtype=int), 0, spacing=[0.0, 1.0]), "spacing"),
     ],
 )
 def test_refusals(call, words: str) -> None:

@@ -17,9 +17,7 @@ def system_of(modes: int, ratio: float, velocity: float, damping: float = 0.005)
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=damping)
     return sb.System(
         model,
-        contacts=[
-            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity))
-        ],
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity))],
     )
 
 
@@ -27,9 +25,7 @@ def oscillator(ratio: float, restitution: float, amplitude: float = 1.0) -> sb.S
     """Of natural frequency 1 rad/s and mass 1, struck by a wall amplitude sin(ratio t) about its rest position."""
     model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=amplitude * ratio)
-    return sb.System(
-        model, contacts=[sb.Contact(sb.Restitution(restitution), sb.Striker(drive=drive, gap=0.0))]
-    )
+    return sb.System(model, contacts=[sb.Contact(sb.Restitution(restitution), sb.Striker(drive=drive, gap=0.0))])
 
 
 def exact_orbit(ratio: float, restitution: float, periods: int) -> tuple[float, np.ndarray]:
@@ -73,9 +69,7 @@ def test_orbits_of_a_force_that_begins_with_a_jump(transient: int) -> None:
     assert sb.dynamics.periodic_orbit(system, transient=transient).residual < 1e-9
 
 
-def contact_of_a_ball(
-    law: sb.KelvinVoigt, stroke: float, phase: float, state: np.ndarray
-) -> tuple[float, np.ndarray]:
+def contact_of_a_ball(law: sb.KelvinVoigt, stroke: float, phase: float, state: np.ndarray) -> tuple[float, np.ndarray]:
     """Time in contact with a force, and the state a period later, of a unit mass under unit weight on stroke sin t."""
     k, c = law.linear_stiffness, law.linear_damping
 
@@ -87,9 +81,7 @@ def contact_of_a_ball(
 
     def until(rates, event, direction, t, y):
         event.terminal, event.direction = True, direction
-        found = solve_ivp(
-            rates, (t, end), y, method="DOP853", rtol=1e-13, atol=1e-13, events=event, max_step=0.1
-        )
+        found = solve_ivp(rates, (t, end), y, method="DOP853", rtol=1e-13, atol=1e-13, events=event, max_step=0.1)
         return found.t[-1], found.y[:, -1], found.t_events[0].size > 0
 
     def falling(t, y):
@@ -110,17 +102,13 @@ def contact_of_a_ball(
 @pytest.mark.parametrize(("restitution", "stroke"), [(0.5, 1.2), (0.3, 1.8)])
 def test_determinant_of_a_bouncing_ball(restitution: float, stroke: float) -> None:
     """Phase volume shrinks by exp(-c/m times the time with a force) in a period; k = 1e7."""
-    ball = sb.ReducedModel.from_matrices(
-        [[1.0]], [0.0], contact_shape=[1.0], reference_frequency=0.5 / math.pi
-    )
+    ball = sb.ReducedModel.from_matrices([[1.0]], [0.0], contact_shape=[1.0], reference_frequency=0.5 / math.pi)
     law = sb.KelvinVoigt.from_restitution(1e7, restitution, 1.0)
     phase = math.acos(math.pi * (1.0 - restitution) / ((1.0 + restitution) * stroke))
     table = sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=stroke, phase=phase)
     above = sb.State(amplitude=[stroke * math.sin(phase)], velocity=[math.pi], striker_position=0.0)
     weight = sb.ExternalForce(history=sb.ConstantForce(force=-1.0))
-    system = sb.System(
-        ball, contacts=[sb.Contact(law, sb.Striker(drive=table))], forces=[weight], initial_state=above
-    )
+    system = sb.System(ball, contacts=[sb.Contact(law, sb.Striker(drive=table))], forces=[weight], initial_state=above)
     # steps in contact end at whole ticks, and the force jumps at the onset: the map is rough to some 3e-10
     orbit = sb.dynamics.periodic_orbit(system, transient=30, tolerance=1e-9)
     pressed, later = contact_of_a_ball(law, stroke, orbit.flow.phase, orbit.coordinates)
@@ -179,12 +167,7 @@ def test_products_of_multipliers(modes: int, ratio: float, velocity: float, peri
     system = system_of(modes, ratio, velocity)
     orbit = sb.dynamics.periodic_orbit(system, period=periods, transient=2000)
     model = system.model
-    exact = (
-        -2.0
-        * periods
-        * float((model.damping_ratio * model.omega).sum())
-        / (model.reference_frequency * ratio)
-    )
+    exact = -2.0 * periods * float((model.damping_ratio * model.omega).sum()) / (model.reference_frequency * ratio)
     assert orbit.log_determinant == pytest.approx(exact, abs=1e-7)
     assert np.log(np.abs(orbit.multipliers)).sum() == pytest.approx(exact, abs=1e-7)
     assert orbit.is_stable and orbit.minimal_period == periods
@@ -218,9 +201,7 @@ def test_known_maps() -> None:
 def test_multipliers_at_level_standard() -> None:
     """Within 1e-4 of those of level reference."""
     system = system_of(1, 1.6, 0.03)
-    coarse = sb.dynamics.periodic_orbit(
-        system, transient=1500, integration=sb.Integration(accuracy="standard")
-    )
+    coarse = sb.dynamics.periodic_orbit(system, transient=1500, integration=sb.Integration(accuracy="standard"))
     fine = sb.dynamics.periodic_orbit(system, coarse.coordinates)
     assert np.abs(coarse.multipliers - fine.multipliers).max() < 1e-4
 

@@ -13,17 +13,12 @@ import snapbeam as sb
 
 def test_a_stroboscopic_section_is_that_of_advance() -> None:
     system = system_of(2, 1.4, 0.02)
-    ds = sb.dynamics.poincare_section(
-        system, periods=12, transient=0, integration=sb.Integration(accuracy="reference")
-    )
+    ds = sb.dynamics.poincare_section(system, periods=12, transient=0, integration=sb.Integration(accuracy="reference"))
     how = sb.Integration(accuracy="reference")
     every = sb.advance(system, periods=12, save_every_period=True, integration=how)
     size = abs(every.amplitude[0, 0])
     np.testing.assert_allclose(ds["modal_amplitude"].values[1:], every.amplitude, rtol=0.0, atol=1e-6 * size)
-    assert (
-        ds["drive_phase"].values == pytest.approx(0.0, abs=1e-9)
-        or np.cos(ds["drive_phase"]).min() > 1.0 - 1e-9
-    )
+    assert ds["drive_phase"].values == pytest.approx(0.0, abs=1e-9) or np.cos(ds["drive_phase"]).min() > 1.0 - 1e-9
 
 
 def test_an_impact_section_is_on_the_contact() -> None:
@@ -35,9 +30,7 @@ def test_an_impact_section_is_on_the_contact() -> None:
 
 
 def test_a_section_at_a_level_is_on_it() -> None:
-    ds = sb.dynamics.poincare_section(
-        system_of(1, 1.6, 0.3), ("midspan_displacement", 0.0, "up"), 60, transient=0
-    )
+    ds = sb.dynamics.poincare_section(system_of(1, 1.6, 0.3), ("midspan_displacement", 0.0, "up"), 60, transient=0)
     assert ds.sizes["point"] >= 2
     np.testing.assert_allclose(ds["midspan_displacement"].values, 0.0, atol=1e-7)
     assert (ds["midspan_velocity"].values > 0.0).all()
@@ -54,9 +47,7 @@ def test_a_section_leaves_out_the_transient() -> None:
 
 
 def test_passages_say_how_near_they_are() -> None:
-    ds = sb.dynamics.poincare_section(
-        system_of(1, 1.6, 0.3), ("midspan_displacement", 0.0, "up"), 30, transient=0
-    )
+    ds = sb.dynamics.poincare_section(system_of(1, 1.6, 0.3), ("midspan_displacement", 0.0, "up"), 30, transient=0)
     assert "secant rule" in ds.attrs["termination_reason"]
     assert np.abs(ds["midspan_displacement"].values).max() <= 1.01 * ds.attrs["level_error"] + 1e-15
     assert ds.attrs["level_error"] < 1e-7
@@ -88,12 +79,7 @@ def test_sweeps_show_hysteresis_and_starts_what_they_miss() -> None:
     weak = ds["midspan_displacement"].sel(velocity_amplitude=0.03).isel(period=-1)
     assert float(weak.sel(sweep="up")) < 0.0 and float(weak.sel(sweep="start 0")) < 0.0
     again = sb.dynamics.bifurcation_diagram(
-        system,
-        "velocity_amplitude",
-        [0.03, 0.4],
-        sb.Integration(threads=1),
-        periods=(150, 16),
-        initial_conditions=2,
+        system, "velocity_amplitude", [0.03, 0.4], sb.Integration(threads=1), periods=(150, 16), initial_conditions=2
     )
     for name in ds.data_vars:
         np.testing.assert_array_equal(ds[name].values, again[name].values, err_msg=str(name))
@@ -101,24 +87,15 @@ def test_sweeps_show_hysteresis_and_starts_what_they_miss() -> None:
 
 def test_approaches_are_told() -> None:
     ds = sb.dynamics.bifurcation_diagram(
-        system_of(8, 1.4, 0.03),
-        "velocity_amplitude",
-        [0.03, 0.031],
-        sweeps=["up"],
-        periods=(600, 8),
-        grazing=True,
+        system_of(8, 1.4, 0.03), "velocity_amplitude", [0.03, 0.031], sweeps=["up"], periods=(600, 8), grazing=True
     )
     assert (ds["clearance"] > 0.0).any() and (ds["min_penetration"] > 0.0).all()
 
 
 def test_a_parameter_of_the_structure_may_be_swept() -> None:
     system = system_of(1, 1.6, 0.03, 0.05)
-    ds = sb.dynamics.bifurcation_diagram(
-        system, "model.damping_ratio", [0.04, 0.05], sweeps=["down"], periods=(200, 4)
-    )
-    plain = sb.dynamics.bifurcation_diagram(
-        system, "velocity_amplitude", [0.03], sweeps=["up"], periods=(200, 4)
-    )
+    ds = sb.dynamics.bifurcation_diagram(system, "model.damping_ratio", [0.04, 0.05], sweeps=["down"], periods=(200, 4))
+    plain = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", [0.03], sweeps=["up"], periods=(200, 4))
     one = ds["midspan_displacement"].sel(damping_ratio=0.05).values.ravel()
     np.testing.assert_allclose(one, plain["midspan_displacement"].values.ravel(), atol=1e-6)
 
@@ -133,15 +110,9 @@ def test_a_parameter_of_the_structure_may_be_swept() -> None:
         ),
         (lambda s: sb.dynamics.poincare_section(s, ("contact_force", 0.0, "up")), "section[0]"),
         (lambda s: sb.dynamics.bifurcation_diagram(s, "contact.type", [1.0, 2.0]), "contact.type"),
-        (
-            lambda s: sb.dynamics.bifurcation_diagram(s, "velocity_amplitude", [0.2, 0.1]),
-            "strictly increasing",
-        ),
+        (lambda s: sb.dynamics.bifurcation_diagram(s, "velocity_amplitude", [0.2, 0.1]), "strictly increasing"),
         (lambda s: sb.dynamics.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], sweeps=[]), "sweeps"),
-        (
-            lambda s: sb.dynamics.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], periods=3),
-            "periods = 3",
-        ),
+        (lambda s: sb.dynamics.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], periods=3), "periods = 3"),
     ],
 )
 def test_refusals(call, words: str) -> None:

@@ -14,24 +14,19 @@ from snapbeam.model import default_values
 DAMPING = 0.02
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2, damping_ratio=DAMPING)
 STRIKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
-BASE = sb.BaseExcitation(
-    motion=sb.AccelerationSine(frequency_ratio=1.2, acceleration_amplitude=0.2, phase=0.7)
-)
+BASE = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=1.2, acceleration_amplitude=0.2, phase=0.7))
 LOAD = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.4, amplitude=1.0, phase=-0.3))
 SHAKEN = {
     "base": sb.System(MODEL, base_excitation=BASE),
     "load": sb.System(MODEL, axial_load=LOAD),
     "both": sb.System(MODEL, base_excitation=BASE, axial_load=LOAD),
     "struck": sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, STRIKER)], base_excitation=BASE),
-    "struck under a load": sb.System(
-        MODEL, contacts=[sb.Contact(default_values.CONTACT, STRIKER)], axial_load=LOAD
-    ),
+    "struck under a load": sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, STRIKER)], axial_load=LOAD),
 }
 
 
 LONG = [
-    pytest.param(name, marks=pytest.mark.slow)
-    for name in ("base", "both", "load", "struck", "struck under a load")
+    pytest.param(name, marks=pytest.mark.slow) for name in ("base", "both", "load", "struck", "struck under a load")
 ]
 """Systems whose exponents take long."""
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.dynamics.lifetimes import LifetimeSettings, fit_lifetime, proportion
+from snapbeam.dynamics.lifetimes import LifetimeSettings, fit_lifetime
+from snapbeam.util.proportions import proportion
 from snapbeam.util.validation import InputError
 
 LIFETIME, DELAY = 50.0, 8.0
@@ -44,9 +45,7 @@ def test_what_is_not_exponential_is_told() -> None:
 def test_a_start_that_is_not_exponential_is_left_out() -> None:
     """Many that end at once, then an exponential: the delay is found beyond them."""
     draw = np.random.default_rng(5)
-    time = np.concatenate(
-        [draw.uniform(1.0, 2.0, (50, 30)), 10.0 + draw.exponential(LIFETIME, (50, 100))], axis=1
-    )
+    time = np.concatenate([draw.uniform(1.0, 2.0, (50, 30)), 10.0 + draw.exponential(LIFETIME, (50, 100))], axis=1)
     fit = fit_lifetime(time, True)
     plain = fit_lifetime(time, True, delay=1.0)
     assert (plain.goodness < 0.01).mean() > 0.9

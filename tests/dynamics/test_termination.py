@@ -42,9 +42,7 @@ def orbit(tolerance: float) -> str:
 
 def attractors(tolerance: float) -> str:
     states = np.linspace(0.1, 0.9, 5)[:, None]
-    return sb.dynamics.find_attractors(
-        logistic(3.2), states, transient=100, tolerance=tolerance
-    ).termination_reason
+    return sb.dynamics.find_attractors(logistic(3.2), states, transient=100, tolerance=tolerance).termination_reason
 
 
 def exponent(distance: float) -> str:
@@ -54,9 +52,7 @@ def exponent(distance: float) -> str:
 
 ITERATIONS = {
     "edge, bisection": lambda value: tracked(bisect_threshold=value).termination_reason,
-    "edge, divergence": lambda value: (
-        tracked(diverge_threshold=value, bisect_threshold=1e-17).termination_reason
-    ),
+    "edge, divergence": lambda value: tracked(diverge_threshold=value, bisect_threshold=1e-17).termination_reason,
     "orbit": orbit,
     "branch, tolerance": lambda value: branch(tolerance=value).termination_reason,
     "branch, step": lambda value: branch(step=value).termination_reason,

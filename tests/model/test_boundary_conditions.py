@@ -26,9 +26,7 @@ def beam_with(left: float | None, right: float | None, **more) -> sb.Beam:
     return BEAM.replace(boundary=ends, **more)
 
 
-@pytest.mark.parametrize(
-    ("left", "right"), [(0.0, 0.0), (3.0, 3.0), (0.5, 40.0), (0.0, math.inf), (math.inf, 7.0)]
-)
+@pytest.mark.parametrize(("left", "right"), [(0.0, 0.0), (3.0, 3.0), (0.5, 40.0), (0.0, math.inf), (math.inf, 7.0)])
 def test_modes_are_orthogonal(left, right) -> None:
     """Slopes, and curvatures with the springs' energy; and they fulfil the conditions at the ends."""
     count = 24
@@ -44,29 +42,22 @@ def test_modes_are_orthogonal(left, right) -> None:
         if math.isinf(stiffness):
             np.testing.assert_allclose(turn, 0.0, atol=1e-11 * np.abs(slope).max())
             continue
-        np.testing.assert_allclose(
-            moment - outward * stiffness / LENGTH * turn, 0.0, atol=1e-11 * scale.max()
-        )
+        np.testing.assert_allclose(moment - outward * stiffness / LENGTH * turn, 0.0, atol=1e-11 * scale.max())
         energy += stiffness / LENGTH * np.outer(turn, turn)
     k = modes.wavenumber
     np.testing.assert_allclose(energy / np.outer(k, k), np.eye(count), rtol=0.0, atol=1e-11)
     np.testing.assert_allclose(modes.shape(np.array([0.0, LENGTH])), 0.0, atol=1e-14)
     shapes = modes.shape(x)
-    np.testing.assert_allclose(
-        modes.overlap, (shapes * weight) @ shapes.T, rtol=0.0, atol=1e-13 * modes.overlap.max()
-    )
+    np.testing.assert_allclose(modes.overlap, (shapes * weight) @ shapes.T, rtol=0.0, atol=1e-13 * modes.overlap.max())
     assert (np.diff(k) > 0.0).all()
 
 
 def test_limits_of_the_springs() -> None:
     """An infinite spring clamps, and the error falls in proportion to its softness; none at all pins."""
     clamped, x = BucklingModes(LENGTH, 12), np.linspace(0.0, LENGTH, 101)
-    np.testing.assert_allclose(
-        SpringModes(LENGTH, 12, math.inf, math.inf).shape(x), clamped.shape(x), atol=1e-15
-    )
+    np.testing.assert_allclose(SpringModes(LENGTH, 12, math.inf, math.inf).shape(x), clamped.shape(x), atol=1e-15)
     errors = [
-        np.abs(SpringModes(LENGTH, 12, k, k).wavenumber / clamped.wavenumber - 1.0).max()
-        for k in (1e4, 1e6, 1e8)
+        np.abs(SpringModes(LENGTH, 12, k, k).wavenumber / clamped.wavenumber - 1.0).max() for k in (1e4, 1e6, 1e8)
     ]
     assert errors == pytest.approx([2e-4, 2e-6, 2e-8], rel=1e-3)
     index = np.arange(1, 13)
@@ -88,22 +79,16 @@ def test_pinned_beam_in_closed_form() -> None:
     assert pinned.critical_load == pytest.approx(euler, rel=1e-14)
     assert pinned.second_critical_load == pytest.approx(4.0 * euler, rel=1e-14)
     index = np.arange(1, 9)
-    unit = (
-        (math.pi / LENGTH) ** 2 * math.sqrt(BEAM.bending_stiffness / BEAM.mass_per_length) / (2.0 * math.pi)
-    )
+    unit = (math.pi / LENGTH) ** 2 * math.sqrt(BEAM.bending_stiffness / BEAM.mass_per_length) / (2.0 * math.pi)
     straight = pinned.replace(axial_load=0.4 * euler)
     expected = unit * index * np.sqrt(index**2 - 0.4)
-    np.testing.assert_allclose(
-        sb.ReducedModel.from_beam(straight, modes=8).natural_frequencies, expected, rtol=1e-11
-    )
+    np.testing.assert_allclose(sb.ReducedModel.from_beam(straight, modes=8).natural_frequencies, expected, rtol=1e-11)
     np.testing.assert_allclose(sb.model.exact_natural_frequencies(straight, 8), expected, rtol=1e-11)
     # w = b sin(pi x/L): the i-th frequency by i^2 (i^2 - 1), the first by b^2/(2 r^2)
     square = (index**2 * (index**2 - 1)).astype(float)
     square[0] = 0.5 * (BEAM.buckling_level / BEAM.radius_of_gyration) ** 2
     expected = np.sort(unit * np.sqrt(square))
-    np.testing.assert_allclose(
-        sb.ReducedModel.from_beam(pinned, modes=8).natural_frequencies, expected, rtol=1e-11
-    )
+    np.testing.assert_allclose(sb.ReducedModel.from_beam(pinned, modes=8).natural_frequencies, expected, rtol=1e-11)
     np.testing.assert_allclose(sb.model.exact_natural_frequencies(pinned, 8), expected, rtol=1e-10)
     model = sb.ReducedModel.from_beam(pinned, modes=8)
     assert float(model.midspan_shape @ model.well_amplitude) == pytest.approx(-BEAM.buckling_level, rel=1e-14)
@@ -119,9 +104,7 @@ def test_static_snap_of_a_pinned_beam() -> None:
     closed = second * math.sqrt(8.0 * s / (3.0 * LENGTH))
 
     def holds(force: float) -> bool:
-        return sb.ReducedModel.from_beam(
-            pinned, modes=64, imperfection=sb.Imperfection(point_load=force)
-        ).is_bistable
+        return sb.ReducedModel.from_beam(pinned, modes=64, imperfection=sb.Imperfection(point_load=force)).is_bistable
 
     low, high = 0.5 * closed, 1.5 * closed
     assert holds(low)
@@ -209,9 +192,7 @@ def test_supports_that_give_way() -> None:
 def test_quasi_static_threshold_follows_the_first_mode() -> None:
     pinned = beam_with(0.0, 0.0)
     x = np.array([0.2, 0.5, 0.8])
-    np.testing.assert_allclose(
-        sb.model.quasi_static_threshold(x, 2.0, pinned), 2.0 * np.sin(np.pi * x), rtol=1e-13
-    )
+    np.testing.assert_allclose(sb.model.quasi_static_threshold(x, 2.0, pinned), 2.0 * np.sin(np.pi * x), rtol=1e-13)
     np.testing.assert_array_equal(
         sb.model.quasi_static_threshold(x, 2.0, BEAM), sb.model.quasi_static_threshold(x, 2.0)
     )
@@ -247,9 +228,7 @@ def test_by_name_and_in_files(tmp_path) -> None:
     again = clamped.replace(**{"boundary.left_rotational_stiffness": 3.0 * UNIT})
     assert again == system
     assert again.replace(**{"beam.width": 0.02}).model.beam.boundary == again.model.beam.boundary
-    swept = sb.sweep(
-        system, {"boundary.left_rotational_stiffness": [0.0, 3.0 * UNIT]}, sb.Integration(cycles=2)
-    )
+    swept = sb.sweep(system, {"boundary.left_rotational_stiffness": [0.0, 3.0 * UNIT]}, sb.Integration(cycles=2))
     assert swept.response_class.dims == ("left_rotational_stiffness",)
     assert (np.diff(swept.reference_frequency.values) != 0.0).all()
     with pytest.raises(InputError, match="left"):

@@ -40,9 +40,7 @@ def test_clamped_ends_and_symmetry() -> None:
     assert (modes.shape(0.5 * LENGTH)[even] == 0.0).all()
     assert (modes.slope(0.5 * LENGTH)[~even] == 0.0).all()
     x = LENGTH * np.array([0.125, 0.25, 0.375])
-    np.testing.assert_allclose(
-        modes.shape(LENGTH - x), modes.parity[:, None] * modes.shape(x), atol=1e-13 * size.max()
-    )
+    np.testing.assert_allclose(modes.shape(LENGTH - x), modes.parity[:, None] * modes.shape(x), atol=1e-13 * size.max())
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 32])
@@ -54,9 +52,7 @@ def test_shape_is_the_papers(count: int) -> None:
     odd_form = 1.0 - np.cos(k * x)
     even_form = 1.0 - 2.0 * x / LENGTH - np.cos(k * x) + 2.0 * np.sin(k * x) / (k * LENGTH)
     bracket = np.where(modes.parity[:, None] > 0, odd_form, even_form)
-    np.testing.assert_allclose(
-        modes.shape(x), math.sqrt(2.0 / LENGTH) / k * bracket, atol=2e-13 / modes.wavenumber[0]
-    )
+    np.testing.assert_allclose(modes.shape(x), math.sqrt(2.0 / LENGTH) / k * bracket, atol=2e-13 / modes.wavenumber[0])
 
 
 def test_slope_and_curvature_are_derivatives() -> None:

@@ -121,9 +121,7 @@ def test_power_law_is_hertz_at_three_halves() -> None:
     assert power.max_penetration(2e-3, 0.1) == pytest.approx(hertz.max_penetration(2e-3, 0.1), rel=1e-12)
     assert power.impact_duration(2e-3, 0.1) == pytest.approx(hertz.impact_duration(2e-3, 0.1), rel=1e-12)
     for name in ("force", "energy", "slope"):
-        assert getattr(power, name)(power, 3e-6) == pytest.approx(
-            getattr(hertz, name)(hertz, 3e-6), rel=1e-12
-        )
+        assert getattr(power, name)(power, 3e-6) == pytest.approx(getattr(hertz, name)(hertz, 3e-6), rel=1e-12)
 
 
 def test_layer_and_hertz_carry_one_force_and_share_the_penetration() -> None:
@@ -157,9 +155,7 @@ def test_layer_between_its_limits() -> None:
         return y[0] + 1e-15 if t > 1e-6 else 1.0
 
     apart.terminal = True
-    bounce = solve_ivp(
-        rate, (0.0, 1.0), [0.0, 0.1], "DOP853", rtol=1e-11, atol=1e-16, events=apart, max_step=1e-5
-    )
+    bounce = solve_ivp(rate, (0.0, 1.0), [0.0, 0.1], "DOP853", rtol=1e-11, atol=1e-16, events=apart, max_step=1e-5)
     assert bounce.t[-1] == pytest.approx(law.impact_duration(2e-3, 0.1), rel=1e-6)
     assert bounce.y[0].max() == pytest.approx(law.max_penetration(2e-3, 0.1), rel=1e-3)
 

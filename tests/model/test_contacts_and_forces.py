@@ -91,9 +91,7 @@ location = 0.5
     config = load_config(tmp_path / "mine.toml")
     system = config.system
     assert [each.label for each in system.contacts] == ["", "stop"]
-    assert system.contacts[1].law == system.contacts[0].law and system.get(
-        "contact.stop.gap"
-    ) == pytest.approx(5e-5)
+    assert system.contacts[1].law == system.contacts[0].law and system.get("contact.stop.gap") == pytest.approx(5e-5)
     assert system.get("force.stiffness") == 2000.0 and system.get("force.weight.force") == 1e-3
     for written in (config_text(config), config_text(config.whole())):
         (tmp_path / "again.toml").write_text(written)
@@ -114,9 +112,7 @@ location = 0.5
     with pytest.raises(InputError, match=r"\[contact\.3\]: there is none before it; number them 1, 2, 3"):
         sb.System.from_mapping(sb.System(MODEL).to_mapping() | {"contact": {}, "contact.3": {}})
     for section in ("contact", "force"):
-        with pytest.raises(
-            InputError, match=rf"{section} = \[\]: must be a table, or an array of at least one"
-        ):
+        with pytest.raises(InputError, match=rf"{section} = \[\]: must be a table, or an array of at least one"):
             config_from_mapping({"extends": "paper", section: []})
 
 
@@ -130,10 +126,7 @@ location = 0.5
         ({"forces": [SYSTEM.forces[1]] * 2}, "forces: two have the label 'magnet'"),
         ({"forces": SYSTEM.forces[0]}, r"forces = LocalSpring\(.*: must be a list or tuple"),
         ({"forces": [HERTZ]}, r"forces\[0\] = HertzContact\(.*: must be an ExternalForce"),
-        (
-            {"forces": [sb.LocalSpring(stiffness=1.0)]},
-            "force.location = None: a force on a beam acts at a location",
-        ),
+        ({"forces": [sb.LocalSpring(stiffness=1.0)]}, "force.location = None: a force on a beam acts at a location"),
         ({"harvesters": [None]}, r"harvesters\[0\] = None: must be a PiezoelectricHarvester"),
         ({"base_excitation": 1.0}, "base_excitation = 1.0: must be a BaseExcitation"),
     ],
@@ -169,9 +162,7 @@ def test_questions_and_runs_of_many_parts():
     """Two external forces beside two harvesters and six contacts: equilibria, and nothing to refuse."""
     coil = sb.ElectromagneticHarvester(force_factor=1.0, resistance=10.0)
     weight = sb.ExternalForce(history=sb.ConstantForce(force=-2e-3), location=0.5)
-    system = sb.System(
-        MODEL, contacts=[sb.Contact(HERTZ, STOP)] * 6, forces=[weight, weight], harvesters=[coil, coil]
-    )
+    system = sb.System(MODEL, contacts=[sb.Contact(HERTZ, STOP)] * 6, forces=[weight, weight], harvesters=[coil, coil])
     one = sb.System(MODEL, forces=[sb.ExternalForce(history=sb.ConstantForce(force=-4e-3), location=0.5)])
     for each, same in zip(system.potential.equilibria, one.potential.equilibria, strict=True):
         np.testing.assert_allclose(each.amplitude, same.amplitude, rtol=1e-9, atol=1e-12)
@@ -187,11 +178,7 @@ def test_two_equal_coils_are_one():
     how = sb.Integration(cycles=3)
     for kind, factor, rest in (
         (sb.ElectromagneticHarvester, "force_factor", {"resistance": 10.0, "location": 0.4}),
-        (
-            sb.PiezoelectricHarvester,
-            "moment_per_volt",
-            {"resistance": 2e4, "capacitance": 6e-8, "patch_end": 0.25},
-        ),
+        (sb.PiezoelectricHarvester, "moment_per_volt", {"resistance": 2e4, "capacitance": 6e-8, "patch_end": 0.25}),
     ):
         ends = []
         for strength, count in ((1e-4, 2), (1e-4 * 2.0**0.5, 1)):

@@ -22,7 +22,7 @@ RECORD = 3.0 * np.sin(700.0 * TIMES) + np.cos(330.0 * TIMES)
 DRIVES = [
     sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.2, phase=0.4),
     sb.DisplacementSine(frequency_ratio=0.7, displacement_amplitude=0.3),
-    sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.1, second_ratio=1.8, second_amplitude=0.02, second_phase=0.9),
+    sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1) + sb.Sine(frequency_ratio=1.8, velocity_amplitude=0.02, phase=0.9),
     sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=4.0),
     sb.Chirp(start_ratio=2.0, stop_ratio=0.5, velocity_amplitude=0.1, sweep_cycles=9.0, sweep_type="log"),
     sb.Burst(frequency_ratio=1.1, velocity_amplitude=0.2, duration_cycles=6.0, ramp_up_cycles=2.0, retraction=0.5),

@@ -29,9 +29,7 @@ def brute_force(model: ReducedModel, location: float, displacement: float) -> fl
 
     rng = np.random.default_rng(0)
     starts = rng.normal(size=(12, model.modes - 1)) * (1.0 / np.arange(1, model.modes) ** 2)
-    ends = [
-        minimize(energy, z, jac=True, method="BFGS", options={"gtol": 1e-10, "maxiter": 5000}) for z in starts
-    ]
+    ends = [minimize(energy, z, jac=True, method="BFGS", options={"gtol": 1e-10, "maxiter": 5000}) for z in starts]
     return min(float(end.fun) for end in ends) * unit
 
 
@@ -42,18 +40,14 @@ def test_least_energy_matches_brute_force(modes: int, location: float, height: f
     model = ReducedModel.from_beam(BEAM, modes)
     displacement = height * BEAM.buckling_level
     bound = float(least_energy_at(model, location, displacement))
-    assert bound == pytest.approx(
-        brute_force(model, location, displacement), rel=1e-6, abs=1e-6 * -model.well_energy
-    )
+    assert bound == pytest.approx(brute_force(model, location, displacement), rel=1e-6, abs=1e-6 * -model.well_energy)
 
 
 @pytest.mark.parametrize("modes", [1, 2, 8, 32])
 def test_least_energy_is_a_lower_bound_reached_in_the_well(modes: int) -> None:
     model = ReducedModel.from_beam(BEAM, modes)
     rng = np.random.default_rng(modes)
-    shapes = (
-        rng.normal(size=(300, modes)) / np.arange(1, modes + 1) ** 2 * 2.0 * np.abs(model.well_amplitude[0])
-    )
+    shapes = rng.normal(size=(300, modes)) / np.arange(1, modes + 1) ** 2 * 2.0 * np.abs(model.well_amplitude[0])
     places = rng.choice([0.2, 0.35, 0.5, 0.7], 300)
     heights = np.array([model.shape_at(x) @ a for x, a in zip(places, shapes, strict=True)])
     bound = least_energy_at(model, places, heights)
@@ -82,10 +76,7 @@ def test_hardly_displaced_is_hardly_more_energy(modes: int, location: float) -> 
 def test_one_mode_passes_a_point_in_one_shape_only() -> None:
     """Its least energy there is its energy, zero on the line between the clamps."""
     model = ReducedModel.from_beam(BEAM, 1)
-    places, heights = (
-        np.array([0.5, 0.3, 0.5, 0.4, 0.6]),
-        np.array([0.0, 0.0, 0.3, 0.9, -1.1]) * BEAM.buckling_level,
-    )
+    places, heights = (np.array([0.5, 0.3, 0.5, 0.4, 0.6]), np.array([0.0, 0.0, 0.3, 0.9, -1.1]) * BEAM.buckling_level)
     amplitude = heights / np.array([model.shape_at(x)[0] for x in places])
     energy = model.potential_energy(amplitude[:, None])
     np.testing.assert_allclose(

@@ -36,9 +36,7 @@ def test_pull_in_voltage(side: float) -> None:
     assert (np.abs(place[stable]) <= gap / 3.0 * (1.0 + 1e-6)).all() and (~stable).any()
     soft = k - 2.0 * pull / (gap - np.abs(place)) ** 3
     expected = np.sqrt(np.maximum(soft, 0.0) / mass) / (2.0 * math.pi)
-    np.testing.assert_allclose(
-        found.natural_frequency.values[stable, 0], expected[stable], atol=1e-3 * expected.max()
-    )
+    np.testing.assert_allclose(found.natural_frequency.values[stable, 0], expected[stable], atol=1e-3 * expected.max())
     assert np.isnan(found.natural_frequency.values[~stable]).all()
     assert found.attrs["incomplete_branches"] == 0
     ax = found.snapbeam.plot()
@@ -54,9 +52,7 @@ def test_critical_points_need_no_search(monkeypatch: pytest.MonkeyPatch) -> None
     """What becomes of a beam beyond a critical point follows from its motion, without the wells that it may come to."""
     searched: list[int] = []
     before = Potential._starts
-    monkeypatch.setattr(
-        Potential, "_starts", lambda self, count: searched.append(count) or before(self, count)
-    )
+    monkeypatch.setattr(Potential, "_starts", lambda self, count: searched.append(count) or before(self, count))
     model = sb.ReducedModel.from_beam(BEAM, modes=2)
     magnet = sb.MagneticForce(strength=1e-9, gap=-2.9 * BEAM.buckling_level, location=0.5)
     found = sb.model.equilibrium_branches(sb.System(model, forces=[magnet]), "force.strength", (1e-10, 4e-7))
@@ -124,9 +120,7 @@ def test_no_equilibrium_in_the_range() -> None:
     """Beyond pull-in over the whole range."""
     plate = sb.ReducedModel.from_matrices([[1e-9]], [[2.0]], contact_shape=[1.0], length_scale=3e-6)
     system = sb.System(plate, forces=[sb.ElectrostaticForce(voltage=1.0, area=4e-8, gap=3e-6)])
-    with pytest.raises(
-        InputError, match=r"force\.voltage: there is no equilibrium at any of 5 values from 8 to 9 V"
-    ):
+    with pytest.raises(InputError, match=r"force\.voltage: there is no equilibrium at any of 5 values from 8 to 9 V"):
         sb.model.equilibrium_branches(system, "force.voltage", (8.0, 9.0))
 
 
@@ -162,9 +156,7 @@ def test_what_becomes_of_the_wells_under_a_magnet(side: float) -> None:
     short = sb.model.equilibrium_branches(system, "force.strength", (0.0, 0.6 * float(ends[0][0])))
     assert short.sizes["critical_point"] == 0 and short.sizes["stable_part"] == 2
     assert (short.stable_end_kind == "none").all()
-    between = sb.model.equilibrium_branches(
-        system, "force.strength", (0.0, float(0.5 * (ends[0][0] + ends[1][0])))
-    )
+    between = sb.model.equilibrium_branches(system, "force.strength", (0.0, float(0.5 * (ends[0][0] + ends[1][0]))))
     kinds = sorted(map(tuple, between.stable_end_kind.values.tolist()))
     assert sorted(sum(each != "none" for each in own) for own in kinds) == [0, 1]
 
@@ -228,13 +220,9 @@ label = "magnet"
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
     assert "limit point at force.strength = " in done.output
-    assert (
-        ": branch 0, a stable branch ends" in done.output or "does not end, force.strength = " in done.output
-    )
+    assert ": branch 0, a stable branch ends" in done.output or "does not end, force.strength = " in done.output
     assert (tmp_path / "b.png").stat().st_size > 5_000
     refused = CliRunner().invoke(app, [*command, "--force-displacement"])
     assert refused.exit_code == 2
-    refused = CliRunner().invoke(
-        app, ["equilibria", "--config", "own.toml", "--over", "force.strength=1:2:3"]
-    )
+    refused = CliRunner().invoke(app, ["equilibria", "--config", "own.toml", "--over", "force.strength=1:2:3"])
     assert refused.exit_code == 2 and "must be first:last" in refused.output

@@ -128,11 +128,7 @@ def test_impacts_at_the_ends_of_the_ranges_of_numbers(law):
 def test_no_time_of_an_impact_at_rest():
     """Duration of a stiffening force grows without bound as the velocity falls."""
     for law in (sb.HertzContact(4e8), sb.PowerLaw(1.0, 1.7), sb.LayeredHertz(4e8, 1e12)):
-        assert (
-            law.impact_duration(1e-3, 1e-20)
-            > law.impact_duration(1e-3, 1e-10)
-            > law.impact_duration(1e-3, 1.0)
-        )
+        assert law.impact_duration(1e-3, 1e-20) > law.impact_duration(1e-3, 1e-10) > law.impact_duration(1e-3, 1.0)
         assert law.max_penetration(1e-3, 0.0) == 0.0
         with pytest.raises(sb.InputError, match=r"^velocity = "):
             law.impact_duration(1e-3, 0.0)

@@ -15,9 +15,7 @@ from snapbeam.util.validation import InputError
 
 PI = np.pi
 BEAM = sb.Beam(length=3e-3, thickness=1e-5, width=5e-4, density=2330.0, young_modulus=169e9, axial_load=0.0)
-PINNED = BEAM.replace(
-    boundary=sb.BoundaryConditions(left_rotational_stiffness=0.0, right_rotational_stiffness=0.0)
-)
+PINNED = BEAM.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=0.0, right_rotational_stiffness=0.0))
 
 
 def arch(rise: float, modes: int = 3, beam: sb.Beam = BEAM, **more: float) -> sb.ReducedModel:
@@ -46,12 +44,7 @@ def test_three_modes_of_qiu_lang_and_slocum() -> None:
         np.testing.assert_allclose(force[at], exact[at], rtol=0.0, atol=1e-6 * np.abs(exact).max())
     kinds = curve.critical_kind.values
     found = np.sort(1.0 - curve.critical_displacement.values[kinds == "limit"] / rise)
-    cubic = (
-        np.poly1d([1.0])
-        * np.poly1d([1.0, 0.0])
-        * np.poly1d([1.0, -1.5 + root])
-        * np.poly1d([1.0, -1.5 - root])
-    )
+    cubic = np.poly1d([1.0]) * np.poly1d([1.0, 0.0]) * np.poly1d([1.0, -1.5 + root]) * np.poly1d([1.0, -1.5 - root])
     np.testing.assert_allclose(found, np.sort(cubic.deriv().roots.real), rtol=1e-9)
     # the published line 4.18 - 2.18 d/h rounds the wavenumber; many modes change the snap-through force by 0.3 %
     many = sb.force_displacement(arch(ratio, 12), 0.5)
@@ -101,9 +94,7 @@ def test_many_modes_against_the_beam_equation() -> None:
     z = 0.5 * half * (1.0 + x)
     slope = 1.0 - np.cos(z) + c * np.sin(z)
     k = wave / BEAM.length
-    elongation = (
-        2.0 * float(np.sum(0.5 * half * weight * slope**2)) / k * (0.5 / (BEAM.bending_stiffness * k**2)) ** 2
-    )
+    elongation = 2.0 * float(np.sum(0.5 * half * weight * slope**2)) / k * (0.5 / (BEAM.bending_stiffness * k**2)) ** 2
     compression = wave**2 * BEAM.bending_stiffness / BEAM.length**2
     exact = np.sqrt((load - compression) / buckled.nonlinear_stiffness / elongation)
     errors = []
@@ -194,9 +185,7 @@ def test_finite_elements_with_springs() -> None:
     assert curve.attrs["snap_through_kind"] == modal.attrs["snap_through_kind"] == "limit"
 
 
-@pytest.mark.parametrize(
-    "modes", [1, pytest.param(3, marks=pytest.mark.slow), pytest.param(8, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("modes", [1, pytest.param(3, marks=pytest.mark.slow), pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", ["spring", "magnet", "electrode"])
 def test_local_forces_where_the_force_acts_add_to_it(modes: int, law: str) -> None:
     """F(w) of the system is that of the beam less the local force at w, at the same amplitudes."""
@@ -264,9 +253,7 @@ def test_local_forces_anywhere() -> None:
 @pytest.mark.slow
 def test_antisymmetric_wells() -> None:
     """A stiff spring at the centre of a beam beyond its second critical load leaves two antisymmetric wells."""
-    beam = sb.Beam(
-        length=5e-4, thickness=2e-6, width=2e-5, density=2330.0, young_modulus=160e9, axial_load=1e-3
-    )
+    beam = sb.Beam(length=5e-4, thickness=2e-6, width=2e-5, density=2330.0, young_modulus=160e9, axial_load=1e-3)
     model = sb.ReducedModel.from_beam(beam, modes=4)
     system = sb.System(model, forces=[sb.LocalSpring(stiffness=50.0, location=0.5)])
     potential = system.potential

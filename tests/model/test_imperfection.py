@@ -61,15 +61,12 @@ def test_loads_are_what_they_say() -> None:
     uniform = sb.Imperfection(uniform_load=0.3).transverse_load(modes, default_values.BEAM)
     np.testing.assert_allclose(uniform, 0.3 * areas, rtol=0.0, atol=1e-13 * areas.max())
     weight = sb.Imperfection(gravity=9.81).transverse_load(modes, default_values.BEAM)
-    np.testing.assert_allclose(
-        weight, -9.81 * default_values.BEAM.mass_per_length / 0.3 * uniform, rtol=1e-14
-    )
+    np.testing.assert_allclose(weight, -9.81 * default_values.BEAM.mass_per_length / 0.3 * uniform, rtol=1e-14)
     point = sb.Imperfection(point_load=0.2, point_location=0.3).transverse_load(modes, default_values.BEAM)
     np.testing.assert_allclose(point, 0.2 * modes.shape(0.3 * LENGTH), rtol=1e-14)
     # a load upward lifts both wells, one downward lowers them
     assert (
-        model_of(uniform_load=0.05).wells @ model_of().midspan_shape
-        > model_of().wells @ model_of().midspan_shape
+        model_of(uniform_load=0.05).wells @ model_of().midspan_shape > model_of().wells @ model_of().midspan_shape
     ).all()
     assert model_of(gravity=1.0).well_energy < model_of().well_energy
 
@@ -89,8 +86,7 @@ def test_gone_past_a_fold() -> None:
     assert len(past.equilibria) == 1
     np.testing.assert_array_equal(past.wells[0], past.wells[1])
     system = sb.System(
-        past,
-        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
+        past, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))]
     )
     assert "monostable" in [each.code for each in system.diagnostics()]
     with pytest.raises(InputError, match="this imperfection leaves one"):
@@ -99,9 +95,7 @@ def test_gone_past_a_fold() -> None:
 
 def test_two_well_limits_are_computed() -> None:
     """A curved silicon arch without load needs a greater rise, not a smaller one; each limit named is the limit."""
-    beam = sb.Beam(
-        length=500e-6, width=20e-6, thickness=2e-6, density=2330.0, young_modulus=160e9, axial_load=0.0
-    )
+    beam = sb.Beam(length=500e-6, width=20e-6, thickness=2e-6, density=2330.0, young_modulus=160e9, axial_load=0.0)
 
     def arch(rise: float, load: float = 0.0) -> sb.ReducedModel:
         return sb.ReducedModel.from_beam(
@@ -162,11 +156,7 @@ def test_bound_behind_early_termination(modes) -> None:
         for share in (-0.8, -0.3, 0.0, 0.4, 0.9):
             height = share * float(shape @ model.wells[1])
             bound = least_energy_through(
-                model.stiffness,
-                model.nonlinear_stiffness,
-                model.transverse_force,
-                shape[None],
-                np.array([height]),
+                model.stiffness, model.nonlinear_stiffness, model.transverse_force, shape[None], np.array([height])
             )[0]
             # free coordinates of the plane c . alpha = r
             base, free = shape * height / (shape @ shape), np.linalg.svd(shape[None])[2][1:].T
@@ -186,11 +176,7 @@ def test_bound_behind_early_termination(modes) -> None:
 
     plain = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     none = least_energy_through(
-        plain.stiffness,
-        plain.nonlinear_stiffness,
-        np.zeros(modes),
-        plain.shape_at(0.3)[None],
-        np.array([0.4 * LEVEL]),
+        plain.stiffness, plain.nonlinear_stiffness, np.zeros(modes), plain.shape_at(0.3)[None], np.array([0.4 * LEVEL])
     )
     assert none[0] == pytest.approx(float(least_energy_at(plain, 0.3, 0.4 * LEVEL)), rel=1e-9)
 
@@ -203,12 +189,10 @@ def test_measured_wells_are_explained() -> None:
         np.testing.assert_allclose(model.well_frequencies[:, 0], [81.3, 80.5], rtol=1e-6)
         assert model.beam.buckling_level == pytest.approx(0.331e-3, abs=1e-6)
         mirrored = identify_imperfection(default_values.BEAM, 80.5, 81.3, kind)
-        assert getattr(mirrored.imperfection, kind) == pytest.approx(
-            -getattr(model.imperfection, kind), rel=1e-5
-        )
-    assert identify_imperfection(
-        default_values.BEAM, 81.3, 80.5
-    ).imperfection.midspan_amplitude == pytest.approx(-1.17e-6, abs=0.01e-6)
+        assert getattr(mirrored.imperfection, kind) == pytest.approx(-getattr(model.imperfection, kind), rel=1e-5)
+    assert identify_imperfection(default_values.BEAM, 81.3, 80.5).imperfection.midspan_amplitude == pytest.approx(
+        -1.17e-6, abs=0.01e-6
+    )
     with pytest.raises(InputError, match="no load of this beam"):
         identify_imperfection(default_values.BEAM, 400.0, 20.0)
 
@@ -225,14 +209,10 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
     assert other.model.modes == 5
     system.save(tmp_path / "a.toml")
     assert sb.System.load(tmp_path / "a.toml") == system
-    perfect = system.replace(
-        **{"imperfection.midspan_amplitude": 0.0, "imperfection.antisymmetric_amplitude": 0.0}
-    )
+    perfect = system.replace(**{"imperfection.midspan_amplitude": 0.0, "imperfection.antisymmetric_amplitude": 0.0})
     assert perfect == system.replace(imperfection=None)
     assert (
-        perfect.replace(
-            **{"imperfection.midspan_amplitude": 1e-5, "imperfection.antisymmetric_amplitude": 2e-6}
-        )
+        perfect.replace(**{"imperfection.midspan_amplitude": 1e-5, "imperfection.antisymmetric_amplitude": 2e-6})
         == system
     )
     with pytest.raises(InputError, match=r"imperfection.tilt: is not a parameter"):
@@ -240,10 +220,7 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
     config = config_from_mapping(
         {
             "extends": "paper",
-            "imperfection": {
-                "midspan_amplitude": 1e-5,
-                "profile": [[0.0, 0.3, 0.7, 1.0], [0.0, 1e-6, 2e-6, 0.0]],
-            },
+            "imperfection": {"midspan_amplitude": 1e-5, "profile": [[0.0, 0.3, 0.7, 1.0], [0.0, 1e-6, 2e-6, 0.0]]},
         }
     )
     assert config.system.model.is_bistable
@@ -255,9 +232,7 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
     )
     again = sb.System.from_mapping(sb.System(matrices).to_mapping())
     np.testing.assert_array_equal(again.model.wells, matrices.wells)
-    assert sorted(matrices.wells[:, 0]) == pytest.approx(
-        sorted(np.roots([1.0, 0.0, -1.0, -0.1]).real)[::2], rel=1e-12
-    )
+    assert sorted(matrices.wells[:, 0]) == pytest.approx(sorted(np.roots([1.0, 0.0, -1.0, -0.1]).real)[::2], rel=1e-12)
 
 
 @pytest.mark.slow

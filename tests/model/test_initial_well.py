@@ -13,9 +13,7 @@ from snapbeam.model.parameter_file import Config, config_from_mapping, load_conf
 from snapbeam.simulation.simulate import attributes_of
 from snapbeam.solver.step_size import Plan
 
-BEAM = sb.Beam(
-    length=0.041, thickness=2.6e-4, width=4e-3, density=2.7e3, young_modulus=6.9e10, buckling_level=3.1e-4
-)
+BEAM = sb.Beam(length=0.041, thickness=2.6e-4, width=4e-3, density=2.7e3, young_modulus=6.9e10, buckling_level=3.1e-4)
 MODEL = sb.ReducedModel.from_beam(BEAM, modes=3, damping_ratio=0.02)
 BASE = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.7, acceleration_amplitude=0.05))
 UNEVEN = sb.ReducedModel.from_beam(
@@ -116,9 +114,7 @@ def test_parameter_file_names_the_well(tmp_path):
         assert named.start_well == "upper"
         named.save(tmp_path / "saved.toml")
         assert sb.System.load(tmp_path / "saved.toml") == named
-    with pytest.raises(
-        sb.InputError, match=r"\[initial_state\] initial_well = 'top': must be 'lower', 'upper'"
-    ):
+    with pytest.raises(sb.InputError, match=r"\[initial_state\] initial_well = 'top': must be 'lower', 'upper'"):
         Config({}), config_from_mapping({"initial_state": {"initial_well": "top"}})
 
 

@@ -23,9 +23,7 @@ def test_replace() -> None:
     asked = sb.Integration(cycles=5, step=1e-5)
     assert asked.replace(cycles=6) == sb.Integration(cycles=6, step=1e-5)
     assert asked.cycles == 5
-    with pytest.raises(
-        InputError, match="cycle: is not a parameter of an integration; must be one of cycles, step"
-    ):
+    with pytest.raises(InputError, match="cycle: is not a parameter of an integration; must be one of cycles, step"):
         asked.replace(cycle=6)
     with pytest.raises(dataclasses.FrozenInstanceError):
         asked.cycles = 3  # type: ignore[misc]

@@ -118,9 +118,7 @@ def test_modes_are_normalised_after_inverse_iteration() -> None:
 
 def test_imperfect_beam_with_many_modes_keeps_its_first_frequency() -> None:
     """Of 256 modes the square of the first is 1e-9 of the largest; near the snap it is not rounded to 0."""
-    beam = sb.Beam(
-        length=0.2, width=0.01, thickness=0.5e-3, young_modulus=210e9, density=7800.0, buckling_level=1e-3
-    )
+    beam = sb.Beam(length=0.2, width=0.01, thickness=0.5e-3, young_modulus=210e9, density=7800.0, buckling_level=1e-3)
     uneven = sb.Imperfection(midspan_amplitude=1e-5)
     few, many = (sb.ReducedModel.from_beam(beam, modes, imperfection=uneven) for modes in (32, 256))
     assert many.natural_frequencies[0] == pytest.approx(few.natural_frequencies[0], rel=1e-4)
@@ -175,9 +173,7 @@ def test_base_that_moves_fixed_coordinates_acts_through_the_mass() -> None:
     mass, stiffness = coupled(4)
     stiffness[3, 3] = 1e20
     with pytest.warns(sb.DiagnosticWarning):
-        model = sb.ReducedModel.from_matrices(
-            mass, stiffness, contact_shape=np.ones(4), base_shape=np.ones(4)
-        )
+        model = sb.ReducedModel.from_matrices(mass, stiffness, contact_shape=np.ones(4), base_shape=np.ones(4))
     assert model.base_shape is not None
     np.testing.assert_allclose(model.mass @ model.base_shape, (mass @ np.ones(4))[:3], rtol=1e-12)
 
@@ -209,10 +205,7 @@ def test_stiff_coordinates_that_are_no_penalty_stay() -> None:
     ("more", "message"),
     [
         ({"contact_shape": [0.0, 0.0, 1.0]}, "contact_shape: must not be zeros only"),
-        (
-            {"well_amplitude": [-1.0, 0.0, 1.0], "nonlinear_stiffness": 1.0},
-            "well_amplitude: must be 0 in the",
-        ),
+        ({"well_amplitude": [-1.0, 0.0, 1.0], "nonlinear_stiffness": 1.0}, "well_amplitude: must be 0 in the"),
     ],
 )
 def test_rows_on_fixed_coordinates_only_are_refused(more: dict[str, Any], message: str) -> None:
@@ -248,9 +241,7 @@ def random_pair(number: int) -> tuple[Any, Any, int, NDArray[np.bool_]]:
         whole = [np.zeros((n + added, n + added)) for _ in range(2)]
         for each, own in zip(whole, (mass, stiffness), strict=True):
             each[:n, :n] = own
-            across = (
-                1e-3 * rng.normal(size=(n, added)) * np.sqrt(np.diag(own))[:, None] * math.sqrt(own.max())
-            )
+            across = 1e-3 * rng.normal(size=(n, added)) * np.sqrt(np.diag(own))[:, None] * math.sqrt(own.max())
             each[:n, n:], each[n:, :n] = across, across.T
             each[n:, n:] = np.eye(added) * own.max()
         mass, stiffness = whole
@@ -324,9 +315,7 @@ def test_sparse_parts_and_unstable_motions() -> None:
     pulled = laplacian(2000).tolil()
     pulled[0, 0], pulled[1000, 1000] = -1.0, -3.0
     found = eigenpairs(sp.csr_array(pulled), sp.csr_array(sp.eye_array(2000)), count=10).value
-    expected = scipy.linalg.eigvalsh_tridiagonal(
-        pulled.diagonal(), -np.ones(1999), select="i", select_range=(0, 9)
-    )
+    expected = scipy.linalg.eigvalsh_tridiagonal(pulled.diagonal(), -np.ones(1999), select="i", select_range=(0, 9))
     np.testing.assert_allclose(found, expected, atol=1e-14)
     with pytest.raises(InputError, match="must be stable"):
         model_of(sp.csr_array(sp.eye_array(2000)), sp.csr_array(pulled), modes=4)
@@ -343,9 +332,7 @@ def test_modes_are_those_of_the_whole_model() -> None:
     np.testing.assert_allclose(turned.natural_frequencies, whole.natural_frequencies, rtol=1e-9)
     for name in rows:
         one, two = (
-            each.linear_modes.T
-            @ (each.mass if name == "base_shape" else np.eye(each.modes))
-            @ getattr(each, name)
+            each.linear_modes.T @ (each.mass if name == "base_shape" else np.eye(each.modes)) @ getattr(each, name)
             for each in (turned, whole)
         )
         np.testing.assert_allclose(np.abs(one), np.abs(two), rtol=1e-6, atol=1e-9)

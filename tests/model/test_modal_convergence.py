@@ -50,9 +50,7 @@ def test_the_estimate_of_a_snap_through_force() -> None:
     forces = {n: float(force_displacement(system_of(ARCH, n), 0.5).snap_through_force) for n in (2, 4, 16)}
     assert forces[2] == pytest.approx(forces[4], rel=1e-9)
     for modes in (2, 4):
-        estimate = modal_error(
-            system_of(ARCH, modes), lambda each: force_displacement(each, 0.5)["snap_through_force"]
-        )
+        estimate = modal_error(system_of(ARCH, modes), lambda each: force_displacement(each, 0.5)["snap_through_force"])
         assert abs(forces[16] / forces[modes] - 1.0) <= estimate <= 0.01
 
 

@@ -94,10 +94,7 @@ def test_an_offset_of_a_recorded_acceleration_is_told(record: str, drifts: bool)
 def test_beams(changes, code: str, words: str) -> None:
     import re
 
-    found = {
-        diagnostic.code: diagnostic
-        for diagnostic in system(default_values.BEAM.replace(**changes)).diagnostics()
-    }
+    found = {diagnostic.code: diagnostic for diagnostic in system(default_values.BEAM.replace(**changes)).diagnostics()}
     assert re.search(words, found[code].message), found[code].message
 
 

@@ -21,13 +21,8 @@ def finite_elements(load: float, level: float, elements: int) -> np.ndarray:
     h = 1.0 / elements
     points, weights = np.polynomial.legendre.leggauss(6)
     s, weight = 0.5 * (points + 1.0), 0.5 * h * weights
-    shape = np.array(
-        [1 - 3 * s**2 + 2 * s**3, h * (s - 2 * s**2 + s**3), 3 * s**2 - 2 * s**3, h * (s**3 - s**2)]
-    )
-    slope = (
-        np.array([-6 * s + 6 * s**2, h * (1 - 4 * s + 3 * s**2), 6 * s - 6 * s**2, h * (3 * s**2 - 2 * s)])
-        / h
-    )
+    shape = np.array([1 - 3 * s**2 + 2 * s**3, h * (s - 2 * s**2 + s**3), 3 * s**2 - 2 * s**3, h * (s**3 - s**2)])
+    slope = np.array([-6 * s + 6 * s**2, h * (1 - 4 * s + 3 * s**2), 6 * s - 6 * s**2, h * (3 * s**2 - 2 * s)]) / h
     bend = np.array([-6 + 12 * s, h * (6 * s - 4), 6 - 12 * s, h * (6 * s - 2)]) / h**2
     size = 2 * (elements + 1)
     stiffness, mass, wave = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
@@ -76,8 +71,7 @@ def test_sixty_frequencies_none_missed(level: float) -> None:
 def test_straight_none_missed(load: float) -> None:
     beam = BEAM.replace(axial_load=load)
     excess = (
-        ReducedModel.from_beam(beam, modes=256).natural_frequencies[:60] / exact_natural_frequencies(beam, 60)
-        - 1.0
+        ReducedModel.from_beam(beam, modes=256).natural_frequencies[:60] / exact_natural_frequencies(beam, 60) - 1.0
     )
     assert excess.min() > -1e-8  # the lowest frequency loses digits in P_cr - P
     assert excess[1:].min() > 0.0
@@ -103,9 +97,7 @@ def test_symmetric_and_antisymmetric_cross() -> None:
     """At b/r = 6.21208 the first two frequencies meet and change places."""
     gaps = []
     for level in (6.212075, 6.212085):
-        first = (
-            exact_natural_frequencies(BEAM.replace(buckling_level=level * BEAM.radius_of_gyration), 2) / UNIT
-        )
+        first = exact_natural_frequencies(BEAM.replace(buckling_level=level * BEAM.radius_of_gyration), 2) / UNIT
         fixed = int(np.argmin(np.abs(first - 44.36270469277)))
         gaps.append(first[1 - fixed] - first[fixed])
     assert gaps[0] < 0.0 < gaps[1]

@@ -8,14 +8,7 @@ import pytest
 from snapbeam.model.default_values import BEAM, CONTACT
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameter_axes import from_physical, parse_axis, to_physical
-from snapbeam.model.parameter_file import (
-    DEFAULT_AXES,
-    Config,
-    config_from_mapping,
-    dump_config,
-    load_config,
-    override,
-)
+from snapbeam.model.parameter_file import DEFAULT_AXES, Config, config_from_mapping, dump_config, load_config, override
 from snapbeam.model.parameters import PHYSICAL
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import points_of
@@ -48,19 +41,13 @@ REFUSALS = [
     ({"model": {"qqq": 1}}, "[model] qqq: unknown key; must be one of modes, damping_ratio"),
     ({"baem": {}}, "[baem]: unknown section; did you mean 'beam'?"),
     ({"beam": 3}, "beam = 3: must be a section [beam]"),
-    (
-        {"beam": {"thickness": "0.4 ms"}},
-        "[beam] thickness = '0.4 ms': the unit 'ms' does not fit; must be in m",
-    ),
+    ({"beam": {"thickness": "0.4 ms"}}, "[beam] thickness = '0.4 ms': the unit 'ms' does not fit; must be in m"),
     ({"beam": {"length": True}}, "[beam] length = True: must be a number in m"),
     ({"beam": {"length": float("nan")}}, "[beam] length = nan: must be a finite number in m"),
     ({"beam": {"density": float("inf")}}, "[beam] density = inf: must be a finite number in kg/m^3"),
     ({"beam": {"length": -1.0}}, "[beam] length = -1.0: must be a finite number greater than 0 m"),
     ({"beam": {"length": 161.0}}, "is it given in mm?"),
-    (
-        {"beam": {"thickness": 0.4}},
-        "[beam] thickness = 0.4 m: must be less than length = 0.161 m; is it given in mm?",
-    ),
+    ({"beam": {"thickness": 0.4}}, "[beam] thickness = 0.4 m: must be less than length = 0.161 m; is it given in mm?"),
     ({"beam": {"young_modulus": 200}}, "is it given in GPa?"),
     ({"beam": {"density": 7.8}}, "is it given in g/cm^3?"),
     ({"beam": {"buckling_level": 3e-4, "axial_load": 3.0}}, "give exactly one of the two"),
@@ -78,10 +65,7 @@ REFUSALS = [
     ({"sweep": {"frequency_ratio": "4:0.1:64"}}, "start must be less than stop"),
     ({"sweep": {"frequency_ratio": "0.1:4:many"}}, "the count 'many' must be a whole number"),
     ({"sweep": {"frequency_ratio": [1.0, 0.5]}}, "must be strictly increasing"),
-    (
-        {"sweep": {"frequency_ratio": "0:4:64"}},
-        "[sweep] frequency_ratio = 0.0: must be a finite number greater than 0",
-    ),
+    ({"sweep": {"frequency_ratio": "0:4:64"}}, "[sweep] frequency_ratio = 0.0: must be a finite number greater than 0"),
     (
         {"sweep": {"velocity_amplitude": [-0.1, 0.1]}},
         "[sweep] velocity_amplitude = -0.1: must be a finite number of at least 0",
@@ -95,19 +79,10 @@ REFUSALS = [
     ({"integration": {"step": "fast"}}, "[integration] step = 'fast': must be a number in s"),
     ({"integration": {"step": 0.0}}, "step = 0.0: must be a finite number greater than 0 s"),
     ({"integration": {"tolerance": 1e-3, "step": 1e-5}}, "[integration] tolerance = 0.001 with step = 1e-05"),
-    (
-        {"integration": {"engine": "gpu"}},
-        "[integration] engine = 'gpu': must be one of 'auto', 'native', 'python'",
-    ),
+    ({"integration": {"engine": "gpu"}}, "[integration] engine = 'gpu': must be one of 'auto', 'native', 'python'"),
     ({"integration": {"early_termination": 1}}, "[integration] early_termination = 1: must be True or False"),
-    (
-        {"model": {"damping_ratio": [0.1, 0.2]}},
-        "[model] damping_ratio of shape (2,): must have the shape (32,)",
-    ),
-    (
-        {"beam": {"buckling_level": 0.0}},
-        "[beam] buckling_level = 0.0: must be a finite number greater than 0 m",
-    ),
+    ({"model": {"damping_ratio": [0.1, 0.2]}}, "[model] damping_ratio of shape (2,): must have the shape (32,)"),
+    ({"beam": {"buckling_level": 0.0}}, "[beam] buckling_level = 0.0: must be a finite number greater than 0 m"),
     (
         {"contact": {"type": "spring"}},
         "[contact] type = 'spring': must be one of 'elastic_plastic', 'hertz', 'hunt_crossley'",
@@ -130,10 +105,7 @@ REFUSALS = [
         {"drive": {"frequency_hz": "100 rad/s"}},
         "[drive] frequency_hz = '100 rad/s': the unit 'rad/s' does not fit; must be in Hz",
     ),
-    (
-        {"drive": {"velocity_m_s": -1.0}},
-        "[drive] velocity_m_s = -1 m/s: is velocity_amplitude = -5.80416, which must",
-    ),
+    ({"drive": {"velocity_m_s": -1.0}}, "[drive] velocity_m_s = -1 m/s: is velocity_amplitude = -5.80416, which must"),
     (
         {"drive": {"frequency_hz": 100.0, "frequency_ratio": 1.0}},
         "[drive] give frequency_ratio or frequency_hz, not both",
@@ -144,10 +116,7 @@ REFUSALS = [
     ),
     ({"contact": {"location_m": 0.05, "location": 0.3}}, "[contact] give location or location_m, not both"),
     ({"contact": {"gap": "1 mm^2"}}, "[contact] gap = '1 mm^2': the unit 'mm^2' does not fit; must be in m"),
-    (
-        {"shaker": {"frequency_ratio": 1.0}, "drive": {"frequency_ratio": 2.0}},
-        "[shaker]: unknown section",
-    ),
+    ({"shaker": {"frequency_ratio": 1.0}, "drive": {"frequency_ratio": 2.0}}, "[shaker]: unknown section"),
     ({"initial_state": {"amplitude[1]": "much"}}, "[initial_state] amplitude[1] = 'much': must be a number"),
     (
         {"initial_state": {"amplitude[0]": 1.0}},
@@ -169,10 +138,7 @@ REFUSALS = [
         {"sweep": {"beam.density": "7.5:8:3"}},
         "[sweep] density = 7.5: must be 10 to 30000 kg/m^3; is it given in g/cm^3?",
     ),
-    (
-        {"sweep": {"modes": "1,x"}},
-        "[sweep] modes = '1,x': must be a whole number, whole numbers separated by commas",
-    ),
+    ({"sweep": {"modes": "1,x"}}, "[sweep] modes = '1,x': must be a whole number, whole numbers separated by commas"),
     ({"sweep": {"model.modes": "1:32:3"}}, "[sweep] modes = 16.5: must be an integer in [1, 256]"),
     ({"sweep": {"contact.side": "below,left"}}, "[sweep] side = 'left': must be one of 'below', 'above'"),
     (
@@ -231,9 +197,7 @@ def test_round_trip(tmp_path):
 
 def test_override_replaces_what_it_contradicts():
     config = config_from_mapping({"extends": "paper", "beam": {"axial_load": 30.0, "length": 0.2}})
-    changed = override(
-        config, {"beam": {"buckling_level": 3e-4, "length": None}, "contact": {"stiffness": 1e8}}
-    )
+    changed = override(config, {"beam": {"buckling_level": 3e-4, "length": None}, "contact": {"stiffness": 1e8}})
     beam = changed.system.model.beam
     assert beam.buckling_level == 3e-4
     assert beam.length == 0.2
@@ -306,18 +270,14 @@ def test_one_file_for_every_command(tmp_path):
 def test_any_command_reads_the_file_of_another(tmp_path):
     """System.load converts units and leaves out runs, axes and questions; an unknown section gets a suggestion."""
     path = tmp_path / "own.toml"
-    path.write_text(
-        OWN + "[sweep]\nlocation = [0.3, 0.4]\n[integration]\ncycles = 3\n[probability]\nruns = 8\n"
-    )
+    path.write_text(OWN + "[sweep]\nlocation = [0.3, 0.4]\n[integration]\ncycles = 3\n[probability]\nruns = 8\n")
     system = System.load(path)
     assert system == load_config(path).system
     assert system.get("drive.frequency_ratio") == pytest.approx(20.0 / system.model.reference_frequency)
     system.save(tmp_path / "saved.toml")
     assert System.load(tmp_path / "saved.toml") == system
     path.write_text(OWN + "[integraton]\ncycles = 3\n")
-    with pytest.raises(
-        InputError, match=r"own.toml: \[integraton\]: unknown section; did you mean 'integration'"
-    ):
+    with pytest.raises(InputError, match=r"own.toml: \[integraton\]: unknown section; did you mean 'integration'"):
         System.load(path)
 
 
@@ -348,18 +308,12 @@ def test_nothing_of_the_paper_is_added_unasked(tmp_path):
 def test_physical_units_are_ratios_of_the_system():
     """100 Hz and 31 mm/s at 40 mm from the clamp, given as values and as axes."""
     config = config_from_mapping(
-        {
-            "extends": "paper",
-            "drive": {"frequency_hz": 100.0, "velocity_m_s": 0.031},
-            "contact": {"location_m": 0.04},
-        }
+        {"extends": "paper", "drive": {"frequency_hz": 100.0, "velocity_m_s": 0.031}, "contact": {"location_m": 0.04}}
     )
     system = config.system
     freq, level = system.model.reference_frequency, BEAM.buckling_level
     assert system.get("drive.frequency_ratio") == pytest.approx(100.0 / freq, rel=1e-14)
-    assert system.get("drive.velocity_amplitude") == pytest.approx(
-        0.031 / (2.0 * np.pi * freq * level), rel=1e-14
-    )
+    assert system.get("drive.velocity_amplitude") == pytest.approx(0.031 / (2.0 * np.pi * freq * level), rel=1e-14)
     assert system.get("contact.location") == pytest.approx(0.04 / 0.161, rel=1e-14)
     given = config_from_mapping(
         {"sweep": {"frequency_hz": "50:100:3", "velocity_m_s": [0.01, 0.03], "location_m": "0.02:0.08:4"}}

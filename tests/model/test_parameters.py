@@ -74,8 +74,7 @@ def test_a_system_has_no_parameter_beside_it() -> None:
         sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
         contacts=[
             sb.Contact(
-                default_values.CONTACT,
-                sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-4),
+                default_values.CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-4)
             )
         ],
     )
@@ -118,11 +117,7 @@ def test_every_row_is_said_in_words() -> None:
         ("contact.stiffness", "Contact stiffness $k_c$ (N/m$^{1.5}$)", "(0, inf)"),
         ("beam.density", r"Mass density $\rho$ (kg/m$^{3}$)", "(0, inf)"),
         ("contact.coefficient", "Coefficient of restitution $e$", "[0, 1]"),
-        (
-            "integration.early_termination",
-            "Whether a run ends once its response class is certain",
-            "true or false",
-        ),
+        ("integration.early_termination", "Whether a run ends once its response class is certain", "true or false"),
     ],
 )
 def test_label_and_limits(name: str, label: str, limits: str) -> None:
@@ -201,15 +196,11 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         "band_limited_noise": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
         "random_vibration": sb.RecordedAcceleration.from_psd([(20.0, 0.04), (200.0, 0.04)], duration_s=0.5),
         "shock": sb.Shock(acceleration_g=10.0, duration_ms=11.0),
-        "two_tone": sb.TwoTone(**pair, second_ratio=2.0, second_amplitude=0.1),
         "constant_velocity": sb.ConstantVelocity(speed=0.4),
         "displacement_sine": sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.1),
         "acceleration_sine": sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=0.1),
     }
-    loads = {
-        "ramp": sb.LoadRamp(change=1.0, duration=1.0),
-        "sine": sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0),
-    }
+    loads = {"ramp": sb.LoadRamp(change=1.0, duration=1.0), "sine": sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0)}
     forces = {
         "harmonic_force": sb.HarmonicForce(frequency_ratio=2.0, amplitude=1.0),
         "constant_force": sb.ConstantForce(force=1.0),
@@ -218,23 +209,16 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         "base_excitation": lambda kind: sb.BaseExcitation(motion=drives.get(kind, sb.Sine(**pair))),
         "axial_load": lambda kind: sb.AxialLoadModulation(motion=loads[kind]),
         "forces": lambda kind: [sb.ExternalForce(history=forces[kind], location=0.5)],
-        "harvesters": lambda kind: [
-            sb.PiezoelectricHarvester(moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4)
-        ],
+        "harvesters": lambda kind: [sb.PiezoelectricHarvester(moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4)],
     }
     for name, row in TABLE.items():
         if not row.is_run:
             continue
-        kind = next(
-            (each for each in row.kinds if each in ("hertz", "sine")), row.kinds[0] if row.kinds else ""
-        )
+        kind = next((each for each in row.kinds if each in ("hertz", "sine")), row.kinds[0] if row.kinds else "")
         system = sb.System(
             sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
             contacts=[
-                sb.Contact(
-                    laws.get(kind, default_values.CONTACT),
-                    sb.Striker(drive=drives.get(kind, sb.Sine(**pair))),
-                )
+                sb.Contact(laws.get(kind, default_values.CONTACT), sb.Striker(drive=drives.get(kind, sb.Sine(**pair))))
             ],
             **{part: around[part](kind) for part in (row.section, f"{row.section}s") if part in around},
         )

@@ -13,12 +13,7 @@ from snapbeam.model import default_values
 
 def oscillator(damping_ratio: float = 0.0) -> sb.ReducedModel:
     return sb.ReducedModel.from_matrices(
-        [[2.0]],
-        [8.0],
-        contact_shape=[1.0],
-        patch_shape=[1.0],
-        damping_ratio=damping_ratio,
-        reference_frequency=1.0,
+        [[2.0]], [8.0], contact_shape=[1.0], patch_shape=[1.0], damping_ratio=damping_ratio, reference_frequency=1.0
     )
 
 
@@ -29,9 +24,7 @@ def test_piezo_circuit_of_one_mode(resistance: float) -> None:
     layer = sb.PiezoelectricHarvester(moment_per_volt=theta, capacitance=capacitance, resistance=resistance)
     found = sb.System(oscillator(0.02), harvesters=[layer]).poles()
     mass, stiffness, loss = 2.0, 8.0, 2.0 * 0.02 * np.sqrt(16.0)
-    exact = np.roots(
-        np.polyadd(np.polymul([mass, loss, stiffness], [capacitance, 1.0 / resistance]), [theta**2, 0.0])
-    )
+    exact = np.roots(np.polyadd(np.polymul([mass, loss, stiffness], [capacitance, 1.0 / resistance]), [theta**2, 0.0]))
     for root in exact:
         assert np.abs(found - root).min() < 1e-9 * abs(root)
 
@@ -88,9 +81,7 @@ def test_ring_down_of_a_run() -> None:
     start = sb.State(amplitude=(1.0 - 1e-5) * model.well_amplitude)
     times = np.linspace(0.0, 20.0, 4001)[:-1] / model.reference_frequency
     run = sb.simulate(
-        system.replace(initial_state=start),
-        sb.Integration(cycles=20, accuracy="reference"),
-        sample_times=times,
+        system.replace(initial_state=start), sb.Integration(cycles=20, accuracy="reference"), sample_times=times
     )
     motion = run.dataset.modal_amplitude.values[:, 0] - model.well_amplitude[0]
     design = np.exp(np.outer(times, system.poles()))

@@ -68,9 +68,7 @@ def test_pull_in_at_a_third_of_the_gap():
 def test_pull_in_voltage_of_an_electrode(side):
     """V^2 = 8 k g^3/(27 eps_0 A), on either side; a run beyond it ends, and one below it comes to rest."""
     mass, k, gap, area = 1e-9, 2.0, 3e-6, 4e-8
-    model = sb.ReducedModel.from_matrices(
-        [[mass]], [[k]], contact_shape=[1.0], length_scale=gap, damping_ratio=0.2
-    )
+    model = sb.ReducedModel.from_matrices([[mass]], [[k]], contact_shape=[1.0], length_scale=gap, damping_ratio=0.2)
     critical = math.sqrt(8.0 * k * gap**3 / (27.0 * 8.8541878188e-12 * area))
 
     def system(share: float) -> sb.System:
@@ -100,9 +98,7 @@ def test_electrodes_and_magnets_stand_on_one_side():
 
 def test_a_spring_on_eight_modes_against_minimisation():
     """The shallow silicon arch with a spring of 5 N/m at its centre, by SciPy on an energy written here."""
-    beam = sb.Beam(
-        length=8e-4, thickness=3e-6, width=3e-5, density=2330.0, young_modulus=169e9, axial_load=0.0
-    )
+    beam = sb.Beam(length=8e-4, thickness=3e-6, width=3e-5, density=2330.0, young_modulus=169e9, axial_load=0.0)
     model = sb.ReducedModel.from_beam(beam, modes=8, imperfection=sb.Imperfection(midspan_amplitude=6e-6))
     spring = sb.LocalSpring(stiffness=5.0, cubic_stiffness=2e11, location=0.5)
     potential = Potential.of(model, [spring])
@@ -137,9 +133,7 @@ def test_a_constant_force_is_that_of_the_model():
         [each.amplitude for each in potential.equilibria], [each.amplitude for each in given.equilibria], rtol=0.0,
         atol=1e-10 * float(np.abs(model.well_amplitude).max()),
     )  # fmt: skip
-    np.testing.assert_allclose(
-        potential.natural_frequencies(potential.wells[0]), given.natural_frequencies, rtol=1e-8
-    )
+    np.testing.assert_allclose(potential.natural_frequencies(potential.wells[0]), given.natural_frequencies, rtol=1e-8)
     curves = sb.force_displacement(system, 0.5), sb.force_displacement(given, 0.5)
     assert float(curves[0].snap_through_force) == pytest.approx(float(curves[1].snap_through_force), rel=1e-8)
     barrier = given.saddle_energy - given.landscape.lower.energy
@@ -174,13 +168,11 @@ def test_gradient_and_tangent_of_random_systems():
         change = 1e-3 * size * rng.standard_normal(alpha.size)
         weights = ((1, 45.0 / 60.0), (2, -9.0 / 60.0), (3, 1.0 / 60.0))
         slope = sum(
-            w * (potential.energy(alpha + k * change) - potential.energy(alpha - k * change))
-            for k, w in weights
+            w * (potential.energy(alpha + k * change) - potential.energy(alpha - k * change)) for k, w in weights
         )
         assert slope == pytest.approx(float(potential.gradient(alpha) @ change), rel=1e-8)
         bend = sum(
-            w * (potential.gradient(alpha + k * change) - potential.gradient(alpha - k * change))
-            for k, w in weights
+            w * (potential.gradient(alpha + k * change) - potential.gradient(alpha - k * change)) for k, w in weights
         )
         product = potential.tangent(alpha) @ change
         np.testing.assert_allclose(bend, product, rtol=0.0, atol=1e-7 * np.abs(product).max())
@@ -235,9 +227,7 @@ def test_runs_stay_at_rest():
             )
 
 
-@pytest.mark.parametrize(
-    "law", [each for each in LOCAL_FORCES.values() if each.__module__.startswith("snapbeam.")]
-)
+@pytest.mark.parametrize("law", [each for each in LOCAL_FORCES.values() if each.__module__.startswith("snapbeam.")])
 def test_laws_of_the_package(law):
     """Force, energy and stiffness agree with differences for every registered law."""
     constants = {name: 1.3 for name in law.numbers_type()._fields}
@@ -259,10 +249,7 @@ def test_a_force_that_leaves_one_well_has_a_diagnostic():
     one = sb.System(model_of(1), forces=[sb.LocalSpring(stiffness=5000.0, location=0.5)])
     (found,) = [each for each in one.diagnostics() if each.code == "other-wells"]
     assert "leaves 1 wells, while response classes" in found.message
-    shifted = sb.System(
-        model_of(1),
-        forces=[sb.MagneticForce(strength=8e-9, gap=LEVEL * 2.5, location=0.5)],
-    )
+    shifted = sb.System(model_of(1), forces=[sb.MagneticForce(strength=8e-9, gap=LEVEL * 2.5, location=0.5)])
     assert not [each for each in shifted.diagnostics() if each.code == "other-wells"]
 
 
@@ -282,9 +269,7 @@ def test_classes_count_crossings_of_the_saddle_of_the_system(modes, rise, side):
     assert potential.dividing_height == pytest.approx(potential.center(saddle), rel=1e-12)
     assert abs(potential.dividing_height - model.dividing_height) > 0.02 * LEVEL
     for step, well in ((-0.02, "lower"), (0.02, "upper")):
-        start = saddle.amplitude + step * LEVEL * model.midspan_shape / float(
-            model.midspan_shape @ model.midspan_shape
-        )
+        start = saddle.amplitude + step * LEVEL * model.midspan_shape / float(model.midspan_shape @ model.midspan_shape)
         assert potential.descent(start) == ("lower", "upper").index(well)
         run = sb.simulate(system.replace(initial_state=sb.State(amplitude=start)), sb.Integration(cycles=400))
         assert run.summary.zero_crossings == 0
@@ -302,9 +287,7 @@ def test_magnets_on_both_sides_at_nearly_the_same_place():
         sb.MagneticForce(strength=5.0e-10, gap=9.04e-4, location=0.340),
     ]
     potential = sb.System(model, forces=magnets).potential
-    far = [
-        np.abs(each.amplitude).max() > 20.0 * np.abs(potential.size).max() for each in potential.equilibria
-    ]
+    far = [np.abs(each.amplitude).max() > 20.0 * np.abs(potential.size).max() for each in potential.equilibria]
     directions = [each.unstable_directions for each in potential.equilibria]
     assert sorted(n for n, beyond in zip(directions, far, strict=True) if not beyond) == [0, 0, 1, 1, 1]
     assert [n for n, beyond in zip(directions, far, strict=True) if beyond] in ([], [2])
@@ -322,17 +305,9 @@ ATTRACTION = 1e-9
             [(ATTRACTION, 1.0e-3, 0.3), (ATTRACTION, -1.1e-3, 0.5), (ATTRACTION, 1.0e-3, 0.7)],
             [0, 0, 1, 1, 1, 1, 2, 2, 2, 3],
         ),
-        (
-            5,
-            [(3e-9, -1.15e-3, 0.3), (2e-9, 0.9e-3, 0.41), (8e-10, 1.3e-3, 0.73)],
-            [0, 0, 1, 1, 1, 2, 2, 3],
-        ),
+        (5, [(3e-9, -1.15e-3, 0.3), (2e-9, 0.9e-3, 0.41), (8e-10, 1.3e-3, 0.73)], [0, 0, 1, 1, 1, 2, 2, 3]),
         # one that repels between two, so near that the beam bends around it
-        (
-            5,
-            [(2e-12, -0.9e-3, 0.4), (2.5e-12, -1.15e-3, 0.63), (-2e-9, -0.93e-3, 0.525)],
-            [0, 0, 1, 1, 1, 2],
-        ),
+        (5, [(2e-12, -0.9e-3, 0.4), (2.5e-12, -1.15e-3, 0.63), (-2e-9, -0.93e-3, 0.525)], [0, 0, 1, 1, 1, 2]),
     ],
 )
 def test_equilibria_next_to_several_magnets(modes, magnets, directions):

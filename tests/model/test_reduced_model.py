@@ -87,9 +87,7 @@ def test_beam_at_its_critical_load() -> None:
     assert model.natural_frequencies[0] == 0.0
     assert (model.natural_frequencies[1:] > 0.0).all()
     np.testing.assert_allclose(model.linear_modes.T @ model.mass @ model.linear_modes, np.eye(8), atol=1e-14)
-    with pytest.raises(
-        InputError, match=r"reference_frequency is not given .* give reference_frequency in Hz"
-    ):
+    with pytest.raises(InputError, match=r"reference_frequency is not given .* give reference_frequency in Hz"):
         _ = model.reference_frequency
 
 
@@ -173,9 +171,7 @@ def test_wells_and_barrier_against_optimisation(beam: Beam, count: int) -> None:
         assert model.saddle_energy == 0.0
     else:
         second = beam.axial_load - beam.second_critical_load
-        assert model.saddle_energy == pytest.approx(
-            -(second**2) / (4.0 * beam.nonlinear_stiffness), rel=1e-10
-        )
+        assert model.saddle_energy == pytest.approx(-(second**2) / (4.0 * beam.nonlinear_stiffness), rel=1e-10)
         saddle = np.zeros(count)
         saddle[1] = math.sqrt(second / beam.nonlinear_stiffness)
         assert float(model.potential_energy(saddle)) == pytest.approx(model.saddle_energy, rel=1e-10)
@@ -218,13 +214,7 @@ def test_straight_beam_has_no_barrier() -> None:
 
 def test_arrays_are_read_only() -> None:
     model = ReducedModel.from_beam(BEAM, modes=4)
-    for array in (
-        model.mass,
-        model.stiffness,
-        model.linear_modes,
-        model.natural_frequencies,
-        model.tension_matrix,
-    ):
+    for array in (model.mass, model.stiffness, model.linear_modes, model.natural_frequencies, model.tension_matrix):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0.0
 
@@ -238,14 +228,8 @@ def test_arrays_are_read_only() -> None:
         ({"damping_ratio": 1.5}, r"damping_ratio = 1.5: must be a number in \[0, 1\)"),
         ({"damping_ratio": -0.1}, r"damping_ratio = -0.1: must be a number in \[0, 1\)"),
         ({"damping_ratio": math.nan}, r"damping_ratio.* = .*nan.*: must be finite"),
-        (
-            {"damping_ratio": [0.1, 1.0], "modes": 2},
-            r"damping_ratio\[1\] = 1.0: must be a number in \[0, 1\)",
-        ),
-        (
-            {"damping_ratio": [0.1, 0.1], "modes": 3},
-            r"damping_ratio of shape \(2,\): must have the shape \(3,\)",
-        ),
+        ({"damping_ratio": [0.1, 1.0], "modes": 2}, r"damping_ratio\[1\] = 1.0: must be a number in \[0, 1\)"),
+        ({"damping_ratio": [0.1, 0.1], "modes": 3}, r"damping_ratio of shape \(2,\): must have the shape \(3,\)"),
         ({"beam": 0.161}, r"beam = 0.161: must be a Beam"),
     ],
 )

@@ -65,9 +65,7 @@ def test_a_law_that_pushes_away_everywhere():
         found = sb.System(model, forces=[law]).potential.equilibria
         assert [each.unstable_directions for each in found] == expected
     # in a matrix structure without tension the wells are next to hilltops
-    two = sb.ReducedModel.from_matrices(
-        np.eye(2), np.diag([3.0, 5.0]), contact_shape=[1.0, 0.0], length_scale=1.0
-    )
+    two = sb.ReducedModel.from_matrices(np.eye(2), np.diag([3.0, 5.0]), contact_shape=[1.0, 0.0], length_scale=1.0)
     law = sb.LocalSpring(stiffness=0.0, cubic_stiffness=-2.0)
     found = sb.System(two, forces=[law]).potential.equilibria
     places = sorted(float(each.amplitude[0]) for each in found)
@@ -93,13 +91,10 @@ class _Softening(sb.LocalForce):
 def test_a_law_of_ones_own_that_is_not_finite_far_away():
     """A law without a range needs none where the potential rises; the wells are roots of the force balance."""
     model = model_of()
-    potential = sb.System(
-        model, forces=[_Softening(stiffness=90.0, width=0.8 * LEVEL, location=0.5)]
-    ).potential
+    potential = sb.System(model, forces=[_Softening(stiffness=90.0, width=0.8 * LEVEL, location=0.5)]).potential
     for each in potential.equilibria:
         assert (
-            abs(float(potential.gradient(each.amplitude)[0]))
-            <= 1e-10 * np.abs(potential.terms(each.amplitude)).max()
+            abs(float(potential.gradient(each.amplitude)[0])) <= 1e-10 * np.abs(potential.terms(each.amplitude)).max()
         )
     assert sum((-1) ** each.unstable_directions for each in potential.equilibria) == 1
 
@@ -109,9 +104,7 @@ def test_a_weak_electrode_far_away(voltage):
     """The saddle is closer to the electrode than the amplitudes can tell, or it is found."""
     electrode = sb.ElectrostaticForce(voltage=voltage, area=2e-9, gap=-5.0 * LEVEL, location=0.5)
     potential = sb.System(model_of(2), forces=[electrode]).potential
-    assert [potential.center(each) / LEVEL for each in potential.wells] == pytest.approx(
-        [-1.0, 1.0], abs=1e-6
-    )
+    assert [potential.center(each) / LEVEL for each in potential.wells] == pytest.approx([-1.0, 1.0], abs=1e-6)
 
 
 def test_runs_and_orbits():
@@ -120,11 +113,7 @@ def test_runs_and_orbits():
     system = sb.System(model, forces=[law], base_excitation=BASE)
     well = system.potential.wells[1].amplitude
     omega = 2.0 * math.pi * model.reference_frequency
-    row, mass, damping = (
-        float(model.midspan_shape[0]),
-        float(model.mass[0, 0]),
-        float(model.damping_matrix[0, 0]),
-    )
+    row, mass, damping = (float(model.midspan_shape[0]), float(model.mass[0, 0]), float(model.damping_matrix[0, 0]))
 
     def rate(t, y):
         force = row * law.force_at(row * y[0])
@@ -136,12 +125,7 @@ def test_runs_and_orbits():
     came = sb.advance(free, begin, periods=7, integration=sb.Integration(accuracy="reference"))
     end = 7.0 / model.reference_frequency
     exact = solve_ivp(
-        rate,
-        (0.0, end),
-        [float(begin.amplitude[0]), float(begin.velocity[0])],
-        method="DOP853",
-        rtol=1e-11,
-        atol=1e-16,
+        rate, (0.0, end), [float(begin.amplitude[0]), float(begin.velocity[0])], method="DOP853", rtol=1e-11, atol=1e-16
     )
     assert float(came.amplitude[0]) == pytest.approx(exact.y[0, -1], abs=1e-5 * abs(float(well[0])))
     assert float(came.velocity[0]) == pytest.approx(exact.y[1, -1], abs=1e-5 * omega * abs(float(well[0])))

@@ -57,11 +57,7 @@ def test_a_batch_and_its_states() -> None:
             InputError,
             r"state velocity of shape \(1,\): must have shape \(2,\)",
         ),
-        (
-            {"amplitude": [1.0], "phase": np.inf},
-            InputError,
-            "state phase = inf: must be finite numbers, or NaN",
-        ),
+        ({"amplitude": [1.0], "phase": np.inf}, InputError, "state phase = inf: must be finite numbers, or NaN"),
         ({"amplitude": [1.0], "phase": "late"}, InputError, "state phase = 'late': must be finite numbers"),
         (
             {"amplitude": [1.0], "contact_time": [0.1, np.nan]},
@@ -82,9 +78,7 @@ def test_refusals(given, error, message) -> None:
 
 
 def test_more_modes_are_still_and_none_that_moves_is_lost() -> None:
-    state = sb.State(
-        amplitude=[[1.0, 0.5, 0.0]], velocity=[[0.0, 0.0, 0.0]], phase=0.3, striker_position=1e-4
-    )
+    state = sb.State(amplitude=[[1.0, 0.5, 0.0]], velocity=[[0.0, 0.0, 0.0]], phase=0.3, striker_position=1e-4)
     more = state.with_modes(5)
     np.testing.assert_array_equal(more.amplitude, [[1.0, 0.5, 0.0, 0.0, 0.0]])
     assert float(more.phase[0]) == 0.3 and float(more.striker_position[0]) == 1e-4
@@ -103,9 +97,7 @@ def test_contact_times_of_several_strikers() -> None:
     np.testing.assert_array_equal(two.contact_times(2), two.contact_time)
     np.testing.assert_array_equal(two.with_modes(3).contact_time, two.contact_time)
     assert np.isnan(sb.State(amplitude=[0.0]).contact_times(3)).all()
-    with pytest.raises(
-        InputError, match=r"state contact_time of 2 strikers: must have one number for each of the 3"
-    ):
+    with pytest.raises(InputError, match=r"state contact_time of 2 strikers: must have one number for each of the 3"):
         two.contact_times(3)
 
 
@@ -148,9 +140,7 @@ def test_amplitudes_are_counted_in_that_of_the_well() -> None:
     assert float(state.striker_position) == 2e-4
     # the centre of the upper well: amplitude[1] = 1 is b up
     up = started(MODEL, rest_state(MODEL, BELOW), {"amplitude[1]": 1.0})
-    assert float(MODEL.midspan_shape @ up.amplitude) == pytest.approx(
-        default_values.BEAM.buckling_level, rel=1e-12
-    )
+    assert float(MODEL.midspan_shape @ up.amplitude) == pytest.approx(default_values.BEAM.buckling_level, rel=1e-12)
     # of a structure with one well: what moves the centre by the length scale
     spring = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[2.0], length_scale=3.0)
     assert amplitude_scale(spring) == 1.5
@@ -170,10 +160,7 @@ def test_a_start_changes_only_what_is_named() -> None:
     ("name", "message"),
     [
         ("amplitude[4]", r"initial_state\.amplitude\[4\]: mode = 4: must be an integer in \[1, 3\]"),
-        (
-            "amplitude[0]",
-            r"initial_state\.amplitude\[0\]: not a parameter of an initial state; must be amplitude\[i\]",
-        ),
+        ("amplitude[0]", r"initial_state\.amplitude\[0\]: not a parameter of an initial state; must be amplitude\[i\]"),
         ("position", r"initial_state\.position: not a parameter of an initial state"),
     ],
 )

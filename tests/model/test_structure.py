@@ -23,9 +23,7 @@ def test_free_mass() -> None:
     assert model.reference_frequency == 50.0
     assert not model.is_bistable
     assert model.length_scale == 1.0
-    with pytest.raises(
-        InputError, match=r"reference_frequency is not given and the first natural frequency is 0"
-    ):
+    with pytest.raises(InputError, match=r"reference_frequency is not given and the first natural frequency is 0"):
         _ = ReducedModel.from_matrices([[0.02]], [0.0], contact_shape=[1.0]).reference_frequency
 
 
@@ -97,10 +95,7 @@ def test_shape_is_the_contact_point_whatever_the_location() -> None:
         ({"damping_ratio": 1.5}, r"damping_ratio = 1.5: must be a number in \[0, 1\)"),
         ({"reference_frequency": 0.0}, r"reference_frequency = 0.0: must be .* greater than 0 Hz"),
         ({"well_amplitude": [1.0]}, r"well_amplitude of shape \(1,\): must have the shape \(2,\)"),
-        (
-            {"well_amplitude": [-1.0, 0.0]},
-            r"well_amplitude = \[-1.0, 0.0\]: must be zero unless nonlinear_stiffness",
-        ),
+        ({"well_amplitude": [-1.0, 0.0]}, r"well_amplitude = \[-1.0, 0.0\]: must be zero unless nonlinear_stiffness"),
     ],
 )
 def test_refusals(changes: dict[str, Any], message: str) -> None:
@@ -128,7 +123,5 @@ def test_refuses_what_is_no_lower_well(equilibrium: list[float], message: str) -
 
 
 def test_one_well_has_no_barrier() -> None:
-    with pytest.raises(
-        InputError, match="the map needs a bistable structure: give a well_amplitude other than"
-    ):
+    with pytest.raises(InputError, match="the map needs a bistable structure: give a well_amplitude other than"):
         ReducedModel.from_matrices(**TWO).require_bistable("the map")

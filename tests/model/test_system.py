@@ -24,11 +24,8 @@ def record(samples: int = 400, last: float = 0.0) -> sb.Striker:
     displacement[-1] += last
     return sb.Striker(
         drive=sb.RecordedMotion(
-            displacement=displacement,
-            velocity=0.06 * np.cos(600.0 * t),
-            sampling_frequency=20_000.0,
-            frequency=95.0,
-        ),
+            displacement=displacement, velocity=0.06 * np.cos(600.0 * t), sampling_frequency=20_000.0, frequency=95.0
+        )
     )
 
 
@@ -53,22 +50,17 @@ SYSTEMS = {
     "matrices": sb.System(
         BY_MATRICES,
         contacts=[
-            sb.Contact(
-                sb.HertzContact(1e3), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side="above")
-            )
+            sb.Contact(sb.HertzContact(1e3), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side="above"))
         ],
     ),
     "gap": PLAIN.replace(**{"contact.gap": -1e-4, "drive.phase": 1.0}),
     "load": PLAIN.replace(**{"beam.axial_load": 36.0}),
     "damping by mode": sb.System(
-        sb.ReducedModel.from_beam(
-            default_values.BEAM, modes=2, damping_ratio=[0.01, 0.02], reference_frequency=80.0
-        ),
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=2, damping_ratio=[0.01, 0.02], reference_frequency=80.0),
         contacts=[sb.Contact(default_values.CONTACT, SHAKER)],
     ),
     "restitution": sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
-        contacts=[sb.Contact(sb.Restitution(0.6), SHAKER)],
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=1), contacts=[sb.Contact(sb.Restitution(0.6), SHAKER)]
     ),
 }
 
@@ -243,13 +235,6 @@ OF_OTHERS = {
         sb.RecordedAcceleration.from_psd([(20.0, 0.04), (200.0, 0.04)], duration_s=0.5),
         {"psd": ((20.0, 0.04), (200.0, 0.02)), "duration_s": 0.4, "rms_g": 1.0, "seed": 2, "ramp_up_s": 0.1},
     ),
-    "two_tone": (
-        sb.TwoTone(frequency_ratio=1.0, velocity_amplitude=0.1, second_ratio=2.0, second_amplitude=0.1),
-        {
-            "frequency_ratio": 1.1, "velocity_amplitude": 0.2, "second_ratio": 2.5, "second_amplitude": 0.2,
-            "second_phase": 0.3,
-        },
-    ),
     "constant_velocity": (sb.ConstantVelocity(speed=0.4), {"speed": 0.5}),
     "fixed": (sb.FixedStop(), {}),
     "displacement_sine": (
@@ -294,15 +279,10 @@ def test_every_sample_and_the_start_are_hashed() -> None:
     """Two runs with different records or starts do not carry the same parameter hash."""
     one, other = (PLAIN.replace(**{"contact.striker": record(last=shift)}) for shift in (0.0, 1e-12))
     assert one.hash != other.hash
-    begun, elsewhere = (
-        PLAIN.replace(initial_state=start(velocity=[0.0, 0.0, v])) for v in (0.1, 0.1 + 1e-15)
-    )
+    begun, elsewhere = (PLAIN.replace(initial_state=start(velocity=[0.0, 0.0, v])) for v in (0.1, 0.1 + 1e-15))
     assert begun.hash != elsewhere.hash
     asked = sb.Integration(cycles=1)
-    attrs = [
-        sb.simulate(system, asked, sample_times=[0.0]).dataset.attrs
-        for system in (one, other, begun, elsewhere)
-    ]
+    attrs = [sb.simulate(system, asked, sample_times=[0.0]).dataset.attrs for system in (one, other, begun, elsewhere)]
     assert len({each["parameter_hash"] for each in attrs}) == 4
     assert [each["system_hash"] for each in attrs] == [s.hash for s in (one, other, begun, elsewhere)]
 
@@ -345,14 +325,9 @@ def test_replace_keeps_everything_else() -> None:
 
 def test_whole_parts() -> None:
     assert PLAIN.replace(beam=default_values.BEAM.replace(width=0.02)).get("beam.width") == 0.02
-    assert (
-        PLAIN.replace(drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.1)).get("drive.frequency_ratio")
-        == 2.0
-    )
+    assert PLAIN.replace(drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.1)).get("drive.frequency_ratio") == 2.0
     assert PLAIN.replace(contacts=[], initial_state=start()).striker is None
-    shaken = PLAIN.replace(
-        **{"contact.striker": sb.Shaker(frequency_ratio=3.0, velocity_amplitude=0.1, location=0.2)}
-    )
+    shaken = PLAIN.replace(**{"contact.striker": sb.Shaker(frequency_ratio=3.0, velocity_amplitude=0.1, location=0.2)})
     assert (shaken.get("drive.frequency_ratio"), shaken.get("contact.location")) == (3.0, 0.2)
     both = PLAIN.replace(model=sb.ReducedModel.from_beam(default_values.BEAM, 2), **{"beam.width": 0.02})
     assert (both.model.modes, both.get("beam.width")) == (2, 0.02)
@@ -371,9 +346,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
     more = system.replace(**{"model.modes": 5})
     np.testing.assert_array_equal(more.initial_state.amplitude, [*system.initial_state.amplitude, 0.0, 0.0])
     np.testing.assert_array_equal(more.initial_state.velocity, [1e-3, 0.0, 0.1, 0.0, 0.0])
-    with pytest.raises(
-        InputError, match=r"modes = 2: a state of 3 modes cannot be cut to fewer without loss"
-    ):
+    with pytest.raises(InputError, match=r"modes = 2: a state of 3 modes cannot be cut to fewer without loss"):
         system.replace(**{"model.modes": 2})
     assert system.replace(**{"model.modes": 5}).replace(**{"model.modes": 3}) == system
 
@@ -381,10 +354,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (
-            {"beam.thicknes": 1.0},
-            r"beam\.thicknes: is not a parameter of a beam; must be one of length, thickness",
-        ),
+        ({"beam.thicknes": 1.0}, r"beam\.thicknes: is not a parameter of a beam; must be one of length, thickness"),
         (
             {"nothing.x": 1.0},
             r"nothing\.x: is not a parameter of a system; its sections are beam, model, boundary, imperfection, contact",
@@ -400,10 +370,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
         ),
         ({"contact.frequency_ratio": 1.0}, "must be one of stiffness, location, side, gap"),
         ({"drive.displacement": [1.0]}, "must be one of frequency_ratio, velocity_amplitude, phase"),
-        (
-            {"initial_state.amplitude": 1.0},
-            r"must be amplitude\[i\], velocity\[i\], phase or striker_position",
-        ),
+        ({"initial_state.amplitude": 1.0}, r"must be amplitude\[i\], velocity\[i\], phase or striker_position"),
         (
             {"initial_state.amplitude[9]": 1.0},
             r"initial_state\.amplitude\[9\]: mode = 9: must be an integer in \[1, 3\]",
@@ -414,10 +381,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
         ({"contact.location": 1.0}, r"location = 1.0: must be a number in \(0, 1\)"),
         ({"contact": None}, r"contacts\[0\] = None: must be a Contact\(law, striker\)"),
         ({"contact.2.gap": 1e-5}, r"contact\.2: this system has 1 contact"),
-        (
-            {"contact.stop.gap": 1e-5},
-            r"contact\.stop\.gap: this system has no contact 'stop'; must be one of 1",
-        ),
+        ({"contact.stop.gap": 1e-5}, r"contact\.stop\.gap: this system has no contact 'stop'; must be one of 1"),
         ({"force": 1.0}, "force: this system has no force"),
         ({"contacts": 1.0}, "contacts = 1.0: must be a list or tuple"),
         ({"contact.law": 3.0}, r"law = 3.0: must be a law of contact, such as HertzContact\(stiffness\)"),
@@ -441,9 +405,7 @@ def test_refusals(changes, message: str) -> None:
 
 
 def test_refusals_name_what_is_not_there() -> None:
-    with pytest.raises(
-        InputError, match=r"beam\.thicknes: is not a parameter of this system; it has beam\.length"
-    ):
+    with pytest.raises(InputError, match=r"beam\.thicknes: is not a parameter of this system; it has beam\.length"):
         PLAIN.get("beam.thicknes")
     with pytest.raises(InputError, match="drive: this system has no contacts"):
         SYSTEMS["free"].replace(**{"drive.frequency_ratio": 1.0})

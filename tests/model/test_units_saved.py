@@ -7,6 +7,7 @@ import pickle
 import pytest
 
 import snapbeam as sb
+from snapbeam.model.parameter_file import config_from_mapping
 
 FILE = """
 [beam]
@@ -72,3 +73,22 @@ def test_what_is_replaced_has_no_unit_of_before(system, tmp_path) -> None:
 def test_a_system_of_python_is_saved_as_it_is(system, tmp_path) -> None:
     made = sb.System.from_mapping(system.to_mapping())
     assert "frequency_ratio" in saved(made, tmp_path)
+
+
+@pytest.mark.parametrize("section", ["drive", "base_excitation"])
+def test_terms_of_a_sum_in_physical_units(section: str) -> None:
+    """Frequencies and amplitudes of each term: in a file, by ``replace`` and read back, as the ratios they are made into."""
+    terms = {"frequency_hz_1": 70.0, "frequency_ratio_2": 1.9, "frequency_hz_3": 210.0}
+    amplitudes = {"velocity_m_s_1": 0.02, "velocity_amplitude_2": 0.05, "velocity_m_s_3": 0.01}
+    sums = {"type": "sine+sine+sine", **terms, **amplitudes}
+    given = {"model": {"modes": 1}, section: sums} | ({"contact": {}} if section == "drive" else {})
+    system = config_from_mapping({"extends": "paper", **given}).system
+    first, scale = system.model.reference_frequency, system.scale
+    assert system.get(f"{section}.frequency_ratio_1") == pytest.approx(70.0 / first)
+    assert system.get(f"{section}.frequency_ratio_2") == 1.9
+    assert system.get(f"{section}.frequency_hz_3") == pytest.approx(210.0)
+    assert system.get(f"{section}.velocity_amplitude_3") == pytest.approx(0.01 / (scale.length * scale.omega))
+    other = system.replace(**{f"{section}.frequency_hz_2": 3.0 * first})
+    assert other.get(f"{section}.frequency_ratio_2") == pytest.approx(3.0)
+    with pytest.raises(sb.InputError, match="give frequency_ratio_1 or frequency_hz_1, not both"):
+        config_from_mapping({"extends": "paper", **given, section: sums | {"frequency_ratio_1": 1.0}})

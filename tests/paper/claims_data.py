@@ -32,10 +32,7 @@ def response_map(kinds: Any, modes: int = 32, cycles: int = 200, **more: Any) ->
         {
             "response_class": (("frequency_ratio", "velocity_amplitude"), kinds.astype(np.int8)),
             "zero_crossings": (("frequency_ratio", "velocity_amplitude"), np.where(kinds > 0, 1, 0)),
-            "final_well_proven": (
-                ("frequency_ratio", "velocity_amplitude"),
-                np.ones(kinds.shape, dtype=bool),
-            ),
+            "final_well_proven": (("frequency_ratio", "velocity_amplitude"), np.ones(kinds.shape, dtype=bool)),
         },
         {"frequency_ratio": RATIO, "velocity_amplitude": DRIVE},
         {"modes": modes, "cycles": cycles, "reference_frequency": 83.93 if modes == 1 else 81.85},
@@ -48,12 +45,7 @@ def calm_sensitivity(one: xr.Dataset, many: xr.Dataset) -> dict[str, xr.Dataset]
     names = ("", "perturbed", "half_step", "long", "perturbed_long")
     found = {name or "base": many for name in names}
     found |= {"_".join(part for part in ("one_mode", name) if part): one for name in names}
-    return found | {
-        "double_modes": many,
-        "soft_contact": many,
-        "buckling_damping": many,
-        "one_mode_reference": one,
-    }
+    return found | {"double_modes": many, "soft_contact": many, "buckling_damping": many, "one_mode_reference": one}
 
 
 def two_maps(one: Any, many: Any, **data: Any) -> Given:

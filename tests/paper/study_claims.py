@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from snapbeam.dynamics.lifetimes import proportion
 from snapbeam.paper.claims.claim_result import Check, ClaimResult, Quantity, above, below, found
+from snapbeam.util.proportions import proportion
 
 __all__ = ["Row", "claims", "table"]
 
@@ -37,7 +37,7 @@ def _all(*checks: Check) -> Check:
 
 
 def _share(hits: int, runs: int) -> Quantity:
-    """With the greater half of Jeffreys' interval of 95 %."""
+    """With the greater half of Wilson's interval of 95 %."""
     value, low, high = (float(part) for part in proportion(hits, runs))
     return Quantity(value, max(high - value, value - low))
 
@@ -52,8 +52,7 @@ def _ends(points: xr.Dataset) -> Row:
     each_point = [points.isel(point=k) for k in range(points.sizes["point"])]
     left = [_share(int(one["runs_snapping"]), runs) for one in each_point]
     tau = [
-        Quantity(float(one["lifetime"]), 0.5 * float(one["lifetime_high"] - one["lifetime_low"]))
-        for one in each_point
+        Quantity(float(one["lifetime"]), 0.5 * float(one["lifetime_high"] - one["lifetime_low"])) for one in each_point
     ]
     ended = _all(*(below(each, 0.05) for each in left))
     short = _all(*(below(each, 200.0) for each in tau))
@@ -166,10 +165,7 @@ def claims(
 
 def table(rows: list[Row]) -> list[str]:
     """Lines of Markdown."""
-    lines = [
-        "| # | claim | measured, 95 % | rule | fails with | verdict |",
-        "|---|---|---|---|---|---|",
-    ]
+    lines = ["| # | claim | measured, 95 % | rule | fails with | verdict |", "|---|---|---|---|---|---|"]
     for number, row in enumerate(rows, start=1):
         verdict = f"**{row.result.verdict}**" + (" †" if row.result.close else "")
         lines.append(f"| T{number} | {row.says} | {row.measured} | {row.rule} | {row.fails} | {verdict} |")

@@ -16,7 +16,7 @@ import xarray as xr
 from scipy import stats
 
 import snapbeam as sb
-from snapbeam.dynamics.lifetimes import proportion
+from snapbeam.util.proportions import proportion
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
 FILE = DATA / "lifetimes.md"
@@ -77,9 +77,7 @@ def sensitivity() -> dict[str, tuple[float, float]]:
     count = cycles.size
     rate_error = math.sqrt(((grown - rate * cycles) ** 2).sum() * count / (count - 1)) / cycles.sum()
     table = data["sensitivity"]
-    line = stats.linregress(
-        np.log(table["size"].values), np.log(table["changed"].values / table.attrs["points"])
-    )
+    line = stats.linregress(np.log(table["size"].values), np.log(table["changed"].values / table.attrs["points"]))
     ratio = kappa / rate
     return {
         "kappa": (kappa, kappa_error),

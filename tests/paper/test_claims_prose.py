@@ -27,9 +27,7 @@ def test_one_entry_a_function_and_one_function_an_entry(topic):
     assert len(set(functions.values())) == len(functions)
     for number, function in functions.items():
         assert function.__doc__, number
-        assert function.__doc__.startswith(f"{number}"), (
-            f"{function.__name__} says another number than {number}"
-        )
+        assert function.__doc__.startswith(f"{number}"), f"{function.__name__} says another number than {number}"
 
 
 def test_numbers_are_told_once():

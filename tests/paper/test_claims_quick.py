@@ -20,11 +20,7 @@ def model_of(modes: int) -> sb.ReducedModel:
 def threshold(modes: int, ratio: float, velocity: np.ndarray, cycles: int = 200) -> float:
     """Least velocity amplitude of the row that snaps the beam through."""
     row = paper_map(
-        model_of(modes),
-        frequency_ratio=ratio,
-        velocity_amplitude=velocity,
-        cycles=cycles,
-        early_termination=True,
+        model_of(modes), frequency_ratio=ratio, velocity_amplitude=velocity, cycles=cycles, early_termination=True
     )
     snapped = row.response_class.values > sb.ResponseClass.INTRAWELL
     assert snapped[-1] and not snapped[0]
@@ -57,9 +53,7 @@ def test_a_fast_shaker_needs_far_less_than_a_slow_one() -> None:
 def waveforms() -> sb.Run:
     """The run of Fig. 5, Omega = 1.21 and V = 0.18 with 32 modes."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
-    return sb.simulate(
-        sb.System(model_of(32), contacts=[sb.Contact(paper.CONTACT, shaker)]), sb.Integration(cycles=12)
-    )
+    return sb.simulate(sb.System(model_of(32), contacts=[sb.Contact(paper.CONTACT, shaker)]), sb.Integration(cycles=12))
 
 
 def test_snap_through_of_figure_5() -> None:
@@ -80,10 +74,7 @@ def test_ripple_in_free_flight() -> None:
     free = run.dataset.contact_force.values == 0.0
     q = (run.dataset.modal_amplitude.values - model.well_amplitude) @ model.mass @ model.linear_modes
     high = model.natural_frequencies > 2000.0
-    assert (
-        np.abs(q[free][:, high] * model.omega[high]).max()
-        > 0.01 * np.abs(q[free][:, 0] * model.omega[0]).max()
-    )
+    assert np.abs(q[free][:, high] * model.omega[high]).max() > 0.01 * np.abs(q[free][:, 0] * model.omega[0]).max()
 
 
 def test_shaker_at_the_centre() -> None:

@@ -65,9 +65,7 @@ def test_half_widths_cover():
             hits += abs(middle - truth) <= half * 1.0001
         assert hits >= 0.92 * 300
     for of, truth in ((mean_of, 1.0), (median_of, np.log(2.0))):
-        hits = sum(
-            abs((q := of(rng.exponential(size=60))).value - truth) <= q.uncertainty for _ in range(100)
-        )
+        hits = sum(abs((q := of(rng.exponential(size=60))).value - truth) <= q.uncertainty for _ in range(100))
         assert hits >= 87
 
 

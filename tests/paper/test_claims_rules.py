@@ -28,9 +28,7 @@ def notched(at: float, wide: float = 0.4, depth: float = 0.1) -> np.ndarray:
     return 0.2 - depth * np.exp(-(((RATIO - at) / wide) ** 2))
 
 
-@pytest.mark.parametrize(
-    ("at", "wide", "verdict"), [(1.4, 0.1, "holds"), (1.55, 0.4, "in part"), (1.9, 0.1, "fails")]
-)
+@pytest.mark.parametrize(("at", "wide", "verdict"), [(1.4, 0.1, "holds"), (1.55, 0.4, "in part"), (1.9, 0.1, "fails")])
 def test_notch_of_one_mode(at, wide, verdict):
     """2a: at the printed place, near enough for a step of V, elsewhere."""
     result = thresholds.notch_of_one_mode(two_maps(notched(at, wide), notched(1.2)))
@@ -147,9 +145,7 @@ def test_how_transients_end():
     assert transients.ends_in_first_well(long_maps(settled(), settled(), 32)).verdict == "fails"
 
 
-@pytest.mark.parametrize(
-    ("near", "far", "verdict"), [(0.5, 0.0, "holds"), (0.2, 0.15, "in part"), (0.0, 0.2, "fails")]
-)
+@pytest.mark.parametrize(("near", "far", "verdict"), [(0.5, 0.0, "holds"), (0.2, 0.15, "in part"), (0.0, 0.2, "fails")])
 def test_late_changes_lie_near_the_threshold(near, far, verdict):
     """32b."""
     before = response_map(np.full(RATIO.size, 0.3), 32, 1000)
@@ -157,15 +153,8 @@ def test_late_changes_lie_near_the_threshold(near, far, verdict):
     close = np.abs(DRIVE / 0.3 - 1.0) <= 0.15
     rng = np.random.default_rng(0)
     chance = np.where(close[None, :], near, far)
-    after = response_map(
-        np.where(rng.random(kinds.shape) < chance, ResponseClass.TRANSIENT_1, kinds), 32, 3000
-    )
-    late = {
-        "modes_1_before": before,
-        "modes_1_after": after,
-        "modes_32_before": before,
-        "modes_32_after": after,
-    }
+    after = response_map(np.where(rng.random(kinds.shape) < chance, ResponseClass.TRANSIENT_1, kinds), 32, 3000)
+    late = {"modes_1_before": before, "modes_1_after": after, "modes_32_before": before, "modes_32_after": after}
     assert transients.outlasts_near_threshold(Given(transients=late)).verdict == verdict
 
 
@@ -183,12 +172,7 @@ def resonance_data(one: np.ndarray, many: np.ndarray) -> Given:
     maps = {}
     for name, curve, modes in (("modes_1", one, 1), ("modes_32", many, 32)):
         maps[name] = xr.Dataset(
-            {
-                "max_displacement": (
-                    ("frequency_ratio", "velocity_amplitude"),
-                    np.stack([curve, curve], axis=1),
-                )
-            },
+            {"max_displacement": (("frequency_ratio", "velocity_amplitude"), np.stack([curve, curve], axis=1))},
             {"frequency_ratio": ratio, "velocity_amplitude": [0.005, 0.02]},
             {"modes": modes, "reference_frequency": 83.93 if modes == 1 else 81.85, "cycles": 1000},
         )
@@ -252,8 +236,7 @@ def window_data(end: tuple[float, float], centre: tuple[float, float]) -> Given:
         row[drives >= low] = ResponseClass.TRANSIENT_2
         row[drives > high] = ResponseClass.CONTINUOUS
     ds = xr.Dataset(
-        {"response_class": (("location", "velocity_amplitude"), kinds)},
-        {"location": x, "velocity_amplitude": drives},
+        {"response_class": (("location", "velocity_amplitude"), kinds)}, {"location": x, "velocity_amplitude": drives}
     )
     return Given(windows={"omega_0.625": ds, "omega_1.625": ds})
 
@@ -275,9 +258,7 @@ def dominance_data(until: float) -> Given:
     middle = 0.5 * (BIN_EDGES[1:] + BIN_EDGES[:-1])
     samples = np.full((12, middle.size), 100)
     lead = np.where(middle < until, 100, 0) * np.ones((12, 1), dtype=int)
-    runs = xr.Dataset(
-        {"samples": (("run", "bin"), samples), "higher_exceed": (("run", "bin"), lead)}, {"bin": middle}
-    )
+    runs = xr.Dataset({"samples": (("run", "bin"), samples), "higher_exceed": (("run", "bin"), lead)}, {"bin": middle})
     time = np.linspace(0.0, 1.0, 400)
     alpha = np.stack([np.cos(20.0 * time), np.full(time.size, until)], axis=1)
     run = xr.Dataset({"modal_amplitude": (("time", "mode"), alpha)}, {"time": time, "cycle": ("time", time)})

@@ -51,24 +51,7 @@ def test_every_row_has_an_uncertainty_of_what_it_measured():
 def test_verdicts_that_do_not_depend_on_the_size():
     """1, 11, 13, 14, 18, 20, 21: closed forms and symmetry; 1c and 16: a misprint and a modulus no material has."""
     verdicts = {row.number: row.verdict for row in rows()}
-    holding = (
-        "1a",
-        "1b",
-        "1d",
-        "11",
-        "12a",
-        "13",
-        "14",
-        "18",
-        "20a",
-        "20b",
-        "20c",
-        "20d",
-        "21a",
-        "21b",
-        "9f",
-        "10d",
-    )
+    holding = ("1a", "1b", "1d", "11", "12a", "13", "14", "18", "20a", "20b", "20c", "20d", "21a", "21b", "9f", "10d")
     assert {number: verdicts[number] for number in holding} == dict.fromkeys(holding, "holds")
     assert {verdicts[number] for number in ("1c", "16", "26b")} == {"fails"}
 
@@ -114,9 +97,7 @@ def test_markdown(tmp_path):
         assert {line.replace("\\|", "").count("|") for line in lines} == {lines[0].count("|")}
     page = REPRODUCTION.read_text(encoding="utf-8")
     headings = {
-        line.lstrip("# ").lower().replace(" ", "-").replace(".", "")
-        for line in page.splitlines()
-        if line[:1] == "#"
+        line.lstrip("# ").lower().replace(" ", "-").replace(".", "") for line in page.splitlines() if line[:1] == "#"
     }
     links = set(re.findall(r"\]\(#([^)]*)\)", text))
     assert links and links <= headings, links - headings
@@ -125,9 +106,7 @@ def test_markdown(tmp_path):
 
 
 def row_of(**more):
-    given = dict.fromkeys(
-        ("topic", "says", "paper", "source", "measured", "uncertainty", "rule", "fails"), "a"
-    )
+    given = dict.fromkeys(("topic", "says", "paper", "source", "measured", "uncertainty", "rule", "fails"), "a")
     return Claim(**({"number": "1", "verdict": "holds", "close": False} | given | more))
 
 

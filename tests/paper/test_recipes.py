@@ -77,8 +77,7 @@ def test_recipes_of_one_size_share_a_grid(results):
 def test_points_lie_where_they_were_measured(tmp_path, results):
     table = tmp_path / "dots.csv"
     table.write_text(
-        "frequency_ratio,velocity_amplitude,location,response_class\n1.625,0.3,0.3,intrawell\n",
-        encoding="utf-8",
+        "frequency_ratio,velocity_amplitude,location,response_class\n1.625,0.3,0.3,intrawell\n", encoding="utf-8"
     )
     figure = paper.fig8(results=results, measurements=table)
     found = [c for ax in figure.axes for c in ax.collections if isinstance(c, PathCollection)]
@@ -169,7 +168,6 @@ def test_first_impact_carries_one_mode_over_at_a_quarter():
         shaker = sb.Shaker(frequency_ratio=6.0, velocity_amplitude=amplitude)
         # up to the top of the first flight; near the threshold it is slow, the wall comes back below
         run = sb.simulate(
-            sb.System(model, contacts=[sb.Contact(sb.HertzContact(stiffness=4e10), shaker)]),
-            sb.Integration(cycles=6),
+            sb.System(model, contacts=[sb.Contact(sb.HertzContact(stiffness=4e10), shaker)]), sb.Integration(cycles=6)
         )
         assert (run.summary.max_midspan_displacement > 0.0) == snaps

@@ -58,8 +58,7 @@ def test_is_small():
 
 
 @pytest.mark.parametrize(
-    ("name", "cycles"),
-    [(name, cycles) for name, cycles in (("fig6", 200), ("fig7", 1000)) if name in KEPT],
+    ("name", "cycles"), [(name, cycles) for name, cycles in (("fig6", 200), ("fig7", 1000)) if name in KEPT]
 )
 def test_frequency_maps_are_of_full_size(name, cycles):
     maps = loaded(name)
@@ -91,8 +90,7 @@ def test_a_point_of_the_map_is_computed_again():
 
 
 @pytest.mark.parametrize(
-    "name",
-    [name for name in ("fig2", "fig6", "fig7", "fig8", "figA9", "figB10", "si5", "two_tips") if name in KEPT],
+    "name", [name for name in ("fig2", "fig6", "fig7", "fig8", "figA9", "figB10", "si5", "two_tips") if name in KEPT]
 )
 def test_draws(name):
     figure = paper.FIGURES[name]("full", data=DATA)

@@ -91,9 +91,7 @@ def test_passages_of_a_known_motion():
 def test_notch_of_a_known_threshold():
     """The lowest that rises on both sides, not the window's edge; its stretch is what is within a step of it."""
     ratio = np.arange(1.0, 1.61, 0.1)
-    rows = np.array(
-        [[[0.10, 0.20, 0.15, 0.155, 0.25, 0.18, 0.30], [0.10, 0.20, 0.30, 0.16, 0.25, np.nan, np.nan]]]
-    )
+    rows = np.array([[[0.10, 0.20, 0.15, 0.155, 0.25, 0.18, 0.30], [0.10, 0.20, 0.30, 0.16, 0.25, np.nan, np.nan]]])
     ds = xr.Dataset(
         {"threshold": (("variant", "location", "frequency_ratio"), rows)},
         {"variant": ["v"], "location": [0.4, 0.5], "frequency_ratio": ratio},
@@ -143,9 +141,7 @@ def test_every_impact_and_passage_belongs_to_a_run(results):
         assert run.min() >= 0 and run.max() < count and (np.diff(run) >= 0).all()
     assert (data["impacts"].duration.values > 0.0).all() and (data["impacts"].impulse.values > 0.0).all()
     runs = data["runs"]
-    assert (runs.antisymmetric_exceed <= runs.higher_exceed).all() and (
-        runs.higher_exceed <= runs.samples
-    ).all()
+    assert (runs.antisymmetric_exceed <= runs.higher_exceed).all() and (runs.higher_exceed <= runs.samples).all()
 
 
 def test_ridge_of_a_known_resonance():

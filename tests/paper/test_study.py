@@ -58,7 +58,5 @@ def test_claims_hold_by_rules_that_could_fail() -> None:
     endless = {f"long_{level}": data[f"long_{level}"].copy(deep=True) for level in ("standard", "reference")}
     for ds in endless.values():
         ds["last_snap"][:] = 10_000.0
-    verdicts = [
-        row.result.verdict for row in study_claims.claims({"points": points} | endless, shares, odd, apart)
-    ]
+    verdicts = [row.result.verdict for row in study_claims.claims({"points": points} | endless, shares, odd, apart)]
     assert verdicts == ["fails"] * 6

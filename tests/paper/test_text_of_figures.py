@@ -11,12 +11,7 @@ from snapbeam import paper
 from snapbeam.plot.style import COLUMN_WIDTHS
 from snapbeam.util.datasets import xr
 
-SYSTEM_ATTRS = {
-    "beam_length": 0.161,
-    "beam_thickness": 4e-4,
-    "length_scale": 3.35e-4,
-    "reference_frequency": 83.9,
-}
+SYSTEM_ATTRS = {"beam_length": 0.161, "beam_thickness": 4e-4, "length_scale": 3.35e-4, "reference_frequency": 83.9}
 
 
 @pytest.fixture(params=("elsevier", "ieee", "talk"))

@@ -81,13 +81,10 @@ def test_two_strikers_that_move_slowly() -> None:
     rest = np.array([model.shape_at(x) for x in PAIR]) @ model.well_amplitude
     drive = sb.ConstantVelocity(speed=1.0 / (2.0 * np.pi * 500.0))
     tips = [
-        sb.Striker(drive=drive, location=float(x), gap=float(at - rest.min()))
-        for x, at in zip(PAIR, rest, strict=True)
+        sb.Striker(drive=drive, location=float(x), gap=float(at - rest.min())) for x, at in zip(PAIR, rest, strict=True)
     ]
     with pytest.warns(sb.DiagnosticWarning, match="antisymmetric"):
-        run = sb.simulate(
-            sb.System(model, contacts=[sb.Contact(paper.CONTACT, tips)]), sb.Integration(cycles=540)
-        )
+        run = sb.simulate(sb.System(model, contacts=[sb.Contact(paper.CONTACT, tips)]), sb.Integration(cycles=540))
     height = run.dataset.striker_displacements.values[:, 0]
     force = run.dataset.striker_forces.values
     path = push(model, PAIR, 0.002).path

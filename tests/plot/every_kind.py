@@ -17,17 +17,12 @@ SYSTEM = sb.System(
     contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))],
 )
 CHAOTIC = SYSTEM.replace(**{"drive.frequency_ratio": 0.8, "drive.velocity_amplitude": 0.5})
-PLANE = {
-    "drive.frequency_ratio": np.linspace(0.8, 1.6, 5),
-    "drive.velocity_amplitude": np.linspace(0.05, 0.3, 6),
-}
+PLANE = {"drive.frequency_ratio": np.linspace(0.8, 1.6, 5), "drive.velocity_amplitude": np.linspace(0.05, 0.3, 6)}
 SPEEDS = {"drive.velocity_amplitude": np.linspace(0.05, 0.5, 16)}
 SPREAD = sb.uncertainty.ParameterUncertainty(
     of={"location": sb.uncertainty.Normal(0.01), "contact.stiffness": sb.uncertainty.LogNormal(0.2)}
 )
-MOVING = sb.uncertainty.ParameterUncertainty(
-    of={"velocity_amplitude": sb.uncertainty.Normal(0.1, relative=True)}
-)
+MOVING = sb.uncertainty.ParameterUncertainty(of={"velocity_amplitude": sb.uncertainty.Normal(0.1, relative=True)})
 
 
 @cache
@@ -70,9 +65,7 @@ def _designs(objectives: object = "velocity_amplitude") -> xr.Dataset:
     )
     variables = {"velocity_amplitude": (0.03, 0.3), "location": (0.3, 0.5)}
     limit = sb.uncertainty.Constraint(quantity="snap", lower=0.8)
-    return sb.uncertainty.optimize_design(
-        CHAOTIC, variables, objectives, limit, MOVING, effort, integration=SHORT
-    )
+    return sb.uncertainty.optimize_design(CHAOTIC, variables, objectives, limit, MOVING, effort, integration=SHORT)
 
 
 def _saddle() -> sb.dynamics.PeriodicOrbit:

@@ -76,9 +76,7 @@ def test_quantiles() -> None:
     lines = {line.get_label(): line for line in ax.lines}
     np.testing.assert_array_equal(lines["P = 0.5"].get_ydata(), middle)
     assert lines["not monotone"].get_xdata().tolist() == [ratio[3]]
-    np.testing.assert_allclose(
-        lines[r"quasi-static, $V_\mathrm{QS1}$"].get_ydata(), ratio * np.sin(np.pi * 0.4) ** 2
-    )
+    np.testing.assert_allclose(lines[r"quasi-static, $V_\mathrm{QS1}$"].get_ydata(), ratio * np.sin(np.pi * 0.4) ** 2)
     with pytest.raises(InputError, match="no quantile thresholds"):
         plot_quantiles(xr.Dataset())
 
@@ -93,10 +91,7 @@ def test_tornado() -> None:
         {"quantity_mean": 0.2, "quantity": "threshold", "quantity_units": "1", "confidence": 0.95},
     )  # fmt: skip
     ax = plot_tornado(dataset)
-    assert [text.get_text().split("\n")[0] for text in ax.get_yticklabels()] == [
-        "contact stiffness",
-        "location",
-    ]
+    assert [text.get_text().split("\n")[0] for text in ax.get_yticklabels()] == ["contact stiffness", "location"]
     widths = sorted(round(abs(patch.get_width()), 6) for patch in ax.patches)
     assert widths == [0.01, 0.01, 0.03, 0.03]
     with pytest.raises(InputError, match="no sensitivities"):

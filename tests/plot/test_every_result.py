@@ -171,11 +171,7 @@ def public(kind) -> dict[str, object]:
 def test_every_dataset_that_an_analysis_returns_has_a_kind_of_figure() -> None:
     """A new function that returns a dataset fails here until its result draws itself."""
     functions = public(inspect.isfunction)
-    returned = {
-        name
-        for name, each in functions.items()
-        if "Dataset" in str(inspect.signature(each).return_annotation)
-    }
+    returned = {name for name, each in functions.items() if "Dataset" in str(inspect.signature(each).return_annotation)}
     assert returned == set(RESULTS)
     assert set(RESULTS.values()) <= {kind.words for kind in _KINDS}
 
@@ -195,9 +191,7 @@ def test_posterior_and_gradient_state_units_and_intervals() -> None:
     labels = [text.get_text().split("\n") for text in ax.get_yticklabels()]
     assert labels[0][0] == "buckling level" and labels[0][1].endswith("µm")
     wide = ax.collections[0].get_segments()
-    np.testing.assert_allclose(
-        [np.ptp(line[:, 0]) for line in wide], [2 * 1.96 * 2, 2 * 1.96 * 10], rtol=0.06
-    )
+    np.testing.assert_allclose([np.ptp(line[:, 0]) for line in wide], [2 * 1.96 * 2, 2 * 1.96 * 10], rtol=0.06)
     table = xr.Dataset(
         {"elasticity": ("parameter", [0.4, -2.0]), "relative_error": ("parameter", [0.1, 0.01])},
         {"parameter": list(names)}, {"quantity": "peak_force"},
@@ -224,10 +218,7 @@ def test_scores_are_in_the_colours_of_the_measured_classes() -> None:
 
 def test_homoclinic_points_and_growth_draw_themselves() -> None:
     points = xr.Dataset(
-        {
-            "state": (("point", "coordinate"), [[0.1, 0.2], [0.3, 0.4]]),
-            "stable_arclength": ("point", [1.0, 2.0]),
-        },
+        {"state": (("point", "coordinate"), [[0.1, 0.2], [0.3, 0.4]]), "stable_arclength": ("point", [1.0, 2.0])},
         {"coordinate": ["amplitude[1]", "velocity[1]"]},
     )
     assert points.snapbeam.plot().lines[0].get_label() == "homoclinic points, 2"
@@ -243,9 +234,7 @@ def test_the_gap_between_two_groups_of_curves_is_closed() -> None:
         {"sweep": ["up", "down"], "velocity_amplitude": value}, {"parameter": "velocity_amplitude"},
     )  # fmt: skip
     ax = plot_diagram(table)
-    at = ax.transAxes.inverted().transform(
-        ax.transData.transform([(0.2, y) for y in (-1.0, -0.75, -0.5, 1.0)])
-    )[:, 1]
+    at = ax.transAxes.inverted().transform(ax.transData.transform([(0.2, y) for y in (-1.0, -0.75, -0.5, 1.0)]))[:, 1]
     assert at[2] - at[1] == pytest.approx(at[1] - at[0])
     assert at[3] - at[2] < 0.4 and at[2] - at[0] > 0.5
     assert all(y < -0.4 or y > 0.9 for y in ax.get_yticks())

@@ -21,12 +21,7 @@ def test_branches_units_and_snaps() -> None:
     texts = [each.get_text() for each in ax.texts]
     assert any(each.startswith("snap-through -37") for each in texts)
     legend = [each.get_text() for each in ax.figure.legends[0].get_texts()]
-    assert legend == [
-        "stable",
-        "stable under displacement control only",
-        "unstable",
-        "bifurcation point",
-    ]
+    assert legend == ["stable", "stable under displacement control only", "unstable", "bifurcation point"]
     low, high = ax.get_ylim()
     assert low < 1e6 * float(curve.snap_through_force) < 1e6 * float(curve.snap_back_force) < high
     stable = [line for line in ax.lines if line.get_color() == "#16245E"]

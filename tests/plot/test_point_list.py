@@ -30,8 +30,7 @@ def points() -> xr.Dataset:
     return xr.Dataset(
         {"response_class": ("point", rng.integers(0, 4, count).astype("i1")), "peak_force": ("point", force)},
         coords={
-            name: ("point", values, {"parameter": full.get(name, f"drive.{name}")})
-            for name, values in coords.items()
+            name: ("point", values, {"parameter": full.get(name, f"drive.{name}")}) for name, values in coords.items()
         }
         | {"location": 0.4762},
         attrs={"cycles": 20, "modes": 2},
@@ -68,9 +67,7 @@ def test_a_statistic_of_a_list(points):
     ax = plot_statistic(points, "peak_force")
     filled, hollow = ax.collections[:2]
     assert filled.get_offsets().shape == (29, 2)
-    np.testing.assert_allclose(
-        hollow.get_offsets(), [[points["frequency_ratio"][3], points["velocity_amplitude"][3]]]
-    )
+    np.testing.assert_allclose(hollow.get_offsets(), [[points["frequency_ratio"][3], points["velocity_amplitude"][3]]])
 
 
 def test_what_lies_over_the_points(points):

@@ -46,15 +46,10 @@ def test_every_pixel_of_a_cell_has_its_colour(synthetic_map, tmp_path):
     ax.figure.canvas.draw()
     x, y = synthetic_map["frequency_ratio"].values, synthetic_map["velocity_amplitude"].values
     wanted = np.array(
-        [
-            [to_rgb(CLASS_COLORS[ResponseClass(k)]) for k in row]
-            for row in synthetic_map["response_class"].values
-        ]
+        [[to_rgb(CLASS_COLORS[ResponseClass(k)]) for k in row] for row in synthetic_map["response_class"].values]
     )
     for share in (-0.3, 0.0, 0.3):
-        places = np.stack(
-            np.meshgrid(x + share * (x[1] - x[0]), y + share * (y[1] - y[0]), indexing="ij"), axis=-1
-        )
+        places = np.stack(np.meshgrid(x + share * (x[1] - x[0]), y + share * (y[1] - y[0]), indexing="ij"), axis=-1)
         inside = places[..., 1] > 0.005
         pixels = ax.transData.transform(places.reshape(-1, 2)).reshape(places.shape)
         seen = image[image.shape[0] - 1 - pixels[..., 1].astype(int), pixels[..., 0].astype(int)]
@@ -142,9 +137,7 @@ def test_in_axes_of_ones_own(synthetic_map):
     assert plot_response_map(synthetic_map, axes[1]) is axes[1]
     assert len(axes[1].get_legend().get_texts()) == 5
     assert plot_response_map(synthetic_map, axes[0], legend=False).get_legend() is None
-    assert [handle.get_label() for handle in class_handles()] == [
-        kind.label for kind in ResponseClass if kind >= 0
-    ]
+    assert [handle.get_label() for handle in class_handles()] == [kind.label for kind in ResponseClass if kind >= 0]
 
 
 def test_classes_without_runs_are_not_in_the_legend():

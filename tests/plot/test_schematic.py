@@ -26,9 +26,7 @@ def words(figure) -> str:
 
 def test_says_what_signs_do_not(model) -> None:
     drive = sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.2, duration_cycles=4.0)
-    striker = sb.Striker(
-        drive=drive, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=0.1 * LEVEL
-    )
+    striker = sb.Striker(drive=drive, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=0.1 * LEVEL)
     said = words(plot_system(sb.System(model, contacts=[sb.Contact(sb.HuntCrossley(4e8, 2.0), striker)])))
     assert "Hunt–Crossley" in said
     assert "gap 0.1 $b$" in said
@@ -40,9 +38,7 @@ def test_says_what_signs_do_not(model) -> None:
 
 
 def test_beam_and_tip_are_where_they_are(model) -> None:
-    striker = sb.Striker(
-        drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=0.5 * LEVEL, side="above", location=0.5
-    )
+    striker = sb.Striker(drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=0.5 * LEVEL, side="above", location=0.5)
     figure = plot_system(sb.System(model, contacts=[sb.Contact(default_values.CONTACT, striker)]))
     solid = next(line for line in figure.axes[0].lines if line.get_linewidth() == 1.8)
     assert solid.get_ydata().max() == pytest.approx(1.0, abs=1e-3)
@@ -66,9 +62,7 @@ def test_what_surrounds_the_beam_is_drawn_and_named(model) -> None:
     coil = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
 
     def drawn(**around) -> tuple[int, str]:
-        figure = plot_system(
-            sb.System(model, contacts=[sb.Contact(default_values.CONTACT, striker)], **around)
-        )
+        figure = plot_system(sb.System(model, contacts=[sb.Contact(default_values.CONTACT, striker)], **around))
         shapes = sum(len(ax.get_children()) for ax in figure.axes)
         return shapes, words(figure)
 
@@ -99,9 +93,7 @@ def test_unequal_wells_and_what_makes_them(model) -> None:
     figure = plot_system(
         sb.System(
             uneven,
-            contacts=[
-                sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))
-            ],
+            contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))],
         )
     )
     solid, dashed = (
@@ -119,8 +111,7 @@ def test_no_arrows_of_a_load_that_is_zero() -> None:
     imperfection = sb.Imperfection(midspan_amplitude=2e-3)
     model = sb.ReducedModel.from_beam(arch, modes=3, imperfection=imperfection)
     arched = sb.System(
-        model,
-        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))],
+        model, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))]
     )
     assert "$P$" not in words(plot_system(arched))
     loaded = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)

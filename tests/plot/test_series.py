@@ -25,9 +25,7 @@ def _close():
 def run():
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=3),
-        contacts=[
-            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
-        ],
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))],
     )
     return sb.simulate(system, sb.Integration(cycles=12))
 
@@ -41,9 +39,7 @@ def test_captions(run):
     assert caption(xr.Dataset()) == ""
 
 
-@pytest.mark.parametrize(
-    "kind", ["run", "modal_amplitudes", "energies", "spectrum", "spectrogram", "phase_portrait"]
-)
+@pytest.mark.parametrize("kind", ["run", "modal_amplitudes", "energies", "spectrum", "spectrogram", "phase_portrait"])
 def test_every_plotter_takes_axes_and_returns_them(run, kind):
     plotter = getattr(plots, f"plot_{kind}")
     assert isinstance(plotter(run), Axes)
@@ -91,16 +87,12 @@ def test_spectrogram_of_a_sine_that_changes_its_frequency():
     level, corners = mesh.get_array(), mesh.get_coordinates()
     at = 0.5 * (corners[0, 1:, 0] + corners[0, :-1, 0])
     lines = 0.5 * (corners[1:, 0, 1] + corners[:-1, 0, 1])
-    assert at[0] == pytest.approx(2.0, abs=0.1) and at[-1] == pytest.approx(78.0, abs=1.1), (
-        "whole windows only"
-    )
+    assert at[0] == pytest.approx(2.0, abs=0.1) and at[-1] == pytest.approx(78.0, abs=1.1), "whole windows only"
     for part, frequency, height in ((at < 37.0, 2.0, 0.0), (at > 43.0, 5.0, -20.0)):
         np.testing.assert_allclose(lines[level[:, part].argmax(axis=0)], frequency, atol=0.13)
         np.testing.assert_allclose(level[:, part].max(axis=0), height, atol=0.2)
     for length in (0.01, 41.0):
-        with pytest.raises(
-            InputError, match=r"segment = .*: must be from 0.08 cycles, 16 samples, to 40 cycles"
-        ):
+        with pytest.raises(InputError, match=r"segment = .*: must be from 0.08 cycles, 16 samples, to 40 cycles"):
             plots.plot_spectrogram(run, variable="displacement", segment=length)
     for length in (0.08, 40.0):
         plots.plot_spectrogram(run, variable="displacement", segment=length)
@@ -119,9 +111,7 @@ def test_statistics_of_a_map(synthetic_map):
     ds = synthetic_map.assign(peak_force=force)
     ax = plots.plot_statistic(ds, "peak_force")
     mesh = ax.collections[0]
-    assert mesh.norm.vmin == pytest.approx(1e-2) and mesh.norm.vmax == pytest.approx(100.0), (
-        "mN, by powers of ten"
-    )
+    assert mesh.norm.vmin == pytest.approx(1e-2) and mesh.norm.vmax == pytest.approx(100.0), "mN, by powers of ten"
     assert "(mN)" in ax.figure.axes[1].get_ylabel()
     line = plots.plot_statistic(ds.isel(frequency_ratio=3), "peak_force", ax=plt.figure().add_subplot())
     assert line.lines[0].get_ydata().size == ds.sizes["velocity_amplitude"]

@@ -13,12 +13,8 @@ import snapbeam as sb
 @pytest.mark.filterwarnings("ignore:.*lowest mode about")
 def test_a_shock_with_a_harvester():
     """The acceleration has its stated peak; the mean power lies in its own panel, over the last quarter of the time."""
-    beam = sb.Beam(
-        length=0.3, thickness=4e-4, width=0.02, density=7850.0, young_modulus=2e11, buckling_level=5e-4
-    )
-    circuit = sb.PiezoelectricHarvester(
-        moment_per_volt=-1e-4, capacitance=7e-7, resistance=1e4, patch_end=0.25
-    )
+    beam = sb.Beam(length=0.3, thickness=4e-4, width=0.02, density=7850.0, young_modulus=2e11, buckling_level=5e-4)
+    circuit = sb.PiezoelectricHarvester(moment_per_volt=-1e-4, capacitance=7e-7, resistance=1e4, patch_end=0.25)
     base = sb.BaseExcitation(motion=sb.Shock(acceleration_g=5.0, duration_ms=40.0), direction="up")
     model = sb.ReducedModel.from_beam(beam, 1, damping_ratio=0.05)
     system = sb.System(model, base_excitation=base, harvesters=[circuit])

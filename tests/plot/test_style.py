@@ -20,21 +20,9 @@ from snapbeam.util.validation import InputError
 # Machado, Oliveira and Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291, severity 1, on linear RGB.
 VISION = {
     "normal": np.eye(3),
-    "protanopia": [
-        [0.152286, 1.052583, -0.204868],
-        [0.114503, 0.786281, 0.099216],
-        [-0.003882, -0.048116, 1.051998],
-    ],
-    "deuteranopia": [
-        [0.367322, 0.860646, -0.227968],
-        [0.280085, 0.672501, 0.047413],
-        [-0.011820, 0.042940, 0.968881],
-    ],
-    "tritanopia": [
-        [1.255528, -0.076749, -0.178779],
-        [-0.078411, 0.930809, 0.147602],
-        [0.004733, 0.691367, 0.303900],
-    ],
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
 }
 TO_XYZ = np.array(
     [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
@@ -53,9 +41,7 @@ def lab(color, vision):
 @pytest.mark.parametrize("vision", VISION)
 def test_classes_are_told_apart(vision):
     seen = {kind: lab(color, VISION[vision]) for kind, color in CLASS_COLORS.items()}
-    differences = {
-        (a.name, b.name): np.linalg.norm(seen[a] - seen[b]) for a, b in combinations(ResponseClass, 2)
-    }
+    differences = {(a.name, b.name): np.linalg.norm(seen[a] - seen[b]) for a, b in combinations(ResponseClass, 2)}
     assert min(differences.values()) > 28.0, differences
     lightness = sorted(value[0] for value in seen.values())
     assert min(np.diff(lightness)) > 8.0, lightness
@@ -112,9 +98,7 @@ def test_every_figure_of_a_notebook_is_shown(tmp_path):
     (tmp_path / "like_a_notebook.py").write_text(_BACKEND, encoding="utf-8")
     path = os.pathsep.join((str(tmp_path), os.environ.get("PYTHONPATH", "")))
     environment = dict(os.environ, MPLBACKEND="module://like_a_notebook", PYTHONPATH=path)
-    done = subprocess.run(
-        [sys.executable, "-c", _PLOTS], env=environment, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", _PLOTS], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 

@@ -106,17 +106,13 @@ def check(figure: Figure, words: str) -> None:
         overlap = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
         assert min(overlap) < 2.0, f"{words}: {one!r} over {other!r}, {overlap}"
     names = Counter(each.get_text() for legend in legends_of(figure) for each in legend.get_texts())
-    names += Counter(
-        each for ax in figure.axes for each in (ax.get_xlabel(), ax.get_ylabel(), ax.get_title()) if each
-    )
+    names += Counter(each for ax in figure.axes for each in (ax.get_xlabel(), ax.get_ylabel(), ax.get_title()) if each)
     assert not (twice := [name for name, count in names.items() if count > 1]), f"{words}: twice {twice}"
     drawn = np.concatenate([colors_of(ax) for ax in figure.axes])
     for legend in legends_of(figure):
         for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
             color = color_of_entry(handle)[:3]
-            assert np.abs(drawn - color).max(axis=1).min() < 0.01, (
-                f"{words}: {text.get_text()} does not occur"
-            )
+            assert np.abs(drawn - color).max(axis=1).min() < 0.01, f"{words}: {text.get_text()} does not occur"
 
 
 @pytest.mark.parametrize("result", KINDS)

@@ -47,12 +47,7 @@ def curve():
             "upper_threshold_max": (dims, first + 0.03),
             "outcome": (dims, np.where(np.isnan(first), 1, 0), flags),
         },
-        {
-            "modes": [1, 32],
-            "frequency_ratio": ratio,
-            "velocity_amplitude": np.linspace(0.0, 0.6, 61),
-            "location": 0.4,
-        },
+        {"modes": [1, 32], "frequency_ratio": ratio, "velocity_amplitude": np.linspace(0.0, 0.6, 61), "location": 0.4},
         {"cycles": 200},
     )
 

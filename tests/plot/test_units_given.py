@@ -113,9 +113,7 @@ def designs(system: sb.System) -> xr.Dataset:
     )  # fmt: skip
 
 
-def quantiles(
-    system: sb.System, parameter: str, bounds: tuple[float, float], *over: tuple[str, str]
-) -> xr.Dataset:
+def quantiles(system: sb.System, parameter: str, bounds: tuple[float, float], *over: tuple[str, str]) -> xr.Dataset:
     settings = sb.uncertainty.QuantileSearchSettings(runs=120, rounds=1)
     return sb.uncertainty.quantile_threshold(
         system, parameter, bounds, axes(*over), tolerance(), settings, integration=SHORT
@@ -218,11 +216,7 @@ def texts_of(figure: plt.Figure) -> list[str]:
     found = [text.get_text() for text in figure.texts]
     found += [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     for ax in figure.axes:
-        found += [
-            ax.get_xlabel(),
-            ax.get_ylabel(),
-            *(ax.get_title(loc) for loc in ("left", "center", "right")),
-        ]
+        found += [ax.get_xlabel(), ax.get_ylabel(), *(ax.get_title(loc) for loc in ("left", "center", "right"))]
         found += [text.get_text() for text in ax.texts]
         found += [] if ax.get_legend() is None else [text.get_text() for text in ax.get_legend().get_texts()]
         found += [text.get_text() for text in (*ax.get_xticklabels(), *ax.get_yticklabels())]

@@ -23,10 +23,7 @@ def system_of(modes: int, ratio: float = 1.21, velocity: float = 0.18, side: str
     return sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes),
         contacts=[
-            sb.Contact(
-                default_values.CONTACT,
-                sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, side=side),
-            )
+            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, side=side))
         ],
     )
 
@@ -34,9 +31,7 @@ def system_of(modes: int, ratio: float = 1.21, velocity: float = 0.18, side: str
 def energy(system: sb.System, state: sb.State) -> float:
     """Above the well, J."""
     model = system.model
-    return float(
-        model.kinetic_energy(state.velocity) + model.potential_energy(state.amplitude) - model.well_energy
-    )
+    return float(model.kinetic_energy(state.velocity) + model.potential_energy(state.amplitude) - model.well_energy)
 
 
 def plain(state: sb.State) -> sb.State:
@@ -58,10 +53,7 @@ def somewhere(system: sb.System) -> sb.State:
     sign = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
     velocity = model.linear_modes[:, 0] * 2e-3 + (model.linear_modes[:, 1] * 1e-3 if model.modes > 1 else 0.0)
     return sb.State(
-        amplitude=sign * 0.6 * model.well_amplitude,
-        velocity=sign * velocity,
-        phase=1.1,
-        striker_position=-sign * 2e-4,
+        amplitude=sign * 0.6 * model.well_amplitude, velocity=sign * velocity, phase=1.1, striker_position=-sign * 2e-4
     )
 
 
@@ -89,8 +81,7 @@ SYSTEMS = {
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=[pytest.mark.slow] if n in ("elastic", "plastic") else []) for n in SYSTEMS],
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in ("elastic", "plastic") else []) for n in SYSTEMS]
 )
 def test_calls_compose_bit_for_bit(name: str) -> None:
     """Twelve periods in one call, in twelve, in four of three; and all the states on the way."""
@@ -135,9 +126,7 @@ def test_parts_of_periods_compose_to_rounding() -> None:
     state = sb.advance(system, sb.advance(system, periods=0.3), 0.45)
     assert float(state.phase) == pytest.approx(2.0 * math.pi * 0.75, rel=1e-12)
     state = sb.advance(system, state, 1.25)
-    np.testing.assert_allclose(
-        state.amplitude, whole.amplitude, rtol=0.0, atol=1e-5 * abs(whole.amplitude[0])
-    )
+    np.testing.assert_allclose(state.amplitude, whole.amplitude, rtol=0.0, atol=1e-5 * abs(whole.amplitude[0]))
     assert math.cos(float(state.phase)) == pytest.approx(1.0, abs=1e-12)
 
 
@@ -213,10 +202,7 @@ def test_a_run_ends_where_a_state_goes_on() -> None:
     whole = sb.simulate(system, sb.Integration(cycles=20), sample_times=[0.0])
     gone_on = sb.advance(system, half.final_state, 10)
     np.testing.assert_allclose(
-        gone_on.amplitude,
-        whole.final_state.amplitude,
-        rtol=0.0,
-        atol=1e-6 * abs(whole.final_state.amplitude[0]),
+        gone_on.amplitude, whole.final_state.amplitude, rtol=0.0, atol=1e-6 * abs(whole.final_state.amplitude[0])
     )
     again = sb.simulate(
         system.replace(initial_state=plain(half.final_state)), sb.Integration(cycles=10), sample_times=[0.0]
@@ -276,11 +262,7 @@ def test_a_striker_that_is_moved_strikes_where_it_is() -> None:
     """A state goes on under another location, drive or law: the tip stays where it was in space."""
     system = system_of(4, 1.4, 0.03)
     state = sb.advance(system, periods=3)
-    for changes in (
-        {"contact.location": 0.3},
-        {"drive.velocity_amplitude": 0.025},
-        {"contact.stiffness": 1e7},
-    ):
+    for changes in ({"contact.location": 0.3}, {"drive.velocity_amplitude": 0.025}, {"contact.stiffness": 1e7}):
         other = system.replace(**changes)
         following = sb.advance(other, state, 6)
         same = sb.advance(other, plain(state), 6)
@@ -310,7 +292,7 @@ def record(model: sb.ReducedModel) -> sb.Striker:
             velocity=5e-5 * omega * np.cos(omega * t),
             sampling_frequency=20_000.0,
             frequency=100.0,
-        ),
+        )
     )
 
 
@@ -360,8 +342,7 @@ def test_the_tangent_flow_contracts_as_the_damping_says(modes: int, name: str) -
         state = somewhere(system)
     elif name == "undriven":
         system = sb.System(
-            system.model,
-            initial_state=somewhere(system.replace(contacts=[], initial_state=somewhere(system))),
+            system.model, initial_state=somewhere(system.replace(contacts=[], initial_state=somewhere(system)))
         )
     impacts = 0
     for _ in range(3):
@@ -387,9 +368,7 @@ def test_tangents_do_not_disturb() -> None:
         one = sb.advance(system, periods=5, tangent=both[i : i + 1])
         np.testing.assert_array_equal(one.tangent[0], with_both.tangent[i])
     sum_of = sb.advance(system, periods=5, tangent=(both[:1] + 3.0 * both[1:]))
-    np.testing.assert_allclose(
-        sum_of.tangent[0], with_both.tangent[0] + 3.0 * with_both.tangent[1], rtol=1e-6
-    )
+    np.testing.assert_allclose(sum_of.tangent[0], with_both.tangent[0] + 3.0 * with_both.tangent[1], rtol=1e-6)
     # carried on from call to call
     state = sb.advance(system, sb.advance(system, periods=2, tangent=both), 3, tangent=None)
     assert state.tangent is None
@@ -404,9 +383,7 @@ def test_tangents_by_differences_keep_the_tip_where_it_is() -> None:
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3)
     model = sb.ReducedModel.from_beam(default_values.BEAM, 2)
     elastic, lossy = (
-        sb.advance(
-            sb.System(model, contacts=[sb.Contact(law, shaker)]), tangent=full_basis(2), integration=REFERENCE
-        )
+        sb.advance(sb.System(model, contacts=[sb.Contact(law, shaker)]), tangent=full_basis(2), integration=REFERENCE)
         for law in (default_values.CONTACT, damped)
     )
     assert int(elastic.statistics["impacts"]) > 0
@@ -434,9 +411,7 @@ def test_tangents_are_derivatives(modes: int, bound: float) -> None:
             phase=state.phase, striker_position=state.striker_position, contact_time=state.contact_time,
         )  # fmt: skip
         ends.append(sb.advance(system, moved, integration=REFERENCE))
-    for row, (plus, minus) in enumerate(
-        ((ends[0].amplitude, ends[1].amplitude), (ends[0].velocity, ends[1].velocity))
-    ):
+    for row, (plus, minus) in enumerate(((ends[0].amplitude, ends[1].amplitude), (ends[0].velocity, ends[1].velocity))):
         difference = (plus - minus) / 2e-6
         error = np.linalg.norm(found.tangent[0, row] - difference) / np.linalg.norm(difference)
         assert error < bound, (row, error)
@@ -451,9 +426,7 @@ def test_tangents_of_a_batch() -> None:
     found = sb.advance(system, states, 2, tangent=same)
     assert found.tangent.shape == (2, 3, 2, 2)
     for i in range(2):
-        np.testing.assert_array_equal(
-            found.tangent[i], sb.advance(system, states[i], 2, tangent=same).tangent
-        )
+        np.testing.assert_array_equal(found.tangent[i], sb.advance(system, states[i], 2, tangent=same).tangent)
     own = np.stack((same, 2.0 * same))
     np.testing.assert_allclose(
         sb.advance(system, states, 2, tangent=own).tangent[1], 2.0 * found.tangent[1], rtol=1e-12
@@ -471,11 +444,7 @@ SYSTEM = system_of(2)
     [
         (lambda: sb.advance(SYSTEM.model), InputTypeError, "must be a System"),
         (lambda: sb.advance(SYSTEM, 3), InputTypeError, "state = 3: must be a State"),
-        (
-            lambda: sb.advance(SYSTEM, periods=0),
-            InputError,
-            "periods = 0: must be a finite number greater than 0",
-        ),
+        (lambda: sb.advance(SYSTEM, periods=0), InputError, "periods = 0: must be a finite number greater than 0"),
         (
             lambda: sb.advance(SYSTEM, periods=1.5, save_every_period=True),
             InputError,
@@ -527,13 +496,9 @@ def test_what_cannot_be_reached_is_nan_and_says_why() -> None:
     # as many steps as forty periods of flight would take: what contacts take beyond is too much
     plan = choose_base_step(model, SYSTEM.contact_law)
     flight = 40 * math.ceil(2.0 * math.pi / (1.21 * SYSTEM.scale.omega * plan.step))
-    limited = sb.advance(
-        SYSTEM, periods=40, integration=sb.Integration(max_steps=flight), save_every_period=True
-    )
+    limited = sb.advance(SYSTEM, periods=40, integration=sb.Integration(max_steps=flight), save_every_period=True)
     reached = np.isfinite(limited.amplitude).all(axis=-1)
-    assert limited.statistics["status"].tolist() == [
-        0 if each else sb.RunStatus.STEP_LIMIT for each in reached
-    ]
+    assert limited.statistics["status"].tolist() == [0 if each else sb.RunStatus.STEP_LIMIT for each in reached]
     assert limited[39].statistics["status"] == sb.RunStatus.STEP_LIMIT
     assert 0 < reached.sum() < 40
     whole = sb.advance(SYSTEM, periods=40, save_every_period=True)

@@ -58,9 +58,7 @@ def test_times_increase():
 
 def test_dropouts_of_a_measured_run():
     measured = np.array([0.0, np.nan, 0.2, 0.3, 0.4])
-    run = trajectory_dataset(
-        TIME, displacement_at_striker=measured, valid=np.array([1, 0, 1, 1, 1], dtype=np.int8)
-    )
+    run = trajectory_dataset(TIME, displacement_at_striker=measured, valid=np.array([1, 0, 1, 1, 1], dtype=np.int8))
     assert check_trajectory(run) is run
     with pytest.raises(InputError, match=r"displacement_at_striker\[1\] = nan"):
         trajectory_dataset(TIME, displacement_at_striker=measured, valid=np.ones(5, dtype=np.int8))

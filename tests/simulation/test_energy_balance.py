@@ -52,9 +52,7 @@ def test_energy_out_of_nothing_is_no_result() -> None:
     believed = statistics_of(ensemble, accumulators_of_runs)
     assert believed["status"][0] == sb.RunStatus.OK
     accumulators_of_runs["energy"] = (
-        accumulators_of_runs["first_energy"]
-        + accumulators_of_runs["work"]
-        + 0.02 * accumulators_of_runs["gross_work"]
+        accumulators_of_runs["first_energy"] + accumulators_of_runs["work"] + 0.02 * accumulators_of_runs["gross_work"]
     )
     found = statistics_of(ensemble, accumulators_of_runs)
     assert found["status"][0] == sb.RunStatus.ENERGY_ERROR
@@ -67,8 +65,7 @@ def test_free_vibration_is_balanced() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, 4)
     start = (0.9 * np.asarray(model.well_amplitude), np.zeros(4))
     run = sb.simulate(
-        sb.System(model, initial_state=sb.State(amplitude=start[0], velocity=start[1])),
-        sb.Integration(cycles=3),
+        sb.System(model, initial_state=sb.State(amplitude=start[0], velocity=start[1])), sb.Integration(cycles=3)
     )
     assert run.summary.status == sb.RunStatus.OK
     assert abs(run.dataset.attrs["energy_error"]) < 1e-4
@@ -86,9 +83,7 @@ def test_rounding_at_rest_is_no_error(modes) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for _ in range(6):
-            run = sb.simulate(
-                sb.System(model, contacts=[away], initial_state=state), sb.Integration(cycles=15)
-            )
+            run = sb.simulate(sb.System(model, contacts=[away], initial_state=state), sb.Integration(cycles=15))
             assert run.summary.status == sb.RunStatus.OK
             state = run.final_state
             assert state is not None

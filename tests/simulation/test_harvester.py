@@ -148,12 +148,7 @@ def test_bistable_piezoelectric_oscillator_of_the_literature() -> None:
     layers = sb.PiezoelectricHarvester(moment_per_volt=0.05, capacitance=0.1, resistance=200.0)
     force = sb.HarmonicForce(frequency_ratio=0.8, amplitude=0.115, phase=0.5 * np.pi)
     for start in (sb.State(amplitude=[-1.0]), sb.State(amplitude=[1.0], velocity=[1.3])):
-        system = sb.System(
-            model,
-            forces=[sb.ExternalForce(history=force)],
-            harvesters=[layers],
-            initial_state=start,
-        )
+        system = sb.System(model, forces=[sb.ExternalForce(history=force)], harvesters=[layers], initial_state=start)
         power = sb.simulate(system, sb.Integration(cycles=400)).summary.harvested_power_last_quarter
         assert power / 0.1 == pytest.approx(0.017855962, rel=3e-6)
 

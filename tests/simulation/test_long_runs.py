@@ -17,9 +17,7 @@ from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import DiagnosticWarning
 
 
-def announced(
-    stiffness=default_values.CONTACT.stiffness, damping_ratio=0.005, frequency_ratio=1.2, **integration
-):
+def announced(stiffness=default_values.CONTACT.stiffness, damping_ratio=0.005, frequency_ratio=1.2, **integration):
     """Warnings of a run that is prepared and not begun."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=damping_ratio)
     shaker = sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=0.18)
@@ -66,9 +64,7 @@ def test_the_command_says_it_before_the_run(tmp_path):
         assert process.stderr is not None
         try:
             lines = iter(process.stderr.readline, "")
-            assert any("note: the run has" in line for line in lines), (
-                "the run ended, or began, without a word"
-            )
+            assert any("note: the run has" in line for line in lines), "the run ended, or began, without a word"
         finally:
             process.kill()
 

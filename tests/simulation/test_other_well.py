@@ -32,9 +32,7 @@ def test_a_centre_that_crosses_far_from_the_other_well_is_no_snap() -> None:
 def test_a_striker_keeps_the_rule_of_the_paper(side: str) -> None:
     """In runs and sweeps: the class follows from the crossings alone."""
     drive = sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1)
-    system = sb.System(
-        MODEL, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, side=side))]
-    )
+    system = sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, side=side))])
     how = sb.Integration(cycles=8)
     data = sb.sweep(system, {"velocity_amplitude": [0.02, 0.6, 0.8]}, how)
     kinds = sb.classify(data.zero_crossings, data.zero_crossings_last_quarter, how.cycles, _ended(data, side))

@@ -8,9 +8,7 @@ from snapbeam.model import default_values
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2, damping_ratio=0.005)
 SHAKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1, location=0.4)
-MOVED = sb.Striker(
-    drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2), mass=0.01, suspension_stiffness=1e3
-)
+MOVED = sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2), mass=0.01, suspension_stiffness=1e3)
 PLASTIC = sb.ElasticPlasticContact(1e5, 2e5)
 
 

@@ -59,9 +59,7 @@ def test_the_whole_record_is_the_default_and_more_is_refused(model):
     assert run.dataset.attrs["cycles"] == pytest.approx(drive.drive.duration * drive.drive.frequency)
     assert run.dataset.attrs["drive_type"] == "recorded_motion"
     with pytest.raises(sb.InputError, match=r"cycles = 9.*at most the 3\.\d cycles"):
-        sb.simulate(
-            sb.System(model, contacts=[sb.Contact(default_values.CONTACT, drive)]), sb.Integration(cycles=9)
-        )
+        sb.simulate(sb.System(model, contacts=[sb.Contact(default_values.CONTACT, drive)]), sb.Integration(cycles=9))
 
 
 def test_the_energy_balance_closes(model):
@@ -77,14 +75,8 @@ def test_bad_records_are_refused():
     wave = np.sin(np.linspace(0.0, 6.0, 50))
     good = {"sampling_frequency": 100.0, "frequency": 1.0}
     with pytest.raises(sb.InputError, match="does not belong to displacement"):
-        sb.Striker(
-            drive=sb.RecordedMotion(displacement=wave, velocity=wave, **good),
-        )
+        sb.Striker(drive=sb.RecordedMotion(displacement=wave, velocity=wave, **good))
     with pytest.raises(sb.InputError, match="at least 4 samples"):
-        sb.Striker(
-            drive=sb.RecordedMotion(displacement=wave, velocity=wave[:-1], **good),
-        )
+        sb.Striker(drive=sb.RecordedMotion(displacement=wave, velocity=wave[:-1], **good))
     with pytest.raises(sb.InputError, match="must be finite"):
-        sb.Striker(
-            drive=sb.RecordedMotion(displacement=np.full(9, np.nan), velocity=np.zeros(9), **good),
-        )
+        sb.Striker(drive=sb.RecordedMotion(displacement=np.full(9, np.nan), velocity=np.zeros(9), **good))

@@ -46,8 +46,7 @@ def test_free_mass_rebounds_with_its_coefficient():
 def test_energy_balance_closes_and_the_tip_stays_outside(one_mode, coefficient, ratio, amplitude):
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=amplitude)
     run = sb.simulate(
-        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(coefficient), shaker)]),
-        sb.Integration(cycles=20),
+        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(coefficient), shaker)]), sb.Integration(cycles=20)
     )
     assert run.summary.status is sb.RunStatus.OK
     assert ledger(run) < 1e-4
@@ -58,9 +57,7 @@ def test_energy_balance_closes_and_the_tip_stays_outside(one_mode, coefficient, 
 
 def test_a_plastic_impact_sticks_until_the_force_would_pull(one_mode):
     shaker = sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05)
-    run = sb.simulate(
-        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(0.0), shaker)]), sb.Integration(cycles=4)
-    )
+    run = sb.simulate(sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(0.0), shaker)]), sb.Integration(cycles=4))
     assert run.summary.contact_time_fraction > 0.3
     together = run.impacts.duration.values > 0.0
     assert together.any()
@@ -74,9 +71,7 @@ def test_a_plastic_impact_sticks_until_the_force_would_pull(one_mode):
 def test_a_plastic_landing_is_one_impact(one_mode):
     """Landing and sustained contact are one impact, whose impulse is that of the landing and that of the force after it."""
     shaker = sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05)
-    run = sb.simulate(
-        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(0.0), shaker)]), sb.Integration(cycles=4)
-    )
+    run = sb.simulate(sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(0.0), shaker)]), sb.Integration(cycles=4))
     impacts, force = run.impacts, run.dataset.contact_force
     apart = impacts.onset.values[1:] - (impacts.onset + impacts.duration).values[:-1]
     assert apart.size >= 3
@@ -111,10 +106,7 @@ def test_mirror_image_is_exact(one_mode):
             sb.System(
                 one_mode,
                 contacts=[
-                    sb.Contact(
-                        sb.Restitution(0.6),
-                        sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, side=side),
-                    )
+                    sb.Contact(sb.Restitution(0.6), sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, side=side))
                 ],
             ),
             sb.Integration(cycles=20),
@@ -131,8 +123,7 @@ def test_one_mode_has_one_shape(one_mode, coefficient):
     """Extremes at the striker and at the centre are in the ratio of the shape, exactly: no hit is passed over."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3, location=0.3)
     outcome = sb.simulate(
-        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(coefficient), shaker)]),
-        sb.Integration(cycles=30),
+        sb.System(one_mode, contacts=[sb.Contact(sb.Restitution(coefficient), shaker)]), sb.Integration(cycles=30)
     ).summary
     ratio = float(one_mode.midspan_shape[0] / one_mode.shape_at(0.3)[0])
     for name in ("min", "max"):
@@ -151,9 +142,7 @@ def test_no_force_is_told_of_an_impact_that_lasts_no_time(one_mode):
     held = sb.simulate(
         sb.System(
             one_mode,
-            contacts=[
-                sb.Contact(sb.Restitution(0.0), sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05))
-            ],
+            contacts=[sb.Contact(sb.Restitution(0.0), sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05))],
         ),
         sb.Integration(cycles=2),
     )
@@ -182,17 +171,12 @@ def test_early_termination_is_kept_and_reported(one_mode, coefficient):
 
 @pytest.mark.slow
 def test_a_map_takes_the_law(one_mode):
-    ds = swept(
-        one_mode, sb.Restitution(0.6), frequency_ratio=[0.8, 1.2], velocity_amplitude=[0.05, 0.3], cycles=10
-    )
+    ds = swept(one_mode, sb.Restitution(0.6), frequency_ratio=[0.8, 1.2], velocity_amplitude=[0.05, 0.3], cycles=10)
     assert ds.attrs["restitution_coefficient"] == 0.6
     assert (ds.response_class >= 0).all()
     run = sb.simulate(
         sb.System(
-            one_mode,
-            contacts=[
-                sb.Contact(sb.Restitution(0.6), sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.3))
-            ],
+            one_mode, contacts=[sb.Contact(sb.Restitution(0.6), sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.3))]
         ),
         sb.Integration(cycles=10),
     )
@@ -208,8 +192,7 @@ def test_results_of_many_modes_belong_to_their_number_and_the_reason_is_true():
     beam = default_values.BEAM
     total = beam.mass_per_length * beam.length
     masses = {
-        n: sb.ReducedModel.from_beam(beam, modes=n).contact_mass(default_values.LOCATION)
-        for n in (1, 16, 64, 256)
+        n: sb.ReducedModel.from_beam(beam, modes=n).contact_mass(default_values.LOCATION) for n in (1, 16, 64, 256)
     }
     assert masses[1] > masses[16] > masses[64] > masses[256]
     assert masses[256] * 256 == pytest.approx(total, rel=0.1)  # falls like rho S L / N

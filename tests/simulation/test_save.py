@@ -18,8 +18,7 @@ from start_up import start_up
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 SYSTEM = sb.System(
-    MODEL,
-    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))],
+    MODEL, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))]
 )
 RECORDED = sb.Striker(drive=start_up(MODEL, cycles=4), location=0.45)
 CASES = {
@@ -33,18 +32,12 @@ CASES = {
         ),
         sb.Integration(cycles=4),
     ),
-    "free": (
-        sb.System(MODEL, initial_state=sb.State(amplitude=0.9 * MODEL.well_amplitude)),
-        sb.Integration(cycles=3),
-    ),
+    "free": (sb.System(MODEL, initial_state=sb.State(amplitude=0.9 * MODEL.well_amplitude)), sb.Integration(cycles=3)),
     "decided": (
         SYSTEM.replace(**{"drive.velocity_amplitude": 0.36, "model.modes": 1}),
         sb.Integration(cycles=60, early_termination=True),
     ),
-    "failed": (
-        sb.System(MODEL, initial_state=sb.State(amplitude=[1e200, 0.0, 0.0])),
-        sb.Integration(cycles=3),
-    ),
+    "failed": (sb.System(MODEL, initial_state=sb.State(amplitude=[1e200, 0.0, 0.0])), sb.Integration(cycles=3)),
     "no impact ends": (SYSTEM.replace(**{"drive.velocity_amplitude": 0.0}), sb.Integration(cycles=1)),
 }
 
@@ -64,9 +57,7 @@ def test_round_trip(name: str, tmp_path) -> None:
     xr.testing.assert_identical(again.dataset, run.dataset)
     xr.testing.assert_identical(again.impacts, run.impacts)
     np.testing.assert_equal(dict(again.summary), dict(run.summary))
-    assert [type(value) for value in again.summary.values()] == [
-        type(value) for value in run.summary.values()
-    ]
+    assert [type(value) for value in again.summary.values()] == [type(value) for value in run.summary.values()]
     assert again.system == run.system and again.integration == run.integration
     assert again.accuracy == run.accuracy
     assert (again.final_state is None) == (run.final_state is None) == (name == "failed")
@@ -101,9 +92,9 @@ def test_the_file_says_what_it_is(tmp_path) -> None:
         assert {"units", "long_name"} <= variable.attrs.keys(), name
     outcome = xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="summary")
     flags = outcome.response_class.attrs
-    assert flags["flag_meanings"].split()[
-        list(flags["flag_values"]).index(int(run.summary.response_class))
-    ] == (run.summary.response_class.label.replace(" ", "_"))
+    assert flags["flag_meanings"].split()[list(flags["flag_values"]).index(int(run.summary.response_class))] == (
+        run.summary.response_class.label.replace(" ", "_")
+    )
     assert len(outcome.status.attrs["flag_meanings"].split()) == len(outcome.status.attrs["flag_values"])
     impacts = xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="impacts")
     assert impacts.peak_force.attrs["units"] == "N"

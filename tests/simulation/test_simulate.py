@@ -28,9 +28,7 @@ def simulate(modes: int, ratio: float, velocity: float, cycles: int, **options: 
     drive = {name: options.pop(name) for name in ("location", "side") if name in options}
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, **drive)
     sample_times, start = options.pop("sample_times", None), options.pop("start", None)
-    system = sb.System(
-        model_of(modes), contacts=[sb.Contact(default_values.CONTACT, shaker)], initial_state=start
-    )
+    system = sb.System(model_of(modes), contacts=[sb.Contact(default_values.CONTACT, shaker)], initial_state=start)
     return sb.simulate(system, sb.Integration(cycles=cycles, **options), sample_times=sample_times)
 
 
@@ -52,9 +50,7 @@ def assert_same(a: sb.Run, b: sb.Run) -> None:
 
 def test_dataset() -> None:
     run = simulate(3, 1.21, 0.18, 4)
-    data = check_trajectory(
-        run.dataset, require=("displacement_at_striker", "contact_force", "modal_amplitude")
-    )
+    data = check_trajectory(run.dataset, require=("displacement_at_striker", "contact_force", "modal_amplitude"))
     assert dict(data.sizes)["mode"] == 3
     assert data.mode.values.tolist() == [1, 2, 3]
     period = 1.0 / (1.21 * model_of(3).reference_frequency)
@@ -89,8 +85,7 @@ def test_energy_of_the_dataset_is_that_of_its_amplitudes() -> None:
     model = model_of(1, 0.0)
     start = (model.well_amplitude, kick(1, 0.5) * 1.0)
     data = sb.simulate(
-        sb.System(model, initial_state=sb.State(amplitude=start[0], velocity=start[1])),
-        sb.Integration(cycles=3),
+        sb.System(model, initial_state=sb.State(amplitude=start[0], velocity=start[1])), sb.Integration(cycles=3)
     ).dataset
     energy = model.kinetic_energy(start[1]) + model.potential_energy(start[0]) - model.well_energy
     np.testing.assert_allclose(data.energy_beam, energy, rtol=1e-6)
@@ -105,8 +100,7 @@ def test_free_decay_dissipates_what_the_beam_loses(modes: int, bound: float) -> 
     """Measured over eight cycles: below 3e-7; for N = 32 5.4e-5, and 2e-8 at a quarter of the step."""
     data = sb.simulate(
         sb.System(
-            model_of(modes),
-            initial_state=sb.State(amplitude=model_of(modes).well_amplitude, velocity=kick(modes, 0.6)),
+            model_of(modes), initial_state=sb.State(amplitude=model_of(modes).well_amplitude, velocity=kick(modes, 0.6))
         ),
         sb.Integration(cycles=8),
     )
@@ -134,10 +128,7 @@ def test_energy_balance(modes: int, pair: tuple[float, float]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("modes", "pair"),
-    [(n, pair) for n in (1, 8, 32) for pair in REGULAR + ELSEWHERE],
-)
+@pytest.mark.parametrize(("modes", "pair"), [(n, pair) for n in (1, 8, 32) for pair in REGULAR + ELSEWHERE])
 def test_energy_balance_of_a_full_run(modes: int, pair: tuple[float, float]) -> None:
     assert ledger_error(simulate(modes, *pair, 200)) < (1e-4 if pair in REGULAR else 1e-3)
 
@@ -228,9 +219,7 @@ def test_recording_does_not_disturb(modes: int) -> None:
     assert_same(default, single)
 
 
-@pytest.mark.parametrize(
-    ("modes", "pair", "cycles"), [(1, (1.4, 0.02), 5), (32, (0.1, 0.05), 1), (8, (3.0, 0.5), 8)]
-)
+@pytest.mark.parametrize(("modes", "pair", "cycles"), [(1, (1.4, 0.02), 5), (32, (0.1, 0.05), 1), (8, (3.0, 0.5), 8)])
 def test_default_sampling_shows_every_contact(modes: int, pair: tuple[float, float], cycles: int) -> None:
     run = simulate(modes, *pair, cycles)
     time, force = run.dataset.time.values, run.dataset.contact_force.values
@@ -249,13 +238,7 @@ def test_default_sampling_shows_every_contact(modes: int, pair: tuple[float, flo
 
 @pytest.mark.parametrize(
     ("modes", "pair", "cycles"),
-    [
-        (1, (1.21, 0.18), 8),
-        (2, (0.5, 0.4), 6),
-        (8, (1.4, 0.02), 3),
-        (8, (1.625, 0.3), 6),
-        (32, (3.0, 0.5), 8),
-    ],
+    [(1, (1.21, 0.18), 8), (2, (0.5, 0.4), 6), (8, (1.4, 0.02), 3), (8, (1.625, 0.3), 6), (32, (3.0, 0.5), 8)],
 )
 def test_response_agrees_with_the_dataset(modes: int, pair: tuple[float, float], cycles: int) -> None:
     response = (run := simulate(modes, *pair, cycles)).summary

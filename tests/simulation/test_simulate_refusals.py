@@ -18,27 +18,11 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        (
-            {"model": STRAIGHT},
-            sb.InputError,
-            r"needs a buckled beam: axial_load = 0 N must exceed .* 24.3685 N",
-        ),
+        ({"model": STRAIGHT}, sb.InputError, r"needs a buckled beam: axial_load = 0 N must exceed .* 24.3685 N"),
         ({"model": default_values.BEAM}, sb.InputTypeError, r"model = Beam\(.*: must be a ReducedModel"),
-        (
-            {"contacts": SHAKER},
-            sb.InputTypeError,
-            r"contacts = Shaker\(.*: must be a list or tuple",
-        ),
-        (
-            {"contacts": []},
-            sb.InputError,
-            r"contacts = \[\]: .* needs an initial_state",
-        ),
-        (
-            {"contacts": [SHAKER]},
-            sb.InputTypeError,
-            r"contacts\[0\] = Shaker\(.*: must be a Contact\(law, striker\)",
-        ),
+        ({"contacts": SHAKER}, sb.InputTypeError, r"contacts = Shaker\(.*: must be a list or tuple"),
+        ({"contacts": []}, sb.InputError, r"contacts = \[\]: .* needs an initial_state"),
+        ({"contacts": [SHAKER]}, sb.InputTypeError, r"contacts\[0\] = Shaker\(.*: must be a Contact\(law, striker\)"),
         ({"cycles": 0}, sb.InputError, r"cycles = 0: must be an integer in \[1, 10000000\]"),
         ({"cycles": -3}, sb.InputError, "cycles = -3: must be an integer"),
         ({"cycles": 1.5}, sb.InputError, "cycles = 1.5: must be an integer"),
@@ -110,9 +94,7 @@ def test_a_step_that_does_not_resolve_a_period_is_refused(ratio: float) -> None:
         sb.simulate,
         lambda system, integration: sb.sweep(system, {"velocity_amplitude": [0.1, 0.2]}, integration),
     ):
-        with pytest.raises(
-            sb.InputError, match=r"step = 1 s: does not resolve .*must be at most .*a quarter of it"
-        ):
+        with pytest.raises(sb.InputError, match=r"step = 1 s: does not resolve .*must be at most .*a quarter of it"):
             door(system, sb.Integration(cycles=5, step=1.0))
         with pytest.raises(sb.InputError, match=f"does not resolve {words}"):
             door(system, sb.Integration(cycles=5, step=1.01 * longest))

@@ -57,9 +57,7 @@ def same(found: sb.Run, expected: sb.Run, outcome: sb.RunSummary) -> None:
     for key, value in attrs.items():
         np.testing.assert_equal(found.dataset.attrs[key], value, err_msg=key)
     assert found.system == expected.system and found.integration == expected.integration
-    assert found.accuracy == expected.accuracy and (found.final_state is None) == (
-        expected.final_state is None
-    )
+    assert found.accuracy == expected.accuracy and (found.final_state is None) == (expected.final_state is None)
     if expected.final_state is not None and found.final_state is not None:
         np.testing.assert_array_equal(found.final_state.amplitude, expected.final_state.amplitude)
         np.testing.assert_array_equal(found.final_state.velocity, expected.final_state.velocity)
@@ -81,9 +79,7 @@ def test_a_run_that_is_stopped_leaves_nothing(tmp_path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        sb.simulate_to_file(
-            CASES["plain"][0], sb.Integration(cycles=2000), path=tmp_path / "run.nc", progress=stop
-        )
+        sb.simulate_to_file(CASES["plain"][0], sb.Integration(cycles=2000), path=tmp_path / "run.nc", progress=stop)
     assert not list(tmp_path.iterdir())
 
 

@@ -71,9 +71,7 @@ def test_a_run_ends_at_the_last_whole_piece(tmp_path, monkeypatch, system):
     count = part.dataset.sizes["time"]
     assert 4096 < count < run.dataset.sizes["time"] and part.summary.status == sb.RunStatus.INTERRUPTED
     for name, variable in part.dataset.data_vars.items():
-        np.testing.assert_array_equal(
-            variable.values, run.dataset[name].isel(time=slice(count)).values, str(name)
-        )
+        np.testing.assert_array_equal(variable.values, run.dataset[name].isel(time=slice(count)).values, str(name))
     rest = system.replace(initial_state=part.final_state)
     more = sb.simulate(rest, sb.Integration(cycles=3, early_termination=False))
     begun = more.dataset["midspan_displacement"].values[0]

@@ -101,15 +101,7 @@ def test_workers_that_are_killed_in_mid_task(tmp_path, small, whole, client):
     columns, report, _, made = computed(tmp_path / "store", work, stage, client)
     assert columns.content_hash() == whole.content_hash()
     assert report.computed == 7 and not report.failed and "failed_tasks" not in made
-    assert sorted(len(file.read_text(encoding="utf-8")) for file in tmp_path.glob("*-*")) == [
-        1,
-        1,
-        1,
-        1,
-        1,
-        2,
-        2,
-    ]
+    assert sorted(len(file.read_text(encoding="utf-8")) for file in tmp_path.glob("*-*")) == [1, 1, 1, 1, 1, 2, 2]
 
 
 @pytest.mark.slow
@@ -121,19 +113,9 @@ def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
     assert "base 2: killed its worker, 3 times" in made["failed_tasks"]
     poisoned = slice(2 * CHUNK, 3 * CHUNK)
     status = work.values("status", columns)
-    assert (status[poisoned] == RunStatus.NOT_RUN).all() and (
-        np.delete(status, np.r_[poisoned]) == RunStatus.OK
-    ).all()
+    assert (status[poisoned] == RunStatus.NOT_RUN).all() and (np.delete(status, np.r_[poisoned]) == RunStatus.OK).all()
     assert (work.values("response_class", columns)[poisoned] == ResponseClass.UNKNOWN).all()
-    assert sorted(len(file.read_text(encoding="utf-8")) for file in tmp_path.glob("*-*")) == [
-        1,
-        1,
-        1,
-        1,
-        1,
-        2,
-        3,
-    ]
+    assert sorted(len(file.read_text(encoding="utf-8")) for file in tmp_path.glob("*-*")) == [1, 1, 1, 1, 1, 2, 3]
     report = SweepReport()
     result = swept(**small, path=tmp_path / "store", report=report)  # here, and without the poison
     assert report.resumed == 6 and report.computed == 1
@@ -145,9 +127,7 @@ def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
 @pytest.mark.slow
 def test_workers_that_cannot_compute_at_all(tmp_path, small, client):
     work, stage = trouble(small, tmp_path, always=dict.fromkeys(range(7), "raise"))
-    with pytest.raises(
-        CheckpointError, match="cannot compute this sweep: a task raised RuntimeError: no luck"
-    ):
+    with pytest.raises(CheckpointError, match="cannot compute this sweep: a task raised RuntimeError: no luck"):
         computed(tmp_path / "store", work, stage, client)
 
 
@@ -198,12 +178,7 @@ def test_slurm(tmp_path):
     with jobqueue.SLURMCluster(**slurm_arguments(cluster.slurm)) as made:
         script = made.job_script()
         assert made.scheduler.address.startswith("tcp://127.0.0.1:")
-    for line in (
-        "#SBATCH -p short",
-        "#SBATCH --cpus-per-task=16",
-        "#SBATCH -t 02:00:00",
-        "module load python",
-    ):
+    for line in ("#SBATCH -p short", "#SBATCH --cpus-per-task=16", "#SBATCH -t 02:00:00", "module load python"):
         assert line in script
     assert "export OPENBLAS_NUM_THREADS=1" in script
     assert re.search(r"--nthreads 16 (--nworkers 1 )?", script)

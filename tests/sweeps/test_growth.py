@@ -58,9 +58,7 @@ def test_a_longer_map_takes_what_the_store_holds(tmp_path, small):
 def test_layers_hold_each_point_once(small):
     chain = [small, small | {"frequency_ratio": LONGER["frequency_ratio"]}, small | LONGER]
     works = [PointWork(setup_of(**each)) for each in chain]
-    earlier = [
-        {"points": work.setup.points.describe(), "axes": list(work.setup.points.names)} for work in works[:-1]
-    ]
+    earlier = [{"points": work.setup.points.describe(), "axes": list(work.setup.points.names)} for work in works[:-1]]
     layers = layers_of(works[-1], earlier, 6)
     assert [layer.stage.name for layer in layers] == ["base", "more-1", "more-2"]
     places = np.concatenate([layer.places for layer in layers])
@@ -119,9 +117,7 @@ def test_values_that_rounding_alone_tells_apart_are_those_of_the_store(tmp_path,
 
 
 def test_axes_in_another_order_and_of_other_structures_grow_too(tmp_path, model, contact):
-    system = sb.System(
-        model, contacts=[sb.Contact(contact, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))]
-    )
+    system = sb.System(model, contacts=[sb.Contact(contact, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))])
     short = {"velocity_amplitude": [0.1, 0.4], "modes": [1, 3]}
     longer = {"modes": [1, 2, 3], "velocity_amplitude": [0.1, 0.25, 0.4]}
     how = sb.Integration(cycles=3)
@@ -149,8 +145,7 @@ def test_what_cannot_grow_is_refused_with_what_to_do(tmp_path, small):
     ):
         swept(**(small | {"cycles": 6}), path=path)
     with pytest.raises(
-        sb.InputError,
-        match=r"2 of its 4 values of drive.velocity_amplitude are not among the requested values",
+        sb.InputError, match=r"2 of its 4 values of drive.velocity_amplitude are not among the requested values"
     ):
         swept(**(small | {"velocity_amplitude": np.array([0.05, 0.1, 0.6])}), path=path)
     with pytest.raises(sb.InputError, match="location"):
@@ -187,9 +182,7 @@ def test_the_command_grows_a_store_by_its_name_and_an_axis(tmp_path, monkeypatch
     run(*common, "--velocity-amplitude", "0.1:0.3:3", "--checkpoint", "s.map", "-o", "a.nc")
     said = run("--velocity-amplitude", "0.1:0.5:5", "--checkpoint", "s.map", "-o", "b.nc")
     assert "10 runs" in said or "10 of" in said or "10 remain" in said, said
-    run(
-        *common, "--velocity-amplitude", "0.1,0.2,0.3,0.4,0.5", "-o", "fresh.nc"
-    )  # 0.1:0.5:5 gives 0.3 + 4e-17
+    run(*common, "--velocity-amplitude", "0.1,0.2,0.3,0.4,0.5", "-o", "fresh.nc")  # 0.1:0.5:5 gives 0.3 + 4e-17
     with xr.open_dataset("b.nc") as grown, xr.open_dataset("fresh.nc") as fresh:
         for name in fresh.data_vars:
             np.testing.assert_array_equal(grown[name].values, fresh[name].values, err_msg=name)

@@ -47,16 +47,7 @@ def test_dataset() -> None:
         assert (ds[name].attrs["units"], ds[name].attrs["long_name"]) == (row.unit, row.long_name)
     np.testing.assert_array_equal(ds.velocity_amplitude, VELOCITY)
     system = {"modes", "damping_ratio", "contact_stiffness", "beam_length", "beam_thickness", "side"}
-    made = {
-        "cycles",
-        "reference_frequency",
-        "step",
-        "engine",
-        "snapbeam_version",
-        "title",
-        "created",
-        "command",
-    }
+    made = {"cycles", "reference_frequency", "step", "engine", "snapbeam_version", "title", "created", "command"}
     assert system | made <= set(ds.attrs)
     assert all(np.ndim(value) == 0 for value in ds.attrs.values())
     assert ds.response_class.attrs["flag_values"].tolist() == [-1, 0, 1, 2, 3]
@@ -69,9 +60,7 @@ def test_numbers_are_no_dimensions() -> None:
     assert ds.attrs["location"] == 0.4
     point = make(frequency_ratio=1.21, velocity_amplitude=0.3)
     assert point.response_class.dims == ()
-    np.testing.assert_array_equal(
-        make(frequency_ratio=[1.21]).response_class.dims, make().response_class.dims
-    )
+    np.testing.assert_array_equal(make(frequency_ratio=[1.21]).response_class.dims, make().response_class.dims)
 
 
 @pytest.mark.parametrize("modes", [1, 8])
@@ -152,23 +141,11 @@ def test_progress_and_interruption() -> None:
     ("changes", "error", "message"),
     [
         ({"frequency_ratio": []}, sb.InputError, r"frequency_ratio = \[\]: must hold at least one point"),
-        (
-            {"frequency_ratio": [1.2, 1.1]},
-            sb.InputError,
-            r"frequency_ratio\[0\] = 1.2, .* must be strictly increasing",
-        ),
+        ({"frequency_ratio": [1.2, 1.1]}, sb.InputError, r"frequency_ratio\[0\] = 1.2, .* must be strictly increasing"),
         ({"frequency_ratio": [1.0, 1.0]}, sb.InputError, "must be strictly increasing"),
-        (
-            {"frequency_ratio": 0.0},
-            sb.InputError,
-            r"frequency_ratio = 0.0: must be a finite number greater than 0",
-        ),
+        ({"frequency_ratio": 0.0}, sb.InputError, r"frequency_ratio = 0.0: must be a finite number greater than 0"),
         ({"frequency_ratio": [-1.0, 1.0]}, sb.InputError, "frequency_ratio = -1.0: must be a number in"),
-        (
-            {"frequency_ratio": [1.0, math.nan]},
-            sb.InputError,
-            r"frequency_ratio\[1\] = .*nan.*: must be finite",
-        ),
+        ({"frequency_ratio": [1.0, math.nan]}, sb.InputError, r"frequency_ratio\[1\] = .*nan.*: must be finite"),
         (
             {"frequency_ratio": math.inf},
             sb.InputError,
@@ -179,16 +156,8 @@ def test_progress_and_interruption() -> None:
             sb.InputTypeError,
             "frequency_ratio = '1.2': must be a finite number greater than 0",
         ),
-        (
-            {"frequency_ratio": [[1.0]]},
-            sb.InputError,
-            r"frequency_ratio of shape \(1, 1\): must be a number or",
-        ),
-        (
-            {"velocity_amplitude": [-0.1, 0.1]},
-            sb.InputError,
-            r"velocity_amplitude = -0.1: must be .* \[0, inf\)",
-        ),
+        ({"frequency_ratio": [[1.0]]}, sb.InputError, r"frequency_ratio of shape \(1, 1\): must be a number or"),
+        ({"velocity_amplitude": [-0.1, 0.1]}, sb.InputError, r"velocity_amplitude = -0.1: must be .* \[0, inf\)"),
         (
             {"velocity_amplitude": None},
             sb.InputTypeError,

@@ -63,24 +63,15 @@ HEADER = "frequency_ratio,velocity_amplitude,location,response_class\n"
             "frequency_ratio,frequency_hz,velocity_amplitude,response_class\n",
             "one column frequency_ratio or frequency_hz",
         ),
-        (
-            "response_class,response_class,frequency_ratio,velocity_amplitude\n",
-            "column 'response_class' occurs twice",
-        ),
+        ("response_class,response_class,frequency_ratio,velocity_amplitude\n", "column 'response_class' occurs twice"),
         (
             HEADER + "1,2,0.5,intrawell\n1,x,0.5,intrawell\n",
             "line 3, column 'velocity_amplitude': 'x' must be a number",
         ),
         (HEADER + "nan,1,0.5,intrawell\n", "line 2, column 'frequency_ratio': 'nan'"),
         (HEADER + "-1,1,0.5,intrawell\n", "column 'frequency_ratio': '-1' must be a number greater than 0"),
-        (
-            HEADER + "1,1,47,intrawell\n",
-            "column 'location': '47' must be a number greater than 0 and less than 1",
-        ),
-        (
-            HEADER + "1,1,0.5,wild\n",
-            "line 2, column 'response_class': 'wild' must be one of unknown, intrawell",
-        ),
+        (HEADER + "1,1,47,intrawell\n", "column 'location': '47' must be a number greater than 0 and less than 1"),
+        (HEADER + "1,1,0.5,wild\n", "line 2, column 'response_class': 'wild' must be one of unknown, intrawell"),
         (HEADER + "1,1\n", "line 2: has 2 cells, the header names 4"),
     ],
 )

@@ -134,16 +134,10 @@ def frame(**columns) -> pd.DataFrame:
     ("given", "message"),
     [
         ({}, "axes: must name at least one parameter to sweep"),
-        (
-            [1.0, 2.0],
-            r"axes = \[1.0, 2.0\]: must be a mapping of parameters to values, an xarray.Dataset or a table",
-        ),
+        ([1.0, 2.0], r"axes = \[1.0, 2.0\]: must be a mapping of parameters to values, an xarray.Dataset or a table"),
         ({"modes": 3}, "modes = 3: must be an array; put a single value into the system"),
         ({"modes": [1, 2], "model.modes": [1, 2]}, r"model\.modes: is given twice among the axes"),
-        (
-            {"beam.thicknes": [1e-4, 2e-4]},
-            r"beam\.thicknes: is not a parameter; did you mean 'beam\.thickness'",
-        ),
+        ({"beam.thicknes": [1e-4, 2e-4]}, r"beam\.thicknes: is not a parameter; did you mean 'beam\.thickness'"),
         ({3: [1, 2]}, "3: is not a parameter"),
         ({"integration.engine": ["native", "python"]}, r"integration\.engine: cannot be swept"),
         ({"threads": [1, 2]}, "threads: cannot be swept"),
@@ -154,18 +148,12 @@ def frame(**columns) -> pd.DataFrame:
         ({"velocity_amplitude": [-0.1, 0.1]}, r"velocity_amplitude = -0.1: must be .* \[0, inf\)"),
         ({"location": [0.5, np.nan]}, r"location\[1\] = .*nan.*: must be finite"),
         ({"location": []}, r"location = \[\]: must hold at least one point"),
-        (
-            {"location": [[0.1, 0.2]]},
-            r"location of shape \(1, 2\): must be a number or a one-dimensional array",
-        ),
+        ({"location": [[0.1, 0.2]]}, r"location of shape \(1, 2\): must be a number or a one-dimensional array"),
         ({"modes": [1.5, 2.0]}, r"modes = 1.5: must be an integer in \[1, 256\]"),
         ({"contact.side": ["below", "left"]}, "side = 'left': must be one of 'below', 'above'"),
         ({"contact.side": ["below", "below"]}, "must differ from each other"),
         ({"frequency_ratio": ["a", "b"]}, "frequency_ratio = .*must be an array of numbers"),
-        (
-            frame(frequency_ratio=[1.0, -1.0]),
-            r"frequency_ratio\[1\] = -1.0: must be a finite number greater than 0",
-        ),
+        (frame(frequency_ratio=[1.0, -1.0]), r"frequency_ratio\[1\] = -1.0: must be a finite number greater than 0"),
         (frame(modes=[1.5, 2.0]), r"modes\[0\] = 1.5: must be an integer"),
         (frame(who=["a", "b"]), "points with who: must contain a parameter"),
         (frame(frequency_ratio=[]), r"points of lengths .*: must be equal, and at least one"),
@@ -177,10 +165,7 @@ def frame(**columns) -> pd.DataFrame:
             pd.DataFrame({"frequency_ratio": [1.0], "drive.frequency_ratio": [2.0]}),
             r"drive\.frequency_ratio: is given twice among the points",
         ),
-        (
-            xr.Dataset({"location": (("x", "y"), np.full((2, 2), 0.3))}),
-            r"location of shape \(2, 2\): a list of points",
-        ),
+        (xr.Dataset({"location": (("x", "y"), np.full((2, 2), 0.3))}), r"location of shape \(2, 2\): a list of points"),
         (
             xr.Dataset({"location": ("x", [0.3, 0.4]), "modes": ("y", [1, 2, 3])}),
             r"points of lengths .*: must be equal",

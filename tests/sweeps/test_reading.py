@@ -39,9 +39,7 @@ def test_a_finished_store_is_the_map_that_was_returned(whole):
     read = sb.read_checkpoint(path)
     assert read.attrs["points_done"] == read.attrs["points_total"] == 120
     for name in sb.STATISTICS:
-        np.testing.assert_array_equal(
-            read[name].transpose(*dataset[name].dims).values, dataset[name].values, name
-        )
+        np.testing.assert_array_equal(read[name].transpose(*dataset[name].dims).values, dataset[name].values, name)
     np.testing.assert_array_equal(read["frequency_ratio"], dataset["frequency_ratio"])
     assert json.loads(read.attrs["system"]) == json.loads(dataset.attrs["system"])
 
@@ -51,9 +49,7 @@ def test_what_is_not_done_is_unknown_and_says_so(whole, tmp_path):
     half = tmp_path / "half.store"
     shutil.copytree(path, half)
     lines = (half / "tasks.jsonl").read_text(encoding="utf-8").splitlines()
-    (half / "tasks.jsonl").write_text(
-        "\n".join([*lines[:3], lines[3][:40]]), encoding="utf-8"
-    )  # the last line is torn
+    (half / "tasks.jsonl").write_text("\n".join([*lines[:3], lines[3][:40]]), encoding="utf-8")  # the last line is torn
     read = sb.read_checkpoint(half)
     assert read.attrs["points_done"] == 48
     known = read["response_class"].transpose(*dataset["response_class"].dims).values >= 0
@@ -118,12 +114,8 @@ def test_a_foreign_task_size_takes_no_memory(whole, tmp_path, where):
     path = tmp_path / "foreign.store"
     shutil.copytree(whole[0], path)
     for file in path.rglob(where):
-        text = file.read_text(encoding="utf-8").replace(
-            '"points_per_task": 16', '"points_per_task": 1000000000'
-        )
-        file.write_text(
-            text.replace('"points_per_task":16', '"points_per_task":1000000000'), encoding="utf-8"
-        )
+        text = file.read_text(encoding="utf-8").replace('"points_per_task": 16', '"points_per_task": 1000000000')
+        file.write_text(text.replace('"points_per_task":16', '"points_per_task":1000000000'), encoding="utf-8")
         if where == "zarr.json" and (found := json.loads(text)).get("node_type") == "array":
             found["chunk_grid"]["configuration"]["chunk_shape"][0] = 10**9
             file.write_text(json.dumps(found), encoding="utf-8")

@@ -49,9 +49,7 @@ class DrawnRunner:
         rows = ResultTable(
             np.stack((classes, np.zeros_like(classes)), axis=1).astype(np.int32), np.ones((stage.size, 1))
         )
-        return type(
-            "Rows", (), {"read": lambda _, a, b: ResultTable(rows.integers[a:b], rows.numbers[a:b])}
-        )()
+        return type("Rows", (), {"read": lambda _, a, b: ResultTable(rows.integers[a:b], rows.numbers[a:b])})()
 
 
 def short(points):
@@ -111,9 +109,7 @@ def test_axes_of_one_point_and_one_axis():
     grid, results = refine(DrawnRunner(flat, disc), 2)
     assert grid.shape == (1, 17)
     np.testing.assert_array_equal(results.columns.integers[:, 0].reshape(grid.shape), truth(grid, disc))
-    np.testing.assert_array_equal(
-        refined_grid(single).axes["drive.velocity_amplitude"], np.linspace(0.0, 2.0, 9)
-    )
+    np.testing.assert_array_equal(refined_grid(single).axes["drive.velocity_amplitude"], np.linspace(0.0, 2.0, 9))
 
 
 def test_three_axes():

@@ -23,8 +23,7 @@ def test_measuring_error_is_that_of_a_pixel():
 
 def starts_of(model, replicates, side="below"):
     system = sb.System(
-        model,
-        contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side=side))],
+        model, contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side=side))]
     )
     return [perturbed_start(system, replicates, repeat) for repeat in range(replicates.count)]
 
@@ -36,9 +35,7 @@ def test_starts_have_the_size_asked_for(modes):
     moved = np.array([model.midspan_shape @ (start.amplitude - model.well_amplitude) for start in starts])
     assert np.sqrt(np.mean(moved**2)) == pytest.approx(5e-6, rel=0.08)
     assert abs(moved.mean()) < 4.0 * 5e-6 / np.sqrt(2000)
-    q = np.array(
-        [np.linalg.solve(model.linear_modes, start.amplitude - model.well_amplitude) for start in starts]
-    )
+    q = np.array([np.linalg.solve(model.linear_modes, start.amplitude - model.well_amplitude) for start in starts])
     p = np.array([np.linalg.solve(model.linear_modes, start.velocity) for start in starts])
     energy = 0.5 * np.array([np.mean((q * model.omega) ** 2, axis=0), np.mean(p**2, axis=0)])
     np.testing.assert_allclose(energy, energy.mean(), rtol=0.25)  # 2000 draws: 3 % a value, 64 of them
@@ -81,9 +78,7 @@ def test_shares(small):
 def test_repeats_of_starts_that_are_swept():
     """A change is added to where each point begins, not to the rest state."""
     model = sb.ReducedModel.from_beam(BEAM, modes=2)
-    system = sb.System(
-        model, contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))]
-    )
+    system = sb.System(model, contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))])
     axes = {"initial_state.velocity[1]": [0.0, 1.0, 2.0], "velocity_amplitude": [0.02, 0.03]}
     asked = sb.Integration(cycles=3)
     ds = sb.sweep(system, axes, asked, replicates=Replicates(2, perturbation_rms=1e-15))

@@ -62,18 +62,7 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     command = [sys.executable, "-m", "snapbeam", "map", "--modes", "1"]
     command += ["--cycles", "60", "--frequency-ratio", "0.5:2:8", "--velocity-amplitude", "0.05:0.6:8"]
-    command += [
-        "--checkpoint",
-        "store",
-        "--points-per-task",
-        "4",
-        "--threads",
-        "1",
-        "--log",
-        "map.log",
-        "-o",
-        "map.nc",
-    ]
+    command += ["--checkpoint", "store", "--points-per-task", "4", "--threads", "1", "--log", "map.log", "-o", "map.nc"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     ledger = tmp_path / "store" / "tasks.jsonl"
     while not ledger.exists() or ledger.read_text(encoding="utf-8").count("\n") < 2:
@@ -109,9 +98,7 @@ def test_interrupt_keeps_what_is_finished(tmp_path):
     command = [sys.executable, "-m", "snapbeam", "map", "--modes", "1"]
     command += ["--cycles", "2000", "--frequency-ratio", "0.5:2:8", "--velocity-amplitude", "0.05:0.6:8"]
     command += ["--checkpoint", "store", "--points-per-task", "1", "--threads", "1"]
-    process = subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     ledger = tmp_path / "store" / "tasks.jsonl"
     while not ledger.exists():
         assert process.poll() is None
@@ -144,9 +131,7 @@ def test_the_file_is_the_map(tmp_path, small):
     """Written a block at a time, the file is what xarray would write of the map in memory."""
     whole = swept(**small)
     report = SweepReport()
-    stored = swept(
-        **small, path=tmp_path / "store", points_per_task=6, output=tmp_path / "a.nc", report=report
-    )
+    stored = swept(**small, path=tmp_path / "store", points_per_task=6, output=tmp_path / "a.nc", report=report)
     assert (report.tasks, report.resumed, report.computed, report.runs) == (4, 0, 4, 20)
     whole.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
     expected = xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf")
@@ -161,9 +146,7 @@ def test_the_file_is_the_map(tmp_path, small):
     point = swept(**flat, path=tmp_path / "point", output=tmp_path / "point.nc")
     xr.testing.assert_equal(point.load(), swept(**flat))
     deep = dict(small, location=[0.3, 0.45])
-    xr.testing.assert_equal(
-        swept(**deep, path=tmp_path / "deep", output=tmp_path / "deep.nc").load(), swept(**deep)
-    )
+    xr.testing.assert_equal(swept(**deep, path=tmp_path / "deep", output=tmp_path / "deep.nc").load(), swept(**deep))
 
 
 def test_task_size():
@@ -194,10 +177,7 @@ def test_memory_does_not_grow_with_the_map(tmp_path):
         folder = tmp_path / str(side)
         folder.mkdir()
         done = subprocess.run(
-            [sys.executable, "-c", MEMORY, str(side), str(folder)],
-            capture_output=True,
-            text=True,
-            timeout=7200,
+            [sys.executable, "-c", MEMORY, str(side), str(folder)], capture_output=True, text=True, timeout=7200
         )
         assert done.returncode == 0, done.stderr
         peak[side] = float(done.stdout)

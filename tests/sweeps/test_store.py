@@ -22,13 +22,7 @@ from snapbeam.cli.app import app
 from snapbeam.sweeps.checkpoint import records as durable
 from snapbeam.sweeps.checkpoint import records as ledger
 from snapbeam.sweeps.checkpoint import store as tables
-from snapbeam.sweeps.checkpoint.records import (
-    CheckpointError,
-    CheckpointLock,
-    TaskLog,
-    TaskRecord,
-    append_line,
-)
+from snapbeam.sweeps.checkpoint.records import CheckpointError, CheckpointLock, TaskLog, TaskRecord, append_line
 from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.compute import SweepReport
 from snapbeam.sweeps.tasks import PointWork, Stage
@@ -208,9 +202,7 @@ def test_a_damaged_description_is_told(stored, work):
         Checkpoint(path, work)
 
 
-@pytest.mark.parametrize(
-    "where", ["map.json", "tasks.jsonl", "runs.zarr/base/numbers/c.1.0", "runs.zarr/base"]
-)
+@pytest.mark.parametrize("where", ["map.json", "tasks.jsonl", "runs.zarr/base/numbers/c.1.0", "runs.zarr/base"])
 def test_links_are_refused(stored, work, tmp_path, where):
     path, _ = stored
     moved = tmp_path / "elsewhere"
@@ -248,9 +240,7 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(stored, work):
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout.readline() == "held\n"
-            with pytest.raises(
-                CheckpointError, match=f"another process is writing it .process {process.pid}."
-            ):
+            with pytest.raises(CheckpointError, match=f"another process is writing it .process {process.pid}."):
                 Checkpoint(path, work)
         finally:
             process.send_signal(signal.SIGKILL)
@@ -338,9 +328,7 @@ def test_a_full_file_system(small_disk, tmp_path, monkeypatch):
     assert again.exit_code == 0, again.output
     assert f"{len(done)} resumed, {40 - len(done)} computed, 0 damaged" in again.stdout
     CliRunner().invoke(app, [*command, "-o", "b.nc"])
-    xr.testing.assert_equal(
-        xr.load_dataset("a.nc", engine="h5netcdf"), xr.load_dataset("b.nc", engine="h5netcdf")
-    )
+    xr.testing.assert_equal(xr.load_dataset("a.nc", engine="h5netcdf"), xr.load_dataset("b.nc", engine="h5netcdf"))
 
 
 def test_verify_repairs_and_computes_nothing_else(tmp_path, small, work):

@@ -30,9 +30,7 @@ AXES = {
 def system() -> sb.System:
     return sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
-        contacts=[
-            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3))
-        ],
+        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3))],
     )
 
 
@@ -70,9 +68,7 @@ def test_labels(whole, system) -> None:
     assert whole.attrs["velocity_amplitude"] == 0.3
     assert float(whole.velocity_amplitude) == 0.3
     for i, level in enumerate(AXES["beam.buckling_level"]):
-        other = system.replace(
-            **{"beam.buckling_level": level, "model.damping_ratio": 0.01, "model.modes": 4}
-        )
+        other = system.replace(**{"beam.buckling_level": level, "model.damping_ratio": 0.01, "model.modes": 4})
         assert whole.reference_frequency.values[i, 1, 1] == other.model.reference_frequency
         assert whole.length_scale.values[i, 1, 1] == level
 
@@ -97,9 +93,7 @@ def test_axes_in_another_order_are_the_same_points(whole, system) -> None:
     other = sb.sweep(system, {name: AXES[name] for name in names}, ASKED)
     assert other.response_class.dims == ("frequency_ratio", "modes", "beam_buckling_level", "damping_ratio")
     for name in STATISTICS:
-        np.testing.assert_array_equal(
-            other[name].transpose(*whole.response_class.dims), whole[name], err_msg=name
-        )
+        np.testing.assert_array_equal(other[name].transpose(*whole.response_class.dims), whole[name], err_msg=name)
 
 
 def test_parts_stores_and_threads(whole, system, tmp_path) -> None:
@@ -116,13 +110,9 @@ def test_parts_stores_and_threads(whole, system, tmp_path) -> None:
     again = sb.sweep(system, AXES, ASKED, checkpoint=sb.CheckpointOptions(tmp_path / "store", report=report))
     xr.testing.assert_equal(again, whole)
     assert (report.tasks, report.resumed, report.computed) == (7, 7, 0)
-    with pytest.raises(
-        InputError, match=r"points\.model\.modes: \[1, 4\] in the checkpoint, \[1, 3\] requested"
-    ):
+    with pytest.raises(InputError, match=r"points\.model\.modes: \[1, 4\] in the checkpoint, \[1, 3\] requested"):
         sb.sweep(system, AXES | {"modes": [1, 3]}, ASKED, checkpoint=tmp_path / "store")
-    with pytest.raises(
-        InputError, match=r"system\.beam\.thickness: 0\.0004 in the checkpoint, 0\.00041 requested"
-    ):
+    with pytest.raises(InputError, match=r"system\.beam\.thickness: 0\.0004 in the checkpoint, 0\.00041 requested"):
         sb.sweep(system.replace(**{"beam.thickness": 4.1e-4}), AXES, ASKED, checkpoint=tmp_path / "store")
 
 
@@ -146,11 +136,7 @@ def test_the_file_is_the_map(whole, system, tmp_path) -> None:
 def test_on_a_cluster(whole, system, tmp_path) -> None:
     pytest.importorskip("distributed")
     there = sb.sweep(
-        system,
-        AXES,
-        ASKED,
-        checkpoint=sb.CheckpointOptions(tmp_path / "store", points_per_task=9),
-        cluster="local:2",
+        system, AXES, ASKED, checkpoint=sb.CheckpointOptions(tmp_path / "store", points_per_task=9), cluster="local:2"
     )
     xr.testing.assert_equal(there, whole)
 
@@ -214,9 +200,7 @@ def test_an_axis_over(name: str, system) -> None:
     (dim,) = ds.response_class.dims
     for i, value in enumerate(SINGLE[name]):
         if name.startswith("integration."):
-            assert_point_is_run(
-                ds.isel({dim: i}), system, ASKED.replace(**{name.removeprefix("integration."): value})
-            )
+            assert_point_is_run(ds.isel({dim: i}), system, ASKED.replace(**{name.removeprefix("integration."): value}))
         else:
             assert_point_is_run(ds.isel({dim: i}), system.replace(**{name: value}))
 
@@ -244,15 +228,13 @@ def test_recorded_drives(system) -> None:
             velocity=0.018 * np.cos(600.0 * t),
             sampling_frequency=20_000.0,
             frequency=95.0,
-        ),
+        )
     )
     shaken = system.replace(**{"contact.striker": record})
     ds = sb.sweep(shaken, {"location": [0.3, 0.5], "modes": [1, 2]}, sb.Integration())
     assert ds.attrs["cycles"] == pytest.approx(record.drive.duration * 95.0)
     for i, j in itertools.product(range(2), range(2)):
-        changed = shaken.replace(
-            **{"contact.location": ds.location[i].item(), "model.modes": ds.modes[j].item()}
-        )
+        changed = shaken.replace(**{"contact.location": ds.location[i].item(), "model.modes": ds.modes[j].item()})
         assert_point_is_run(ds.isel(location=i, modes=j), changed, sb.Integration())
 
 
@@ -262,9 +244,7 @@ def test_starts_of_a_free_beam(system) -> None:
     axes = {"initial_state.amplitude[1]": [-1.0, 0.2, 1.0], "initial_state.velocity[1]": [0.0, 0.7, 1.9]}
     ds = sb.sweep(free, axes, ASKED)
     for i, j in itertools.product(range(3), range(3)):
-        begun = free.replace(
-            **{name: values[k] for (name, values), k in zip(axes.items(), (i, j), strict=True)}
-        )
+        begun = free.replace(**{name: values[k] for (name, values), k in zip(axes.items(), (i, j), strict=True)})
         assert_point_is_run(ds.isel(initial_state_amplitude_1=i, initial_state_velocity_1=j), begun)
     alone = sb.sweep(free, {name: values[1:] for name, values in axes.items()}, ASKED)
     for name in STATISTICS:
@@ -284,9 +264,7 @@ def test_a_basin_of_attraction(system, tmp_path) -> None:
     at_rest = ds.sel(initial_state_velocity_1=0.0).squeeze()
     near = abs(abs(at_rest.initial_state_amplitude_1) - 1.0) < 0.3
     assert near.sum() == 6
-    assert (at_rest.final_well[near] == np.sign(at_rest.initial_state_amplitude_1[near])).all(), (
-        "each in its own well"
-    )
+    assert (at_rest.final_well[near] == np.sign(at_rest.initial_state_amplitude_1[near])).all(), "each in its own well"
     ax = plot_response_map(ds)
     assert "start" in ax.get_xlabel() and "start" in ax.get_ylabel()
     assert ax.get_xlim()[0] < -1.0, "negative amplitudes are shown"
@@ -326,10 +304,7 @@ def test_a_list_point_for_point(table, system, tmp_path) -> None:
         )  # fmt: skip
         assert_point_is_run(ds.isel(point=i), changed)
         assert float(ds.reference_frequency[i]) == changed.model.reference_frequency
-    assert (
-        not {"modes", "reference_frequency", "beam_thickness", "location", "frequency_ratio"}
-        & ds.attrs.keys()
-    )
+    assert not {"modes", "reference_frequency", "beam_thickness", "location", "frequency_ratio"} & ds.attrs.keys()
     turned = sb.sweep(system, table.iloc[::-1], ASKED)
     for name in STATISTICS:
         np.testing.assert_array_equal(turned[name][::-1], ds[name], err_msg=name)
@@ -370,9 +345,7 @@ def test_a_structure_that_is_none_is_refused_before_any_run(system, monkeypatch)
         InputError, match=r"at beam\.thickness = 0\.0005: a run needs a buckled beam: axial_load = 30 N"
     ):
         sb.sweep(loaded, {"beam.thickness": [4e-4, 5e-4], "frequency_ratio": [1.0, 1.2]}, ASKED)
-    with pytest.raises(
-        InputError, match=r"initial_state\.amplitude\[2\]: mode = 2: must be an integer in \[1, 1\]"
-    ):
+    with pytest.raises(InputError, match=r"initial_state\.amplitude\[2\]: mode = 2: must be an integer in \[1, 1\]"):
         sb.sweep(system, pd.DataFrame({"modes": [2, 1], "initial_state.amplitude[2]": [0.1, 0.1]}), ASKED)
 
 
@@ -396,11 +369,7 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
     ("call", "error", "message"),
     [
         (lambda s: sb.sweep(s.model, {"location": [0.3]}), InputTypeError, "must be a System"),
-        (
-            lambda s: sb.sweep(s, {"location": [0.3]}, 200),
-            InputTypeError,
-            "integration = 200: must be an Integration",
-        ),
+        (lambda s: sb.sweep(s, {"location": [0.3]}, 200), InputTypeError, "integration = 200: must be an Integration"),
         (
             lambda s: sb.sweep(s, {"location": [0.3]}, sb.Integration(tolerance=1e-3)),
             InputError,
@@ -412,9 +381,7 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
             r"contact\.coefficient: is not a parameter of this system; its parameters are beam\.length",
         ),
         (
-            lambda s: sb.sweep(
-                sb.System(s.model, initial_state=sb.State(amplitude=[0.0, 0.0])), {"location": [0.3]}
-            ),
+            lambda s: sb.sweep(sb.System(s.model, initial_state=sb.State(amplitude=[0.0, 0.0])), {"location": [0.3]}),
             InputError,
             r"contact\.location: is not a parameter of this system",
         ),
@@ -433,21 +400,9 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
             InputError,
             r"mode = 9: must be an integer in \[1, 2\]",
         ),
-        (
-            lambda s: sb.sweep(s, {"location": [0.3]}, replicates="many"),
-            InputTypeError,
-            "replicates = 'many'",
-        ),
-        (
-            lambda s: sb.sweep(s, {"location": [0.3]}, checkpoint=3),
-            InputTypeError,
-            "checkpoint = 3: must be a folder",
-        ),
-        (
-            lambda s: sb.sweep(s, {"location": [0.3]}, cluster="local:2"),
-            InputError,
-            "cluster: needs a checkpoint",
-        ),
+        (lambda s: sb.sweep(s, {"location": [0.3]}, replicates="many"), InputTypeError, "replicates = 'many'"),
+        (lambda s: sb.sweep(s, {"location": [0.3]}, checkpoint=3), InputTypeError, "checkpoint = 3: must be a folder"),
+        (lambda s: sb.sweep(s, {"location": [0.3]}, cluster="local:2"), InputError, "cluster: needs a checkpoint"),
         (lambda s: sb.sweep(s, {"location": [0.3]}, refine_levels=-1), InputError, "refine_levels = -1"),
         (lambda s: sb.sweep(s, {"location": [0.3]}, output="map.csv"), InputError, r"must end in \.nc"),
         (

@@ -121,12 +121,7 @@ def test_several_numbers_of_modes():
     axes = {"modes": [1, 2], "frequency_ratio": np.linspace(0.5, 1.5, 4)}
     amplitude, asked, seen = np.linspace(0.02, 0.6, 8), sb.Integration(cycles=4), []
     both = sb.threshold(
-        SYSTEM,
-        "velocity_amplitude",
-        amplitude,
-        axes,
-        asked,
-        progress=lambda done, total: seen.append((done, total)),
+        SYSTEM, "velocity_amplitude", amplitude, axes, asked, progress=lambda done, total: seen.append((done, total))
     )
     assert both["lower_threshold"].dims == ("modes", "frequency_ratio")
     assert both["modes"].values.tolist() == [1, 2]
@@ -134,21 +129,14 @@ def test_several_numbers_of_modes():
     assert both.attrs["runs"] == 64
     assert seen[-1] == (64, 64) and all(a[0] <= b[0] for a, b in itertools.pairwise(seen))
     two = SYSTEM.replace(**{"model.modes": 2})
-    alone = sb.threshold(
-        two, "velocity_amplitude", amplitude, {"frequency_ratio": axes["frequency_ratio"]}, asked
-    )
+    alone = sb.threshold(two, "velocity_amplitude", amplitude, {"frequency_ratio": axes["frequency_ratio"]}, asked)
     np.testing.assert_array_equal(both["lower_threshold"].sel(modes=2), alone["lower_threshold"])
 
 
 @pytest.mark.parametrize(
     ("parameter", "values", "axes", "message"),
     [
-        (
-            "modes",
-            [1, 2],
-            {"frequency_ratio": [0.5, 1.0]},
-            "parameter = 'modes': must be a number that may differ",
-        ),
+        ("modes", [1, 2], {"frequency_ratio": [0.5, 1.0]}, "parameter = 'modes': must be a number that may differ"),
         ("velocity_amplitude", AMPLITUDE, [1.0], "axes = .*: must map parameters to arrays"),
         ("velocity_amplitude", 0.3, {"frequency_ratio": [0.5, 1.0]}, "at least two values to choose from"),
         ("velocity_amplitude", [0.3, 0.1], {"frequency_ratio": [0.5, 1.0]}, "must be strictly increasing"),

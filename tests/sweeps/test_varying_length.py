@@ -30,9 +30,7 @@ def test_the_buckling_level_along_an_axis(tmp_path):
         assert single[name].attrs["units"] == "1" and single[name].attrs["long_name"].endswith("over b")
         assert float(found[name][i]) == pytest.approx(level * float(single[name][0]), rel=1e-9)
         speed = 2.0 * np.pi * system_of(level).model.reference_frequency * level
-        assert float(found["rms_velocity"][i]) == pytest.approx(
-            speed * float(single["rms_velocity"][0]), rel=1e-9
-        )
+        assert float(found["rms_velocity"][i]) == pytest.approx(speed * float(single["rms_velocity"][0]), rel=1e-9)
 
 
 def test_a_damping_axis_keeps_b():

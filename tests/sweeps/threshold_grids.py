@@ -43,6 +43,4 @@ def stand_in(monkeypatch, columns: str) -> np.ndarray:
 def thresholds_of(monkeypatch, columns: str):
     """The threshold dataset of such columns."""
     ratio = stand_in(monkeypatch, columns)
-    return sb.threshold(
-        SYSTEM, "velocity_amplitude", AMPLITUDE, {"frequency_ratio": ratio}, sb.Integration(cycles=1)
-    )
+    return sb.threshold(SYSTEM, "velocity_amplitude", AMPLITUDE, {"frequency_ratio": ratio}, sb.Integration(cycles=1))

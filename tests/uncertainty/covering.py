@@ -18,6 +18,7 @@ from snapbeam.dynamics.lifetimes import fit_lifetime
 from snapbeam.uncertainty.posterior import _population
 from snapbeam.uncertainty.probability import allocate
 from snapbeam.uncertainty.quantiles import crossing, local_crossing, search
+from snapbeam.uncertainty.sensitivity_analysis import first_order
 from snapbeam.util.files import atomic_path
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
@@ -40,7 +41,7 @@ class Counted(NamedTuple):
         return float(np.mean(list(self.shares.values())))
 
 
-def proportions(method: str) -> Counted:
+def proportions() -> Counted:
     """Runs of a point stop once its interval is narrow; probabilities are spread evenly over (0, 1)."""
     truth = (np.arange(10 * TRIALS) + 0.5) / (10 * TRIALS)
     ranks = np.random.default_rng(5)
@@ -49,7 +50,7 @@ def proportions(method: str) -> Counted:
         hits = ranks.random(which.size) < truth[which]
         return np.stack([hits] * 4), np.zeros(which.size, dtype=bool)
 
-    allocation = sb.uncertainty.SamplingPlan(half_width=0.05, interval=method)
+    allocation = sb.uncertainty.SamplingPlan(half_width=0.05)
     _, low, high = allocate(ask, truth.size, allocation).limits(allocation, 0)
     return Counted(truth.size, {"probability": float(((low <= truth) & (truth <= high)).mean())})
 
@@ -72,9 +73,7 @@ def thresholds() -> Counted:
             held[trial, i] = low <= true[i] <= high
             found = local_crossing(runs.values, runs.hits, level, max(low, 0.0), min(high, 1.0), 3.0)
             off[trial, i] = found - true[i]
-    return Counted(
-        TRIALS, {f"V at P = {p:g}": float(s) for p, s in zip(LEVELS, held.mean(axis=0), strict=True)}
-    )
+    return Counted(TRIALS, {f"V at P = {p:g}": float(s) for p, s in zip(LEVELS, held.mean(axis=0), strict=True)})
 
 
 def _indices(given: bool) -> Counted:
@@ -84,7 +83,7 @@ def _indices(given: bool) -> Counted:
     for seed in range(TRIALS):
         if given:
             ranks = np.random.default_rng(seed).random((2000, 3))
-            one = sb.uncertainty.sobol_indices_from_samples(ranks, ishigami(ranks.T), rng=seed)
+            one = first_order(ranks, ishigami(ranks.T), 0.95, seed)
             held.append(np.concatenate([(one.low <= FIRST) & (FIRST <= one.high)]))
             continue
         both = sb.uncertainty.sobol_indices(ishigami, 3, 64, rng=seed)
@@ -139,12 +138,8 @@ def posterior() -> Counted:
 
         logs, weights, *_ = _population(terms, np.zeros(2), 400, trial)
         limits = sb.uncertainty.Posterior(("beam.thickness", "beam.buckling_level"), logs, weights).interval()
-        held.append(
-            [low <= value <= high for (_, low, high), value in zip(limits.values(), truth, strict=True)]
-        )
-    return Counted(
-        TRIALS, dict(zip(("thickness", "buckling level"), np.mean(held, axis=0).tolist(), strict=True))
-    )
+        held.append([low <= value <= high for (_, low, high), value in zip(limits.values(), truth, strict=True)])
+    return Counted(TRIALS, dict(zip(("thickness", "buckling level"), np.mean(held, axis=0).tolist(), strict=True)))
 
 
 def waveforms(trials: int = TRIALS) -> Counted:
@@ -176,8 +171,7 @@ def waveforms(trials: int = TRIALS) -> Counted:
 
 
 KINDS: dict[str, tuple[str, Callable[[], Counted]]] = {
-    "wilson": ("probability, runs stop early (Wilson)", lambda: proportions("wilson")),
-    "jeffreys": ("probability, runs stop early (Jeffreys)", lambda: proportions("jeffreys")),
+    "wilson": ("probability, runs stop early (Wilson)", proportions),
     "thresholds": ("quantile thresholds", thresholds),
     "sobol": ("Sobol's indices of Ishigami's function", lambda: _indices(False)),
     "given": ("indices of given data", lambda: _indices(True)),
@@ -196,19 +190,12 @@ def stored() -> dict[str, dict]:
 
 def text() -> str:
     """A table; ± is two standard errors of counting."""
-    lines = [
-        "| 95 % interval | trials | coverage | coverage of each quantity |",
-        "|---|---|---|---|",
-    ]
+    lines = ["| 95 % interval | trials | coverage | coverage of each quantity |", "|---|---|---|---|"]
     for name, one in stored().items():
         shares = one["shares"]
         value = float(np.mean(list(shares.values())))
         error = 2.0 * (value * (1.0 - value) / (one["trials"] * len(shares))) ** 0.5
-        each = (
-            ", ".join(f"{what} {100.0 * share:.1f} %" for what, share in shares.items())
-            if len(shares) > 1
-            else ""
-        )
+        each = ", ".join(f"{what} {100.0 * share:.1f} %" for what, share in shares.items()) if len(shares) > 1 else ""
         told = f"{100.0 * value:.1f} ± {100.0 * error:.1f} %"
         lines.append(f"| {KINDS[name][0]} | {one['trials']} | {told} | {each} |")
     return "\n".join(lines) + "\n"

@@ -11,9 +11,7 @@ from snapbeam.model import default_values
 from snapbeam.util.validation import InputError
 
 GAP = 0.1 * default_values.BEAM.buckling_level
-SPREAD = sb.uncertainty.ParameterUncertainty(
-    of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)}
-)
+SPREAD = sb.uncertainty.ParameterUncertainty(of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)})
 HOW = sb.Integration(cycles=3, threads=1)
 
 
@@ -22,8 +20,7 @@ def between_two() -> sb.System:
     one = small_system(3)
     stop = sb.Striker(drive=sb.FixedStop(), location=0.5, side="above", gap=GAP)
     return sb.System(
-        one.model,
-        contacts=[sb.Contact(default_values.CONTACT, one.striker), sb.Contact(default_values.CONTACT, stop)],
+        one.model, contacts=[sb.Contact(default_values.CONTACT, one.striker), sb.Contact(default_values.CONTACT, stop)]
     )
 
 

@@ -147,9 +147,7 @@ def test_a_gradient_says_which_way_was_taken() -> None:
         sb.simulate(system.replace(**{names[0]: value * (1.0 + side * step)}), how).summary.striker_work
         for side in (1.0, -1.0)
     ]
-    assert found["derivative"].values[0] == pytest.approx(
-        (ends[0] - ends[1]) / (2.0 * step * value), rel=1e-4
-    )
+    assert found["derivative"].values[0] == pytest.approx((ends[0] - ends[1]) / (2.0 * step * value), rel=1e-4)
 
 
 def test_jumps_that_move_take_differences() -> None:
@@ -161,10 +159,7 @@ def test_jumps_that_move_take_differences() -> None:
     )
     assert found["method"].values.tolist() == ["differences", "exact"]
     one = sb.uncertainty.gradient(
-        system,
-        lambda near: sb.simulate(near, how).summary.impulse,
-        "drive.velocity_amplitude",
-        integration=how,
+        system, lambda near: sb.simulate(near, how).summary.impulse, "drive.velocity_amplitude", integration=how
     )
     assert one["method"].values.tolist() == ["differences"]
     assert found["derivative"].values[1] == pytest.approx(one["derivative"].values[0], rel=1e-4)

@@ -40,9 +40,7 @@ def test_derivatives_of_runs_are_those_of_two_runs(quantity: str) -> None:
     for name, derivative in zip(names, found["derivative"].values, strict=True):
         value, step = system.get(name), 1e-5
         ends = [
-            getattr(
-                sb.simulate(system.replace(**{name: value * (1.0 + sign * step)}), PRECISE).summary, quantity
-            )
+            getattr(sb.simulate(system.replace(**{name: value * (1.0 + sign * step)}), PRECISE).summary, quantity)
             for sign in (1.0, -1.0)
         ]
         # two runs move their steps against the maximum, which a cubic finds between them

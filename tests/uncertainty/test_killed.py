@@ -20,17 +20,14 @@ SPREAD = sb.uncertainty.ParameterUncertainty(
     of={"velocity_amplitude": sb.uncertainty.Normal(0.05, relative=True)}, phase=True, displacement=3e-6
 )
 WIDE = sb.uncertainty.ParameterUncertainty(
-    of={"location": sb.uncertainty.Normal(0.01), "contact.stiffness": sb.uncertainty.LogNormal(0.2)},
-    phase=True,
+    of={"location": sb.uncertainty.Normal(0.01), "contact.stiffness": sb.uncertainty.LogNormal(0.2)}, phase=True
 )
 
 
 def probability(store):
     axes = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": np.linspace(0.06, 0.3, 6)}
     runs = sb.uncertainty.SamplingPlan(half_width=0.08, initial_runs=16, max_runs=160)
-    return sb.uncertainty.probability_map(
-        small_system(), axes, SPREAD, runs, integration=HOW, checkpoint=store
-    )
+    return sb.uncertainty.probability_map(small_system(), axes, SPREAD, runs, integration=HOW, checkpoint=store)
 
 
 def optimum(store):
@@ -45,9 +42,7 @@ def optimum(store):
 
 
 def tornado(store):
-    return sb.uncertainty.sensitivity(
-        small_system(), "peak_force", WIDE, samples=80, integration=HOW, checkpoint=store
-    )
+    return sb.uncertainty.sensitivity(small_system(), "peak_force", WIDE, samples=80, integration=HOW, checkpoint=store)
 
 
 def kept(store: Path) -> int:
@@ -94,7 +89,4 @@ def test_nothing_is_lost_when_killed(make, tmp_path) -> None:
     assert tally.resumed >= KILLS, "what was done before each kill is read again"
     print(make.__name__, kills, "kills;", tally)
     after = sb.SweepReport()
-    assert (
-        make(sb.CheckpointOptions(store, points_per_task=CHUNK, report=after)).equals(whole)
-        and after.runs == 0
-    )
+    assert make(sb.CheckpointOptions(store, points_per_task=CHUNK, report=after)).equals(whole) and after.runs == 0

@@ -11,9 +11,7 @@ from snapbeam.plot.uncertainty import plot_designs
 from snapbeam.uncertainty.differential_evolution import front_of
 from snapbeam.util.validation import InputError
 
-SPREAD = sb.uncertainty.ParameterUncertainty(
-    of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)}
-)
+SPREAD = sb.uncertainty.ParameterUncertainty(of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)})
 HOW = sb.Integration(cycles=1, threads=1)
 
 
@@ -25,9 +23,7 @@ def noisy(x, draws: int = 64):
     rank = np.random.Generator(np.random.Philox(key=[7, 0])).random(draws)
     chance = 1.0 / (1.0 + np.exp(-12.0 * (x[:, 0] + 0.5 * x[:, 1] - 0.6)))
     share = (rank[None, :] < chance[:, None]).mean(axis=1)
-    goal = (
-        1.0 + x[:, 0] ** 2 + 2.0 * (x[:, 1] - 0.1 * np.sin(9.0 * x[:, 0])) ** 2 + 0.5 * (x[:, 2] - 0.3) ** 2
-    )
+    goal = 1.0 + x[:, 0] ** 2 + 2.0 * (x[:, 1] - 0.1 * np.sin(9.0 * x[:, 0])) ** 2 + 0.5 * (x[:, 2] - 0.3) ** 2
     return goal[:, None], np.maximum(0.0, 0.95 - share)
 
 
@@ -115,9 +111,7 @@ def test_a_design_is_brought_to_its_constraint() -> None:
     effort = sb.uncertainty.OptimizerSettings(
         generations=40, population=8, samples=40, validation_samples=400, candidates=4
     )
-    wide = sb.uncertainty.ParameterUncertainty(
-        of={"velocity_amplitude": sb.uncertainty.Normal(0.1, relative=True)}
-    )
+    wide = sb.uncertainty.ParameterUncertainty(of={"velocity_amplitude": sb.uncertainty.Normal(0.1, relative=True)})
     ds = sb.uncertainty.optimize_design(
         system, {"velocity_amplitude": (0.005, 0.03)}, "velocity_amplitude",
         sb.uncertainty.Constraint(quantity="snap", lower=0.8), wide, effort, integration=HOW,
@@ -150,22 +144,18 @@ def test_refinement_is_bisection_towards_better_designs() -> None:
         def estimate(x, numbers, confidence):
             share = 1.0 / (1.0 + np.exp(-20.0 * (x[0] - 0.4)))
             hits = int(np.round(share * numbers.size))
-            _, low, high = (float(each) for each in wilson(hits, numbers.size, confidence))
-            return optimization.Estimate(
-                np.array([[x[0]] * 3]), np.array([[share, low, high]]), numbers.size, 0
-            )
+            _, low, high = (float(each) for each in proportion(hits, numbers.size, confidence))
+            return optimization.Estimate(np.array([[x[0]] * 3]), np.array([[share, low, high]]), numbers.size, 0)
 
-    from snapbeam.uncertainty.monte_carlo import wilson
+    from snapbeam.util.proportions import proportion
 
     needed = optimization._share_for(0.8, 400)
-    assert wilson(int(needed * 400) - 1, 400)[1] < 0.8 <= wilson(round(needed * 400), 400)[1]
+    assert proportion(int(needed * 400) - 1, 400)[1] < 0.8 <= proportion(round(needed * 400), 400)[1]
     exact = 0.4 + np.log(needed / (1.0 - needed)) / 20.0
     effort = sb.uncertainty.OptimizerSettings(refinements=14)
     # the search found a design that is too dear; the others violate the constraint
     x = np.array([[0.7, 0.5], [0.3, 0.5], [0.9, 0.1]])
-    made = optimization._refined(
-        Known(), effort, x, np.array([[0.7], [np.inf], [0.9]]), np.array([0.0, 0.4, 0.0])
-    )
+    made = optimization._refined(Known(), effort, x, np.array([[0.7], [np.inf], [0.9]]), np.array([0.0, 0.4, 0.0]))
     chosen = np.concatenate([x, made.x])[made.chosen]
     assert exact - 1e-3 <= chosen[0] < exact + 2e-3 and "to a constraint" in made.reason
     # the best of the search does not hold on validation samples, the next one does
@@ -264,10 +254,7 @@ def test_intervals_of_objectives_cover() -> None:
         (lambda: sb.uncertainty.Objective(quantity="peak_farce"), "is not a quantity"),
         (lambda: sb.uncertainty.Objective(quantity="snap", quantile=0.5), "quantiles"),
         (lambda: sb.uncertainty.Constraint(quantity="peak_force"), "must have lower or upper"),
-        (
-            lambda: sb.uncertainty.Constraint(quantity="snap", upper=0.5),
-            "give its minimum probability as lower",
-        ),
+        (lambda: sb.uncertainty.Constraint(quantity="snap", upper=0.5), "give its minimum probability as lower"),
         (lambda: sb.uncertainty.OptimizerSettings(population=2), "population"),
         (lambda: sb.uncertainty.optimize_design(small_system(), {}, "speed", [], SPREAD), "variables"),
         (
@@ -275,9 +262,7 @@ def test_intervals_of_objectives_cover() -> None:
             "cannot be chosen",
         ),
         (
-            lambda: sb.uncertainty.optimize_design(
-                small_system(), {"location": (0.5, 0.2)}, "speed", [], SPREAD
-            ),
+            lambda: sb.uncertainty.optimize_design(small_system(), {"location": (0.5, 0.2)}, "speed", [], SPREAD),
             "less than high",
         ),
         (

@@ -35,18 +35,14 @@ def test_better_than_as_many_random_designs_of_a_beam() -> None:
         found = float(ds["objective_speed"][0])
         wins += found < best
         kept += int(ds["constraints_satisfied"][0]) > 0 and float(ds["satisfied_snap"][0]) >= 0.8
-        print(
-            seed, f"found {found:.5f} random {best:.5f} kept {float(ds['satisfied_snap'][0]):.3f}", flush=True
-        )
+        print(seed, f"found {found:.5f} random {best:.5f} kept {float(ds['satisfied_snap'][0]):.3f}", flush=True)
     assert wins == 20 and kept == 20
 
 
 @pytest.mark.parametrize("place", [0.25, 0.4])
 def test_the_quasi_static_threshold_is_the_optimum(place: float) -> None:
     """One mode at Omega = 0.02: the least V that snaps nearly always is V_QS1(x_s), at more places than one."""
-    spread = sb.uncertainty.ParameterUncertainty(
-        of={"velocity_amplitude": sb.uncertainty.Normal(0.001, relative=True)}
-    )
+    spread = sb.uncertainty.ParameterUncertainty(of={"velocity_amplitude": sb.uncertainty.Normal(0.001, relative=True)})
     effort = sb.uncertainty.OptimizerSettings(
         generations=10, population=6, samples=8, validation_samples=40, candidates=3
     )

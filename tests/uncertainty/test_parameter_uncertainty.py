@@ -18,12 +18,10 @@ NUMBERS = np.arange(4000)
 
 def test_draws_hang_on_their_number_alone() -> None:
     spread = sb.uncertainty.ParameterUncertainty(
-        of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(1e-3)},
-        seed=3,
+        of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(1e-3)}, seed=3
     )
     turned = sb.uncertainty.ParameterUncertainty(
-        of={"location": sb.uncertainty.Normal(1e-3), "contact.stiffness": sb.uncertainty.LogNormal(0.2)},
-        seed=3,
+        of={"location": sb.uncertainty.Normal(1e-3), "contact.stiffness": sb.uncertainty.LogNormal(0.2)}, seed=3
     )
     whole = spread.normals(NUMBERS[:50])
     np.testing.assert_array_equal(spread.normals(np.array([41, 7, 41])), whole[[41, 7, 41]])
@@ -36,11 +34,7 @@ def test_draws_hang_on_their_number_alone() -> None:
         (sb.uncertainty.Normal(0.02, relative=True), 0.2, 0.004),
         (sb.uncertainty.Normal(0.01), 0.2, 0.01),
         (sb.uncertainty.UniformTolerance(0.1, relative=True), 0.2, 0.02 / math.sqrt(3.0)),
-        (
-            sb.uncertainty.LogNormal(0.1),
-            0.2 * math.exp(0.005),
-            0.2 * math.exp(0.005) * math.sqrt(math.expm1(0.01)),
-        ),
+        (sb.uncertainty.LogNormal(0.1), 0.2 * math.exp(0.005), 0.2 * math.exp(0.005) * math.sqrt(math.expm1(0.01))),
         (sb.uncertainty.UniformRange(0.1, 0.5), 0.3, 0.4 / math.sqrt(12.0)),
     ],
 )
@@ -85,9 +79,7 @@ def test_sampled_systems_are_the_samples_of_their_numbers() -> None:
 def test_hz_and_metres_per_second_are_held() -> None:
     """A beam buckled further has a higher first frequency: the same shaker strikes it at another ratio."""
     system = small_system()
-    spread = sb.uncertainty.ParameterUncertainty(
-        of={"beam.buckling_level": sb.uncertainty.Normal(0.02, relative=True)}
-    )
+    spread = sb.uncertainty.ParameterUncertainty(of={"beam.buckling_level": sb.uncertainty.Normal(0.02, relative=True)})
     numbers = np.arange(5)
     points = {"drive.frequency_ratio": np.full(5, 1.3)}
     for held in ("physical", "normalised"):
@@ -97,18 +89,14 @@ def test_hz_and_metres_per_second_are_held() -> None:
         for i in range(5):
             drawn = system.replace(**{"beam.buckling_level": found["beam.buckling_level"][i]})
             hz.append(found["drive.frequency_ratio"][i] * drawn.scale.omega / (2.0 * math.pi))
-            ratio = found.get("drive.velocity_amplitude", np.full(5, system.get("drive.velocity_amplitude")))[
-                i
-            ]
+            ratio = found.get("drive.velocity_amplitude", np.full(5, system.get("drive.velocity_amplitude")))[i]
             speed.append(ratio * drawn.scale.omega * drawn.scale.length)
         nominal = 1.3 * system.scale.omega / (2.0 * math.pi)
         assert (np.ptp(hz) < 1e-9 * nominal) == (held == "physical")
         if held == "physical":
             np.testing.assert_allclose(hz, nominal, rtol=1e-12)
             np.testing.assert_allclose(
-                speed,
-                system.get("drive.velocity_amplitude") * system.scale.omega * system.scale.length,
-                rtol=1e-12,
+                speed, system.get("drive.velocity_amplitude") * system.scale.omega * system.scale.length, rtol=1e-12
             )
 
 
@@ -126,10 +114,7 @@ def test_a_ringing_start_never_presses_the_tip() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (
-            lambda: sb.uncertainty.ParameterUncertainty(of={"beam.thicknes": sb.uncertainty.Normal(1.0)}),
-            "thickness",
-        ),
+        (lambda: sb.uncertainty.ParameterUncertainty(of={"beam.thicknes": sb.uncertainty.Normal(1.0)}), "thickness"),
         (lambda: sb.uncertainty.ParameterUncertainty(of={"beam.thickness": 0.01}), "distribution"),
         (
             lambda: sb.uncertainty.ParameterUncertainty(of={"model.modes": sb.uncertainty.Normal(1.0)}),
@@ -140,9 +125,7 @@ def test_a_ringing_start_never_presses_the_tip() -> None:
             "cannot be uncertain",
         ),
         (
-            lambda: sb.uncertainty.ParameterUncertainty(
-                of={"drive.phase": sb.uncertainty.Normal(1.0)}, phase=True
-            ),
+            lambda: sb.uncertainty.ParameterUncertainty(of={"drive.phase": sb.uncertainty.Normal(1.0)}, phase=True),
             "one of the two",
         ),
         (
@@ -182,11 +165,7 @@ def test_files() -> None:
     assert spread.of["beam.thickness"] == sb.uncertainty.Normal(0.01, relative=True)
     assert spread.of["contact.stiffness"] == sb.uncertainty.LogNormal(0.3)
     assert spread.parameters[-1] == "drive.phase" and spread.seed == 4
-    for bad in (
-        {"beam.thickness": {"normal": 1.0, "uniform": 2.0}},
-        {"beam.thickness": 3.0},
-        {"phases": True},
-    ):
+    for bad in ({"beam.thickness": {"normal": 1.0, "uniform": 2.0}}, {"beam.thickness": 3.0}, {"phases": True}):
         with pytest.raises(InputError):
             uncertainty_from_mapping(bad)
 

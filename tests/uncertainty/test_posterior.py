@@ -54,9 +54,7 @@ def test_a_search_that_does_not_converge_keeps_its_samples(monkeypatch: pytest.M
 
     monkeypatch.setattr(posterior, "_EVALUATIONS", 1)
     measured, far = measured_of(default_values.BEAM), default_values.BEAM.replace(thickness=8e-4)
-    with pytest.warns(
-        sb.DiagnosticWarning, match="give a beam nearer to the measured one, or a narrower prior"
-    ):
+    with pytest.warns(sb.DiagnosticWarning, match="give a beam nearer to the measured one, or a narrower prior"):
         found = sb.uncertainty.estimate_posterior(measured, far, {"thickness": 0.5}, modes=2, samples=200)
     assert found.values.shape == (200, 3) and np.isfinite(found.values).all()
     assert not found.converged and found.is_doubtful and not found.resampled(10).converged
@@ -67,9 +65,7 @@ def test_a_search_that_does_not_converge_keeps_its_samples(monkeypatch: pytest.M
     # the advice works
     nearer = default_values.BEAM.replace(thickness=1.001 * default_values.BEAM.thickness)
     monkeypatch.undo()
-    assert sb.uncertainty.estimate_posterior(
-        measured, nearer, {"thickness": 0.1}, modes=2, samples=200
-    ).converged
+    assert sb.uncertainty.estimate_posterior(measured, nearer, {"thickness": 0.1}, modes=2, samples=200).converged
 
 
 @pytest.mark.slow
@@ -96,9 +92,7 @@ def test_classes_weigh_samples() -> None:
     found = sb.uncertainty.Posterior(("beam.buckling_level",), values, np.array([0.5, 0.5]))
     system = small_system(frequency_ratio=0.02, location=0.4)
     limit = float(sb.model.quasi_static_threshold(0.4, 0.02))
-    one = MeasuredPoints(
-        np.array([0.02]), np.array([1.02 * limit]), np.array([0.4]), np.array([2], dtype=np.int8)
-    )
+    one = MeasuredPoints(np.array([0.02]), np.array([1.02 * limit]), np.array([0.4]), np.array([2], dtype=np.int8))
     spread = sb.uncertainty.ParameterUncertainty(
         of={"velocity_amplitude": sb.uncertainty.Normal(0.01, relative=True)}, hold_fixed="normalised"
     )
@@ -119,6 +113,4 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="prior"):
         sb.uncertainty.estimate_posterior(measured, default_values.BEAM, {})
     with pytest.raises(InputError, match="straight_frequencies_se"):
-        sb.uncertainty.estimate_posterior(
-            Measurements(straight_frequencies=[30.0]), default_values.BEAM, PRIOR
-        )
+        sb.uncertainty.estimate_posterior(Measurements(straight_frequencies=[30.0]), default_values.BEAM, PRIOR)

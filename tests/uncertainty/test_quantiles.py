@@ -25,9 +25,7 @@ def runs_of(truth, seed: int, runs: int, rounds: int = 4):
     def ask(columns, values, numbers):
         return generator.random(values.size) < truth(values), np.zeros(values.size, dtype=bool)
 
-    return search(
-        ask, 1, (0.0, 1.0), sb.uncertainty.QuantileSearchSettings(runs=runs, rounds=rounds, seed=seed)
-    )[0]
+    return search(ask, 1, (0.0, 1.0), sb.uncertainty.QuantileSearchSettings(runs=runs, rounds=rounds, seed=seed))[0]
 
 
 def test_the_limiting_distribution_is_that_of_single_runs() -> None:
@@ -113,18 +111,9 @@ def test_the_quasi_static_threshold() -> None:
 
 
 def test_tolerances_spread_the_threshold(tmp_path) -> None:
-    spread = sb.uncertainty.ParameterUncertainty(
-        of={"velocity_amplitude": sb.uncertainty.Normal(0.1, relative=True)}
-    )
+    spread = sb.uncertainty.ParameterUncertainty(of={"velocity_amplitude": sb.uncertainty.Normal(0.1, relative=True)})
     how, run = sb.uncertainty.QuantileSearchSettings(runs=120), sb.Integration(cycles=10, threads=1)
-    arguments = (
-        small_system(),
-        "velocity_amplitude",
-        (0.02, 0.4),
-        {"frequency_ratio": [0.6, 1.4]},
-        spread,
-        how,
-    )
+    arguments = (small_system(), "velocity_amplitude", (0.02, 0.4), {"frequency_ratio": [0.6, 1.4]}, spread, how)
     ds = sb.uncertainty.quantile_threshold(*arguments, integration=run, checkpoint=tmp_path / "store")
     assert (np.diff(ds["threshold"], axis=-1) > 0.0).all()
     again = sb.uncertainty.quantile_threshold(
@@ -132,9 +121,7 @@ def test_tolerances_spread_the_threshold(tmp_path) -> None:
     )
     assert again.equals(ds)
     sure = sb.uncertainty.quantile_threshold(*arguments[:4], options=how, integration=run)
-    np.testing.assert_allclose(
-        ds["threshold"].sel(quantile=0.5), sure["threshold"].sel(quantile=0.5), rtol=0.1
-    )
+    np.testing.assert_allclose(ds["threshold"].sel(quantile=0.5), sure["threshold"].sel(quantile=0.5), rtol=0.1)
 
 
 def test_out_of_range_is_told() -> None:

@@ -14,9 +14,7 @@ from snapbeam.uncertainty.probability import SamplingPlan, _reason, allocate
 from snapbeam.uncertainty.quantiles import local_crossing
 
 TOLERANCES = (0.0, 1e-16, 1e300)
-SPREAD = sb.uncertainty.ParameterUncertainty(
-    of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)}
-)
+SPREAD = sb.uncertainty.ParameterUncertainty(of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)})
 SHORT = sb.Integration(cycles=1, threads=1)
 
 
@@ -53,12 +51,7 @@ def designed(confidence: float) -> str:
     return "settings"
 
 
-ITERATIONS = {
-    "probability map": allocated,
-    "trial of a cost": trial,
-    "posterior": beam_of,
-    "design": designed,
-}
+ITERATIONS = {"probability map": allocated, "trial of a cost": trial, "posterior": beam_of, "design": designed}
 
 
 @pytest.mark.parametrize(

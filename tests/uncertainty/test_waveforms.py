@@ -39,9 +39,7 @@ def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) ->
     times = np.linspace(0.0, CYCLES * period * (1.0 - 1e-9), 40 * CYCLES)
     other = other.replace(**drive)
     run = sb.simulate(other, sb.Integration(cycles=CYCLES, accuracy="reference"), sample_times=times)
-    seen = run.dataset.displacement_at_striker.values * other.scale.length + ERROR * draw.standard_normal(
-        times.size
-    )
+    seen = run.dataset.displacement_at_striker.values * other.scale.length + ERROR * draw.standard_normal(times.size)
     return sb.uncertainty.Waveform(system=nominal, time=times, displacement=seen, standard_error=ERROR)
 
 
@@ -63,9 +61,7 @@ def test_the_beam_and_the_contact_are_found() -> None:
         default_values.BEAM.buckling_level,
         default_values.CONTACT.stiffness,
     ]
-    for (middle, low, high), value, known in zip(
-        said.interval(0.99).values(), truth, PRIOR.values(), strict=True
-    ):
+    for (middle, low, high), value, known in zip(said.interval(0.99).values(), truth, PRIOR.values(), strict=True):
         assert low < value < high
         assert (high - low) / middle < 5.15 * known
     middle, low, high = said.interval()["beam.buckling_level"]
@@ -86,15 +82,11 @@ def test_what_is_beyond_the_horizon_does_not_count() -> None:
     seen = np.zeros(times.size)
     seen[3] = np.nan
     near = sb.uncertainty.Waveform(system=nominal, time=times, displacement=seen, standard_error=1e-6)
-    far = sb.uncertainty.Waveform(
-        system=nominal, time=times, displacement=seen, standard_error=1e-6, drive_error=1e-6
-    )
+    far = sb.uncertainty.Waveform(system=nominal, time=times, displacement=seen, standard_error=1e-6, drive_error=1e-6)
     assert period < near.horizon < far.horizon < 30 * period
     assert not near.used[3] and not near.used[times > near.horizon].any()
     with pytest.raises(InputError, match="nothing of the waveform can be known so well"):
-        _ = sb.uncertainty.Waveform(
-            system=nominal, time=times, displacement=seen, standard_error=1e-13
-        ).horizon
+        _ = sb.uncertainty.Waveform(system=nominal, time=times, displacement=seen, standard_error=1e-13).horizon
 
 
 def test_from_a_tracked_run() -> None:

@@ -16,8 +16,7 @@ from snapbeam.util.work_rate import WorkRate
 def system():
     striker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
     return sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
-        contacts=[sb.Contact(default_values.CONTACT, striker)],
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=1), contacts=[sb.Contact(default_values.CONTACT, striker)]
     )
 
 
@@ -45,15 +44,9 @@ def test_progress_in_words(system, capsys):
 
 
 def test_several_systems_at_once(system):
-    others = [
-        system,
-        system.replace(**{"drive.velocity_amplitude": 0.3}),
-        system.replace(**{"model.modes": 2}),
-    ]
+    others = [system, system.replace(**{"drive.velocity_amplitude": 0.3}), system.replace(**{"model.modes": 2})]
     seen = []
-    runs = sb.simulate(
-        others, sb.Integration(cycles=5), progress=lambda done, total: seen.append((done, total))
-    )
+    runs = sb.simulate(others, sb.Integration(cycles=5), progress=lambda done, total: seen.append((done, total)))
     assert seen == [(1, 3), (2, 3), (3, 3)]
     for one, run in zip(others, runs, strict=True):
         alone = sb.simulate(one, sb.Integration(cycles=5))
@@ -102,9 +95,7 @@ def test_progress_of_dynamics(free, capsys):
 
 
 def test_progress_of_uncertainty(system, capsys):
-    uncertain = sb.uncertainty.ParameterUncertainty(
-        of={"drive.velocity_amplitude": sb.uncertainty.Normal(0.02)}
-    )
+    uncertain = sb.uncertainty.ParameterUncertainty(of={"drive.velocity_amplitude": sb.uncertainty.Normal(0.02)})
     how = sb.Integration(cycles=3)
     sb.uncertainty.sensitivity(system, "peak_force", uncertain, samples=4, integration=how, progress=True)
     assert "sensitivity: 8 of 8 runs" in capsys.readouterr().err

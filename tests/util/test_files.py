@@ -48,10 +48,7 @@ def test_what_is_written_carries_its_mark(suffix, tmp_path):
     assert is_ours(ours) and not is_ours(other)
 
 
-@pytest.mark.parametrize(
-    ("option", "name"),
-    [("-o", "data.nc"), ("--plot", "photo.png"), ("--json", "notes.json")],
-)
+@pytest.mark.parametrize(("option", "name"), [("-o", "data.nc"), ("--plot", "photo.png"), ("--json", "notes.json")])
 def test_a_foreign_file_is_kept_unless_forced(option, name, tmp_path):
     file = tmp_path / name
     file.write_bytes(b'{"mine": 1}')
@@ -76,9 +73,7 @@ def test_what_is_read_is_not_replaced(tmp_path):
     axes = ["--frequency-ratio", "1:1.4:3", "--velocity-amplitude", "0.1:0.5:2"]
     assert command("map", "--modes", "1", "--cycles", "3", *axes, "-o", file, "--quiet").exit_code == 0
     before = file.read_bytes()
-    refused = command(
-        "simulate", "--from", file, "--point", "frequency_ratio=1.2,velocity_amplitude=0.1", "-o", file
-    )
+    refused = command("simulate", "--from", file, "--point", "frequency_ratio=1.2,velocity_amplitude=0.1", "-o", file)
     assert refused.exit_code == 2 and "named twice" in refused.stderr and file.read_bytes() == before
 
 

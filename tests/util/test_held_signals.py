@@ -95,10 +95,7 @@ def saved(path):
 def system():
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     return sb.System(
-        model,
-        contacts=[
-            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))
-        ],
+        model, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))]
     )
 
 

@@ -163,16 +163,12 @@ except OSError as error:
 def test_a_file_for_which_there_is_no_memory(tmp_path, pages):
     """An error inside a callback of HDF5 would end the process with a segmentation fault."""
     done = run_python(NO_MEMORY.replace("PAGES", str(pages)), cwd=tmp_path)
-    assert done.returncode == 0 and "a.nc" in done.stdout and "the memory is not sufficient" in done.stdout, (
-        done
-    )
+    assert done.returncode == 0 and "a.nc" in done.stdout and "the memory is not sufficient" in done.stdout, done
     assert os.listdir(tmp_path) == []
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a folder in use can be deleted")
-@pytest.mark.parametrize(
-    "words", [["simulate", "--modes", "1", "--cycles", "2", "-o", "a.nc"], ["info", "a.nc"]]
-)
+@pytest.mark.parametrize("words", [["simulate", "--modes", "1", "--cycles", "2", "-o", "a.nc"], ["info", "a.nc"]])
 def test_a_working_folder_that_was_deleted(tmp_path, words):
     gone = tmp_path / "gone"
     gone.mkdir()

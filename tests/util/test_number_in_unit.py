@@ -92,21 +92,13 @@ def test_a_parameter_file_with_units_is_that_in_si():
         for name, value in values.items():
             if isinstance(value, float):
                 assert other.given[section][name] == pytest.approx(value, rel=1e-14), name
-    with pytest.raises(
-        sb.InputError, match=r"\[beam\] length = '161 ms': the unit 'ms' does not fit; must be in m"
-    ):
+    with pytest.raises(sb.InputError, match=r"\[beam\] length = '161 ms': the unit 'ms' does not fit; must be in m"):
         config_from_mapping(plain | {"beam": plain["beam"] | {"length": "161 ms"}}, "x.toml")
 
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [
-        ("10 um", 1e-5),
-        ("5. um", 5e-6),
-        ("0.7665 um", 7.665e-7),
-        ("1e999999999 um", np.inf),
-        ("1e-999999999 um", 0.0),
-    ],
+    [("10 um", 1e-5), ("5. um", 5e-6), ("0.7665 um", 7.665e-7), ("1e999999999 um", np.inf), ("1e-999999999 um", 0.0)],
 )
 def test_the_nearest_number_whatever_the_exponent(text, value):
     """To the last digit; an exponent beyond all numbers is infinite or zero at once, as without a unit."""

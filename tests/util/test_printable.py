@@ -31,10 +31,7 @@ def test_errors_of_input_escape_what_they_name(kind):
 
 @pytest.mark.parametrize(
     "sections",
-    [
-        {"beam": dict.fromkeys(map("key{}".format, range(50_000)), 1)},
-        {f"section{i}": {} for i in range(50_000)},
-    ],
+    [{"beam": dict.fromkeys(map("key{}".format, range(50_000)), 1)}, {f"section{i}": {} for i in range(50_000)}],
 )
 def test_the_first_faults_of_many_are_listed(sections):
     _, lines = checked_sections(sections)
@@ -43,9 +40,7 @@ def test_the_first_faults_of_many_are_listed(sections):
 
 def test_info_shows_attributes_and_names_as_text(tmp_path):
     about = "b\x1b]0;title\x07[/bold][red]"
-    data = xr.Dataset(
-        {"x[red]": ("n", [1.0], {"long_name": about, "units": "[/]"})}, attrs={"key[/]\x9b": about}
-    )
+    data = xr.Dataset({"x[red]": ("n", [1.0], {"long_name": about, "units": "[/]"})}, attrs={"key[/]\x9b": about})
     sb.write_netcdf(data, tmp_path / "a[bold]\x1b.nc")
     command = [sys.executable, "-m", "snapbeam", "info", "a[bold]\x1b.nc"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
@@ -58,8 +53,4 @@ def test_info_shows_attributes_and_names_as_text(tmp_path):
 def test_a_missing_file_with_a_hostile_name(tmp_path):
     command = [sys.executable, "-m", "snapbeam", "info", "no\x1b[31m.nc"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert (
-        done.returncode == 2
-        and "\x1b" not in done.stderr
-        and r"no\x1b[31m.nc" in done.stderr.replace("\\\\", "\\")
-    )
+    assert done.returncode == 2 and "\x1b" not in done.stderr and r"no\x1b[31m.nc" in done.stderr.replace("\\\\", "\\")

@@ -28,14 +28,7 @@ RUN = xr.Dataset(
 
 def test_a_run_has_a_row_for_each_time_and_a_column_for_each_mode():
     frame = data_frame(RUN)
-    assert list(frame.columns) == [
-        "time",
-        "cycle",
-        "voltage",
-        "power",
-        "modal_amplitude_1",
-        "modal_amplitude_2",
-    ]
+    assert list(frame.columns) == ["time", "cycle", "voltage", "power", "modal_amplitude_1", "modal_amplitude_2"]
     assert len(frame) == 3 and list(frame["modal_amplitude_2"]) == [1.0, 3.0, 5.0]
     assert frame.attrs["left_out"] == ["shape"]
 
@@ -44,13 +37,9 @@ def test_a_map_has_a_row_for_each_point(synthetic_map):
     frame = data_frame(synthetic_map)
     assert len(frame) == synthetic_map["response_class"].size
     row = frame.iloc[27]
-    there = synthetic_map.sel(
-        frequency_ratio=row["frequency_ratio"], velocity_amplitude=row["velocity_amplitude"]
-    )
+    there = synthetic_map.sel(frequency_ratio=row["frequency_ratio"], velocity_amplitude=row["velocity_amplitude"])
     assert int(there["response_class"]) == row["response_class"]
-    turned = synthetic_map.assign(
-        peak=synthetic_map["response_class"].T * 1.0, more=synthetic_map["response_class"]
-    )
+    turned = synthetic_map.assign(peak=synthetic_map["response_class"].T * 1.0, more=synthetic_map["response_class"])
     assert (data_frame(turned)["peak"] == data_frame(turned)["more"]).all()
 
 
@@ -127,11 +116,7 @@ def test_a_threshold_is_a_table_in_long_form_with_its_units(tmp_path):
             "upper_threshold": (names[0], [0.3, np.nan], {"units": "1"}),
             "failed_runs": (names[0], [0, 1]),
             "response_class": (names, np.array([[0, 3, 3], [0, 0, -1]], dtype=np.int8)),
-            "max_midspan_displacement": (
-                names,
-                np.ones((2, 3)),
-                {"units": "1", "long_name": "maximum, over b"},
-            ),
+            "max_midspan_displacement": (names, np.ones((2, 3)), {"units": "1", "long_name": "maximum, over b"}),
         },
         {
             name: (name, values, {"parameter": parameter})

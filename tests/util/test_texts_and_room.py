@@ -39,10 +39,7 @@ def test_attributes_that_are_no_text_are_refused_by_name(tmp_path, data, words):
 @pytest.mark.skipif(sys.platform != "linux", reason="arguments of any bytes, limits of a process")
 @pytest.mark.parametrize(
     "words",
-    [
-        [b"simulate", b"--window", b"\xff", b"-o", b"a.nc"],
-        [b"map", b"--initial-well", b"l\xff", b"-o", b"a.nc"],
-    ],
+    [[b"simulate", b"--window", b"\xff", b"-o", b"a.nc"], [b"map", b"--initial-well", b"l\xff", b"-o", b"a.nc"]],
 )
 def test_arguments_that_are_no_text_are_refused_by_name(tmp_path, words):
     command = [sys.executable, "-m", "snapbeam", *words]
@@ -83,17 +80,7 @@ def nearly_full(monkeypatch):
     "words",
     [
         ["simulate", "--modes", "1", "--cycles", "200", "-o", "a.nc"],
-        [
-            "map",
-            "--modes",
-            "1",
-            "--frequency-ratio",
-            "0.3:2:60",
-            "--velocity-amplitude",
-            "0.1:0.2:60",
-            "-o",
-            "a.nc",
-        ],
+        ["map", "--modes", "1", "--frequency-ratio", "0.3:2:60", "--velocity-amplitude", "0.1:0.2:60", "-o", "a.nc"],
     ],
     ids=["run", "map"],
 )

@@ -15,8 +15,7 @@ from snapbeam.util.validation import checked, require_texts
 LONE = ["\ud800", "b\udfff", "stop \udcff"]
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.01)
 SYSTEM = sb.System(
-    MODEL,
-    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
+    MODEL, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))]
 )
 
 

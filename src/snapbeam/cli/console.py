@@ -70,10 +70,7 @@ _JSON = Annotated[
         rich_help_panel="Output", metavar="FILE",
     ),
 ]  # fmt: skip
-_QUIET = Annotated[
-    bool,
-    typer.Option("--quiet", "-q", help="Print errors only.", rich_help_panel="Output"),
-]
+_QUIET = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.", rich_help_panel="Output")]
 _FORCE = Annotated[
     bool,
     typer.Option(
@@ -123,10 +120,7 @@ def write_json(path: Path, found: Mapping[str, Any]) -> None:
     """
     from snapbeam.util.files import atomic_path, check_writable
 
-    text = (
-        json.dumps({VERSION: __version__} | _plain(found), indent=2, ensure_ascii=False, allow_nan=False)
-        + "\n"
-    )
+    text = json.dumps({VERSION: __version__} | _plain(found), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     text = text.encode("utf-8", "backslashreplace").decode()  # a name that is not UTF-8: an escape of JSON
     if path == Path("-"):
         sys.stdout.write(text)
@@ -160,10 +154,7 @@ def errors() -> Console:
 def notes() -> Console:
     """Return the console of notes: standard error, or a console that discards text with --quiet."""
     return Console(
-        stderr=True,
-        highlight=False,
-        soft_wrap=True,
-        file=io.StringIO() if _OUTPUT_OPTIONS.get().quiet else None,
+        stderr=True, highlight=False, soft_wrap=True, file=io.StringIO() if _OUTPUT_OPTIONS.get().quiet else None
     )
 
 
@@ -172,7 +163,9 @@ def _folder_gone() -> str:
     try:
         os.getcwd()
     except FileNotFoundError:
-        return f"working folder = {os.environ.get('PWD', '')!r}: does not exist any more; change to a folder that exists"
+        return (
+            f"working folder = {os.environ.get('PWD', '')!r}: does not exist any more; change to a folder that exists"
+        )
     return ""
 
 
@@ -336,9 +329,7 @@ def count_text(count: int, what: str = "points") -> str:
 
 
 @contextmanager
-def progress(
-    total: int | None, task: str = "map", what: str = "points"
-) -> Iterator[Callable[[int, int], None]]:
+def progress(total: int | None, task: str = "map", what: str = "points") -> Iterator[Callable[[int, int], None]]:
     """Give a function of (done, total) that shows progress, rate and remaining time.
 
     *total* is None if it is not known in advance, *task* names the work, *what* names the counted things.  A terminal
@@ -413,6 +404,19 @@ def check_pictures(*pictures: tuple[str, Path | None]) -> None:
             require_room(path, least_picture_size(path), name)
 
 
+def check_outputs(output: Path, plot: Path | None) -> None:
+    """Raise an error, before any computation, if the NetCDF file or the figure cannot be written."""
+    from snapbeam.util.files import check_writable
+
+    check_writable(output, "output", (".nc",))
+    check_pictures(("plot", plot))
+
+
+def print_written(lines: Iterable[str], files: Iterable[Path]) -> None:
+    """Print the lines of a result, and the files that were written."""
+    out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
+
+
 _LEAST_SIZES = {".png": 35e3, ".pdf": 10e3, ".svg": 8e3, ".gif": 300e3, ".mp4": 50e3}
 """Half of the sizes of the smallest figures and animations of the commands, bytes."""
 
@@ -422,17 +426,13 @@ def least_picture_size(path: Path) -> float:
     return _LEAST_SIZES.get(path.suffix.lower(), 0.0)
 
 
-def read_overlay(
-    measurements: Path | None, reference_frequency: float | None, buckling_level: float | None
-) -> Any:
+def read_overlay(measurements: Path | None, reference_frequency: float | None, buckling_level: float | None) -> Any:
     """Return the measured points of a CSV file, normalised, or None."""
     if measurements is None:
         return None
     from snapbeam.sweeps.measured_points import read_measured_points
 
-    return read_measured_points(
-        measurements, reference_frequency=reference_frequency, buckling_level=buckling_level
-    )
+    return read_measured_points(measurements, reference_frequency=reference_frequency, buckling_level=buckling_level)
 
 
 def write_map(dataset: xr.Dataset, path: Path) -> Path:
@@ -444,9 +444,7 @@ def write_map(dataset: xr.Dataset, path: Path) -> Path:
 
 
 @contextmanager
-def kept_if_not_drawn(
-    again: Callable[[str], str], kept: Path | None, save: Callable[[Path], object]
-) -> Iterator[None]:
+def kept_if_not_drawn(again: Callable[[str], str], kept: Path | None, save: Callable[[Path], object]) -> Iterator[None]:
     """In the block, add to an error where the numbers are, and how to draw them again.
 
     Parameters
@@ -510,15 +508,11 @@ def draw_computed(
 ) -> Path:
     """Draw a result that the command has computed, as :func:`draw`; errors as of :func:`kept_if_not_drawn`."""
     save = functools.partial(write_map, dataset) if save is None else save
-    with kept_if_not_drawn(
-        lambda file: plot_command(file, path, variable, options.get("window")), kept, save
-    ):
+    with kept_if_not_drawn(lambda file: plot_command(file, path, variable, options.get("window")), kept, save):
         return draw(dataset, path, variable, **options)
 
 
-def plot_command(
-    file: str, path: Path, variable: str | None = None, window: tuple[float, float] | None = None
-) -> str:
+def plot_command(file: str, path: Path, variable: str | None = None, window: tuple[float, float] | None = None) -> str:
     """The command that draws a result file."""
     words = ["snapbeam", "plot", file, "-o", str(path)]
     words += [] if variable is None else ["--variable", variable]

@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
+import inspect
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
 
+from snapbeam import dynamics as library
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import FAILED, add_json, cli_command, duration, file_line, out, progress
-from snapbeam.cli.parameter_options import (
-    BEAM,
-    CONTACT,
-    DRIVE,
-    MODEL,
-    RUN,
-    STRIKER,
-    configured,
-    with_parameters,
-)
+from snapbeam.cli.console import FAILED, add_json, check_outputs, cli_command, duration, print_written, progress
+from snapbeam.cli.parameter_options import ALL, BEAM, MODEL, configured, with_parameters
 from snapbeam.cli.short_help import ShortHelpCommand, ShortHelpGroup
+from snapbeam.util.validation import InputError, choice
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
     from snapbeam.dynamics.basins import BasinEntropy
+    from snapbeam.dynamics.periodic_orbits import PeriodicOrbit
+    from snapbeam.model.integration import Integration
     from snapbeam.model.parameter_file import Config
+    from snapbeam.model.system import System
 
 
 class _Analyses(ShortHelpGroup):
@@ -45,10 +46,7 @@ class _Analyses(ShortHelpGroup):
     def _near(self, name: str) -> list[str]:
         words = name.lower().replace("_", "-")
         named = [each for each in self.commands if words in each or each in words]
-        first = {
-            each: str(command.help or "").partition("\n")[0].lower()
-            for each, command in self.commands.items()
-        }
+        first = {each: str(command.help or "").partition("\n")[0].lower() for each, command in self.commands.items()}
         described = [each for each, text in first.items() if words.rstrip("s") in text]
         return named or get_close_matches(words, self.commands) or (described if len(words) > 3 else [])
 
@@ -60,7 +58,6 @@ dynamics = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )
-_ALL = (*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN)
 _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location", "model.modes")
 _OWN = "Analysis"
 _BRANCHES = 0.1
@@ -68,23 +65,153 @@ _BRANCHES = 0.1
 _FEW = 4000
 """Maximum size of a variable in the JSON output."""
 _SETTLING = "16 time constants of the slowest mode, at least 200 and at most 20,000"
-Output = Annotated[
-    Path,
-    typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"),
-]
-Parameter = Annotated[str, typer.Option(help="Parameter to vary (velocity_amplitude).", rich_help_panel=_OWN)]
-Values = Annotated[
-    str,
-    typer.Option(help="Values of the parameter, start:stop:count.", rich_help_panel=_OWN, metavar="VALUES"),
-]
 
 
-def _checked(output: Path, plot: Path | None) -> None:
-    from snapbeam.cli.console import check_pictures
-    from snapbeam.util.files import check_writable
+# ----------------------------------------------------------------------------------------------------
+# Options of an analysis, and the command that is made of them and of its computation.
 
-    check_writable(output, "output", (".nc",))
-    check_pictures(("plot", plot))
+
+@dataclass(frozen=True)
+class _Option:
+    """An option of an analysis."""
+
+    kind: Any
+    """Its annotation."""
+    default: Any
+    """Its value if it is not given."""
+    shown: Any = None
+    """The default of the command line: of a number None, since its help states the default."""
+
+
+def _described(about: str, default: object) -> str:
+    """The help of a number."""
+    return f"{about}{'' if default is None else f' ({default:g})'}."
+
+
+def _count(about: str, default: int | None = None) -> _Option:
+    return _Option(Annotated[int | None, opt.count_option(_described(about, default), _OWN)], default)
+
+
+def _number(about: str, default: float | None = None) -> _Option:
+    return _Option(Annotated[float | None, opt.number_option(_described(about, default), _OWN)], default)
+
+
+def _text(about: str, default: str, metavar: str | None = None) -> _Option:
+    option = typer.Option(help=f"{about}.", rich_help_panel=_OWN, metavar=metavar)
+    return _Option(Annotated[str, option], default, default)
+
+
+_PARAMETER = _text("Parameter to vary (velocity_amplitude)", "velocity_amplitude")
+_VALUES = _text("Values of the parameter, start:stop:count", "0.01:0.6:200", "VALUES")
+_BOUNDS = _text("Bounds of the parameter, low:high", "0.005:0.3")
+_PERIOD = _count("Period of the orbit in periods of the drive", 1)
+_SEARCHED = _count("Transient periods to integrate before the search", 500)
+_DISCARDED = _count(f"Transient periods to discard ({_SETTLING})")
+_CHECKPOINT = _Option(opt.CheckpointFolder, None)
+_PHASE = _Option(
+    Annotated[bool, typer.Option("--phase", help="Sample the initial phase of the drive too.", rich_help_panel=_OWN)],
+    False,
+    False,
+)
+
+
+class _Request(SimpleNamespace):
+    """The options of an analysis by name, with their defaults, the parameters, and the time since it began."""
+
+    settings: Config
+    given: dict[str, Any]
+    failed: bool
+
+    def __getattr__(self, name: str) -> Any:  # options
+        raise AttributeError(name)
+
+    @property
+    def took(self) -> str:
+        """Time since the analysis began."""
+        return duration(time.monotonic() - self.begun)
+
+    @property
+    def system(self) -> System:
+        """The system of the parameters."""
+        return self.settings.system
+
+    @property
+    def integration(self) -> Integration:
+        """Settings of the integration, with the number of cores."""
+        return self.settings.integration.replace(threads=getattr(self, "threads", None))
+
+    @property
+    def chosen_integration(self) -> Integration | None:
+        """Settings of the integration if their accuracy was given; otherwise the analysis chooses its own."""
+        return None if self.given.get("integration.accuracy") is None else self.settings.integration
+
+    def axis(self) -> NDArray[np.float64]:
+        """Values of the parameter."""
+        from snapbeam.model.parameter_file import parsed_axis
+
+        return parsed_axis(self.settings.full_name(self.parameter), self.values)
+
+    def interval(self, option: str, parameter: str) -> tuple[float, float]:
+        """Minimum and maximum of a parameter, in its unit."""
+        from snapbeam.model.parameters import lookup
+
+        unit = lookup(self.settings.full_name(parameter)).quantity.unit
+        return opt.parse_range(f"{option} (--{option.replace('_', '-')})", getattr(self, option), unit)
+
+
+_Found = tuple["xr.Dataset", list[str]]
+
+
+def _analysis(
+    *parameters: str, axes: tuple[str, ...] = (), threads: bool = False, **options: _Option
+) -> Callable[[Callable[[_Request], _Found]], Callable[[_Request], _Found]]:
+    """Make a command of a function that returns a dataset and the lines to print."""
+
+    def decorate(compute: Callable[[_Request], _Found]) -> Callable[[_Request], _Found]:
+        def command(given: Any, output: Path, plot: Path | None, **chosen: Any) -> None:
+            for name, option in options.items():
+                chosen[name] = option.default if chosen[name] is None else chosen[name]
+            request = _Request(settings=configured(given), given=given, failed=False, **chosen)
+            check_outputs(output, plot)
+            request.begun = time.monotonic()
+            dataset, lines = compute(request)
+            _finish(dataset, output, plot, lines, chosen.get("statistic"))
+            if request.failed:
+                raise typer.Exit(FAILED)
+
+        rows = {name: (each.kind, each.shown) for name, each in options.items()}
+        rows |= {"output": (opt.Output, Path(f"{compute.__name__}.nc")), "plot": (opt.Plot, None)}
+        rows |= {"threads": (opt.Threads, None)} if threads else {}
+        keyword = inspect.Parameter.KEYWORD_ONLY
+        command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [inspect.Parameter("given", keyword)]
+            + [inspect.Parameter(name, keyword, annotation=kind, default=shown) for name, (kind, shown) in rows.items()]
+        )
+        command.__name__, command.__doc__ = compute.__name__, compute.__doc__
+        made = cli_command(with_parameters(*parameters, axes=axes)(command))
+        dynamics.command(compute.__name__.replace("_", "-"), cls=ShortHelpCommand)(made)
+        return compute
+
+    return decorate
+
+
+def _finish(
+    dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str], statistic: str | None = None
+) -> None:
+    """Write, draw and print the results."""
+    from snapbeam.cli.console import draw_computed, write_map
+    from snapbeam.cli.summary import initial_well_lines
+
+    reason = dataset.attrs.get("termination_reason")
+    if reason and not any(str(reason) in line for line in lines):
+        lines = [*lines, f"stopped: {reason}"]
+    lines = [*initial_well_lines(dataset), *lines]
+    files = [write_map(dataset, output)]
+    if plot is not None:
+        files.append(draw_computed(dataset, plot, output, statistic))
+    small = {str(name): each.values for name, each in dataset.data_vars.items() if each.size <= _FEW}
+    add_json(results=small, summary=lines, files=files)
+    print_written(lines, files)
 
 
 def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
@@ -96,11 +223,7 @@ def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
     values, name = dataset[statistic], str(dataset.attrs["parameter"])
     lines = []
     for direction in values["sweep"].values:
-        part = (
-            values.sel(sweep=direction).dropna(name)
-            if values.dtype.kind == "f"
-            else values.sel(sweep=direction)
-        )
+        part = values.sel(sweep=direction).dropna(name) if values.dtype.kind == "f" else values.sel(sweep=direction)
         if part.size:
             at = part.isel({name: int(part.values.argmax())})
             where = coordinate_text(dataset, name, at[name].item())
@@ -111,20 +234,9 @@ def _extremes(dataset: xr.Dataset, statistic: str) -> list[str]:
         one, other = (values.isel(sweep=i).values for i in (0, 1))
         apart = np.abs(one - other) > _BRANCHES * np.nanmax(np.abs(values.values), initial=0.0)
         if apart.any():
-            ends = (
-                coordinate_text(dataset, name, each) for each in values[name].values[apart][[0, -1]].tolist()
-            )
-            lines.append(
-                f"both directions differ by more than 10 % of the maximum between {' and '.join(ends)}"
-            )
+            ends = (coordinate_text(dataset, name, each) for each in values[name].values[apart][[0, -1]].tolist())
+            lines.append(f"both directions differ by more than 10 % of the maximum between {' and '.join(ends)}")
     return lines
-
-
-def _interval(name: str, text: str, settings: Config, parameter: str) -> tuple[float, float]:
-    """Minimum and maximum of a parameter, in its unit."""
-    from snapbeam.model.parameters import lookup
-
-    return opt.parse_range(name, text, lookup(settings.full_name(parameter)).quantity.unit)
 
 
 def _plain(found: object) -> str:
@@ -132,51 +244,31 @@ def _plain(found: object) -> str:
     return repr(found).removeprefix("<").removesuffix(">")
 
 
-def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str]) -> None:
-    """Write, draw and print the results."""
-    from snapbeam.cli.console import draw_computed, write_map
-    from snapbeam.cli.summary import initial_well_lines
-
-    reason = dataset.attrs.get("termination_reason")
-    if reason and not any(str(reason) in line for line in lines):
-        lines = [*lines, f"stopped: {reason}"]
-    lines = [*initial_well_lines(dataset), *lines]
-    files = [write_map(dataset, output)]
-    if plot is not None:
-        files.append(draw_computed(dataset, plot, output))
-    small = {str(name): each.values for name, each in dataset.data_vars.items() if each.size <= _FEW}
-    add_json(results=small, summary=lines, files=files)
-    out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
+def _orbit(request: _Request, words: str, start: Any = None, **settings: Any) -> PeriodicOrbit:
+    """The periodic orbit near a state, by default the one that a run settles on."""
+    try:
+        return library.periodic_orbit(
+            request.system, start, request.period, integration=request.chosen_integration, **settings
+        )
+    except library.OrbitNotFoundError as error:
+        raise InputError(f"{words}: {error}") from None
 
 
-@dynamics.command("lifetimes", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL, axes=_AXES)
-def lifetimes(
-    given: Any,
-    initial_conditions: Annotated[
-        int | None, opt.count_option("Number of initial conditions at each point (32).", _OWN)
-    ] = None,
-    seed: Annotated[int | None, opt.count_option("Seed of the initial conditions (0).", _OWN)] = None,
-    phase: Annotated[
-        bool, typer.Option("--phase", help="Sample the initial phase of the drive too.", rich_help_panel=_OWN)
-    ] = False,
-    settling_cycles: Annotated[
-        float | None,
-        opt.number_option("Cycles without a zero crossing after which a run counts as settled (50).", _OWN),
-    ] = None,
-    checkpoint: Annotated[
-        Path | None,
-        typer.Option(
-            help="Checkpoint folder; an existing one is resumed.",
-            rich_help_panel="Output",
-            metavar="DIR",
-        ),
-    ] = None,
-    output: Output = Path("lifetimes.nc"),
-    plot: opt.Plot = None,
-    threads: opt.Threads = None,
-) -> None:
+# ----------------------------------------------------------------------------------------------------
+# The analyses.
+
+
+@_analysis(
+    *ALL,
+    axes=_AXES,
+    threads=True,
+    initial_conditions=_count("Number of initial conditions at each point", 32),
+    seed=_count("Seed of the initial conditions", 0),
+    phase=_PHASE,
+    settling_cycles=_number("Cycles without a zero crossing after which a run counts as settled", 50.0),
+    checkpoint=_CHECKPOINT,
+)
+def lifetimes(request: _Request) -> _Found:
     """Compute lifetimes of snap-through and the final wells, with confidence intervals.
 
     snapbeam integrates many initial conditions at each point.
@@ -184,401 +276,232 @@ def lifetimes(
     Example: snapbeam dynamics lifetimes --modes 8 --frequency-ratio 1.625 --velocity-amplitude 0.2:0.5:16
     --initial-conditions 100 -o lifetimes.nc --plot lifetimes.png
     """
-    from snapbeam.dynamics.flow import InitialConditions
-    from snapbeam.dynamics.lifetimes import LifetimeSettings, lifetime_map
-
-    settings = configured(given)
-    _checked(output, plot)
-    sampled = InitialConditions(
-        count=32 if initial_conditions is None else initial_conditions,
-        phase=phase,
-        seed=0 if seed is None else seed,
-    )
-    begun = time.monotonic()
-    cycles = settings.integration.cycles if given.get("integration.cycles") is not None else 1000
+    cycles = request.integration.cycles if request.given.get("integration.cycles") is not None else 1000
     with progress(None, "lifetimes", "points") as report:
-        dataset = lifetime_map(
-            settings.system, settings.axes() or None, settings.integration.replace(cycles=cycles, threads=threads),
-            initial_conditions=sampled, settings=LifetimeSettings(settling_cycles=50.0 if settling_cycles is None else settling_cycles), checkpoint=checkpoint,
+        dataset = library.lifetime_map(
+            request.system,
+            request.settings.axes() or None,
+            request.integration.replace(cycles=cycles),
+            initial_conditions=library.InitialConditions(
+                count=request.initial_conditions, phase=request.phase, seed=request.seed
+            ),
+            settings=library.LifetimeSettings(settling_cycles=request.settling_cycles),
+            checkpoint=request.checkpoint,
             progress=report,
-        )  # fmt: skip
-    runs = int(dataset["last_snap"].size)
-    lines = [f"{runs} runs in {duration(time.monotonic() - begun)}"]
+        )
+    lines = [f"{dataset['last_snap'].size} runs in {request.took}"]
     if dataset["lifetime"].ndim == 0:
         low, value, high = (float(dataset[name]) for name in ("lifetime_low", "lifetime", "lifetime_high"))
-        lines.append(
-            f"lifetime {value:.4g} cycles, {low:.4g} to {high:.4g} at {100 * dataset.attrs['confidence']:g} %"
-        )
-        ends = ", ".join(
-            f"{name} {float(p):.3g}"
-            for name, p in zip(dataset["well"].values, dataset["end_probability"], strict=True)
-        )
-        lines.append(f"ends in the well: {ends}")
+        lines.append(f"lifetime {value:.4g} cycles, {low:.4g} to {high:.4g} at {100 * dataset.attrs['confidence']:g} %")
+        shares = zip(dataset["well"].values, dataset["end_probability"], strict=True)
+        lines.append(f"ends in the well: {', '.join(f'{name} {float(share):.3g}' for name, share in shares)}")
     else:
         known = int(dataset["lifetime"].notnull().sum())
         lines.append(f"a lifetime at {known} of {dataset['lifetime'].size} points")
-    _finish(dataset, output, plot, lines)
+    return dataset, lines
 
 
-@dynamics.command("bifurcation-diagram", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL)
-def bifurcation_diagram(
-    given: Any,
-    parameter: Parameter = "velocity_amplitude",
-    values: Values = "0.01:0.6:200",
-    initial_conditions: Annotated[
-        int | None,
-        opt.count_option("Number of initial conditions at each value, in addition to the sweeps (0).", _OWN),
-    ] = None,
-    periods: Annotated[int | None, opt.count_option("Periods to record at each value (32).", _OWN)] = None,
-    transient: Annotated[
-        int | None, opt.count_option(f"Transient periods to discard at each value ({_SETTLING}).", _OWN)
-    ] = None,
-    output: Output = Path("bifurcation_diagram.nc"),
-    plot: opt.Plot = None,
-    threads: opt.Threads = None,
-) -> None:
+@_analysis(
+    *ALL,
+    threads=True,
+    parameter=_PARAMETER,
+    values=_VALUES,
+    initial_conditions=_count("Number of initial conditions at each value, in addition to the sweeps", 0),
+    periods=_count("Periods to record at each value", 32),
+    transient=_count(f"Transient periods to discard at each value ({_SETTLING})"),
+)
+def bifurcation_diagram(request: _Request) -> _Found:
     """Compute a bifurcation diagram, with an upward and a downward sweep; each value starts from the last state.
 
     Example: snapbeam dynamics bifurcation-diagram --modes 8 --frequency-ratio 1.4 --values 0.01:0.3:400 --plot diagram.png
     """
-    from snapbeam.dynamics.swept import bifurcation_diagram as diagram_of
-    from snapbeam.model.parameter_file import parsed_axis
-
-    settings = configured(given)
-    _checked(output, plot)
-    points = parsed_axis(settings.full_name(parameter), values)
-    begun = time.monotonic()
+    points = request.axis()
     with progress(None, "bifurcation diagram", "values") as report:
-        dataset = diagram_of(
-            settings.system, parameter, points, settings.integration.replace(threads=threads), initial_conditions=initial_conditions or 0,
-            periods=(transient, 32 if periods is None else periods), progress=report,
-        )  # fmt: skip
-    lines = [f"{points.size} values in {duration(time.monotonic() - begun)}"]
+        dataset = library.bifurcation_diagram(
+            request.system,
+            request.parameter,
+            points,
+            request.integration,
+            initial_conditions=request.initial_conditions,
+            periods=(request.transient, request.periods),
+            progress=report,
+        )
+    lines = [f"{points.size} values in {request.took}"]
     for sweep in dataset["sweep"].values[:2]:
         found = dataset["minimal_period"].sel(sweep=sweep).values
         kinds = ", ".join(f"{int((found == m).sum())} of period {m}" for m in np.unique(found) if m > 0)
         lines.append(f"{sweep}: {kinds or 'no value repeats'}, {int((found == 0).sum())} that do not repeat")
-    _finish(dataset, output, plot, lines)
+    return dataset, lines
 
 
-@dynamics.command("hysteresis", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL)
-def hysteresis(
-    given: Any,
-    parameter: Parameter = "velocity_amplitude",
-    values: Values = "0.01:0.6:200",
-    statistic: Annotated[
-        str,
-        typer.Option(help="Statistic that --plot draws (peak_midspan_displacement).", rich_help_panel=_OWN),
-    ] = "peak_midspan_displacement",
-    output: Output = Path("hysteresis.nc"),
-    plot: opt.Plot = None,
-) -> None:
+@_analysis(
+    *ALL,
+    parameter=_PARAMETER,
+    values=_VALUES,
+    statistic=_text("Statistic that --plot draws (peak_midspan_displacement)", "peak_midspan_displacement"),
+)
+def hysteresis(request: _Request) -> _Found:
     """Sweep a parameter up and down, with every statistic of a run at each value; each run starts from the last state.
 
     Example: snapbeam dynamics hysteresis --config harvester.toml --parameter base_excitation.frequency_ratio
     --values 0.2:1.4:25 --statistic harvested_power_last_quarter --plot power.png
     """
-    from snapbeam.cli.console import check_pictures, draw_computed, write_map
-    from snapbeam.cli.summary import initial_well_lines
-    from snapbeam.dynamics.swept import hysteresis as swept
-    from snapbeam.model.parameter_file import parsed_axis
     from snapbeam.solver.statistics import STATISTICS
-    from snapbeam.util.files import check_writable
     from snapbeam.util.status_codes import RunStatus
-    from snapbeam.util.validation import choice
 
-    settings = configured(given)
-    check_writable(output, "output", (".nc",))
-    check_pictures(("plot", plot))
-    choice("statistic", statistic, tuple(STATISTICS))
-    points = parsed_axis(settings.full_name(parameter), values)
-    begun = time.monotonic()
+    choice("statistic", request.statistic, tuple(STATISTICS))
+    points = request.axis()
     with progress(None, "hysteresis", "values") as report:
-        dataset = swept(settings.system, parameter, points, settings.integration, progress=report)
+        dataset = library.hysteresis(request.system, request.parameter, points, request.integration, progress=report)
     failed = int((dataset["status"] != RunStatus.OK).sum())
-    lines = [
-        f"{points.size} values up and down in {duration(time.monotonic() - begun)}, {failed} runs failed or not run",
-        *initial_well_lines(dataset),
-        *_extremes(dataset, statistic),
-    ]
-    files = [write_map(dataset, output)]
-    if plot is not None:
-        files.append(draw_computed(dataset, plot, output, statistic))
-    add_json(summary=lines, files=files)
-    out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
-    if failed:
-        raise typer.Exit(FAILED)
+    request.failed = failed > 0
+    first = f"{points.size} values up and down in {request.took}, {failed} runs failed or not run"
+    return dataset, [first, *_extremes(dataset, request.statistic)]
 
 
-@dynamics.command("backbone-curve", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*BEAM, *MODEL)
-def backbone_curve(
-    given: Any,
-    well: Annotated[
-        str,
-        typer.Option(help="Motion about the lower or the upper well, or across both.", rich_help_panel=_OWN),
-    ] = "lower",
-    mode: Annotated[
-        int | None, opt.count_option("Linear mode in which the motion about a well begins (1).", _OWN)
-    ] = None,
-    amplitude_limit: Annotated[
-        float | None,
-        opt.number_option("Displacement of the centre, over b, where the curve ends (2.5).", _OWN),
-    ] = None,
-    max_points: Annotated[
-        int | None, opt.count_option("Maximum number of points of the curve (200).", _OWN)
-    ] = None,
-    output: Output = Path("backbone_curve.nc"),
-    plot: opt.Plot = None,
-) -> None:
+@_analysis(
+    *BEAM,
+    *MODEL,
+    well=_text("Motion about the lower or the upper well, or across both", "lower"),
+    mode=_count("Linear mode in which the motion about a well begins", 1),
+    amplitude_limit=_number("Displacement of the centre, over b, where the curve ends", 2.5),
+    max_points=_count("Maximum number of points of the curve", 200),
+)
+def backbone_curve(request: _Request) -> _Found:
     """Compute a backbone curve: frequency of the free, undamped motion over its amplitude, with its stability.
 
     Example: snapbeam dynamics backbone-curve --modes 3 --well both -o backbone.nc --plot backbone.png
     """
-    from snapbeam.cli.console import check_pictures, draw_computed, write_map
-    from snapbeam.dynamics.backbone import backbone_curve as curve_of
-    from snapbeam.util.files import check_writable
-
-    settings = configured(given)
-    check_writable(output, "output", (".nc",))
-    check_pictures(("plot", plot))
-    begun = time.monotonic()
+    names = ("well", "mode", "amplitude_limit", "max_points")
     with progress(None, "backbone curve", "points") as report:
-        chosen = {"mode": mode, "amplitude_limit": amplitude_limit, "max_points": max_points}
-        named = {name: value for name, value in chosen.items() if value is not None}
-        curve = curve_of(settings.free_system, well=well, progress=report, **named)  # type: ignore[arg-type]
+        curve = library.backbone_curve(
+            request.settings.free_system, progress=report, **{name: getattr(request, name) for name in names}
+        )
     hertz, stable = curve["frequency"].values, curve["stable"].values
-    lines = [
-        f"{hertz.size} motions in {duration(time.monotonic() - begun)}, {hertz[0]:.5g} to {hertz[-1]:.5g} Hz; "
-        f"{int(stable.sum())} stable",
+    return curve, [
+        f"{hertz.size} motions in {request.took}, {hertz[0]:.5g} to {hertz[-1]:.5g} Hz; {int(stable.sum())} stable",
         f"The curve ends: {curve.attrs['end']}",
     ]
-    files = [write_map(curve, output)]
-    if plot is not None:
-        files.append(draw_computed(curve, plot, output))
-    add_json(summary=lines, files=files)
-    out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
 
 
-@dynamics.command("lyapunov-spectrum", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL, axes=_AXES[:3])
-def lyapunov_spectrum(
-    given: Any,
-    k: Annotated[
-        int | None, opt.count_option("Number of Lyapunov exponents, largest first (1).", _OWN)
-    ] = None,
-    periods: Annotated[int | None, opt.count_option("Periods to average over (500).", _OWN)] = None,
-    transient: Annotated[
-        int | None, opt.count_option(f"Transient periods to discard ({_SETTLING}).", _OWN)
-    ] = None,
-    output: Output = Path("lyapunov_spectrum.nc"),
-    plot: opt.Plot = None,
-    threads: opt.Threads = None,
-) -> None:
+@_analysis(
+    *ALL,
+    axes=_AXES[:3],
+    threads=True,
+    k=_count("Number of Lyapunov exponents, largest first", 1),
+    periods=_count("Periods to average over", 500),
+    transient=_DISCARDED,
+)
+def lyapunov_spectrum(request: _Request) -> _Found:
     """Compute Lyapunov exponents (1/s) by tangents, or a map of the largest exponent.
 
     For the exponents of a transient set --transient 0.
 
     Example: snapbeam dynamics lyapunov-spectrum --modes 8 --frequency-ratio 1.4 --velocity-amplitude 0.01 --k 4
     """
-    from snapbeam.dynamics.lyapunov import lyapunov_spectrum as spectrum_of
-
-    settings = configured(given)
-    _checked(output, plot)
-    begun = time.monotonic()
     with progress(None, "Lyapunov spectrum", "periods") as report:
-        dataset = spectrum_of(
-            settings.system, 1 if k is None else k, 500 if periods is None else periods,
-            transient=transient, axes=settings.axes() or None,
-            integration=settings.integration.replace(threads=threads), progress=report,
-        )  # fmt: skip
-    lines = [f"in {duration(time.monotonic() - begun)}"]
+        dataset = library.lyapunov_spectrum(
+            request.system,
+            request.k,
+            request.periods,
+            transient=request.transient,
+            axes=request.settings.axes() or None,
+            integration=request.integration,
+            progress=report,
+        )
+    lines = [f"in {request.took}"]
     if "running" in dataset:
         for i in range(min(dataset.sizes["exponent_number"], 6)):
             value, error = (float(dataset[name][0, i]) for name in ("exponent", "exponent_error"))
             # on a periodic orbit all blocks agree; what remains is the finite time, of the order of 1/T
             finite = 1.0 / (dataset.attrs["periods"] * dataset.attrs["period"])
             words = f"+- {error:.2g}" if error > finite else f"+- {finite:.2g}, from the finite time"
-            lines.append(
-                f"exponent {i + 1}: {value:.4g} {words}, 1/s; {value * dataset.attrs['period']:.4g} per period"
-            )
-    _finish(dataset, output, plot, lines)
+            per_period = value * dataset.attrs["period"]
+            lines.append(f"exponent {i + 1}: {value:.4g} {words}, 1/s; {per_period:.4g} per period")
+    return dataset, lines
 
 
-@dynamics.command("poincare-section", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL)
-def poincare_section(
-    given: Any,
-    at: Annotated[
-        str, typer.Option(help="Section: stroboscopic or impact.", rich_help_panel=_OWN, metavar="KIND")
-    ] = "stroboscopic",
-    periods: Annotated[int | None, opt.count_option("Periods to record (1000).", _OWN)] = None,
-    transient: Annotated[
-        int | None, opt.count_option(f"Transient periods to discard ({_SETTLING}).", _OWN)
-    ] = None,
-    output: Output = Path("poincare_section.nc"),
-    plot: opt.Plot = None,
-) -> None:
+@_analysis(
+    *ALL,
+    at=_text("Section: stroboscopic or impact", "stroboscopic", "KIND"),
+    periods=_count("Periods to record", 1000),
+    transient=_DISCARDED,
+)
+def poincare_section(request: _Request) -> _Found:
     """Compute a Poincare section: one state per period, or one at the onset of each impact.
 
     Example: snapbeam dynamics poincare-section --modes 1 --frequency-ratio 1.625 --velocity-amplitude 0.3
     --plot section.png
     """
-    from snapbeam.dynamics.sections import poincare_section as section_of
-
-    settings = configured(given)
-    _checked(output, plot)
-    dataset = section_of(
-        settings.system, at, 1000 if periods is None else periods,
-        transient=transient, integration=settings.integration,
-    )  # fmt: skip
-    _finish(dataset, output, plot, [f"{dataset.sizes['point']} points"])
+    dataset = library.poincare_section(
+        request.system, request.at, request.periods, transient=request.transient, integration=request.integration
+    )
+    return dataset, [f"{dataset.sizes['point']} points"]
 
 
-@dynamics.command("branch", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL)
-def branch(
-    given: Any,
-    parameter: Parameter = "velocity_amplitude",
-    bounds: Annotated[
-        str, typer.Option(help="Bounds of the parameter, low:high.", rich_help_panel=_OWN)
-    ] = "0.005:0.3",
-    direction: Annotated[
-        str, typer.Option(help="Initial direction: up or down.", rich_help_panel=_OWN)
-    ] = "up",
-    period: Annotated[
-        int | None, opt.count_option("Period of the orbit in periods of the drive (1).", _OWN)
-    ] = None,
-    transient: Annotated[
-        int | None, opt.count_option("Transient periods to integrate before the search (500).", _OWN)
-    ] = None,
-    max_points: Annotated[int | None, opt.count_option("Maximum number of orbits (500).", _OWN)] = None,
-    output: Output = Path("branch.nc"),
-    plot: opt.Plot = None,
-) -> None:
+@_analysis(
+    *ALL,
+    parameter=_PARAMETER,
+    bounds=_BOUNDS,
+    direction=_text("Initial direction: up or down", "up"),
+    period=_PERIOD,
+    transient=_SEARCHED,
+    max_points=_count("Maximum number of orbits", 500),
+)
+def branch(request: _Request) -> _Found:
     """Continue a periodic orbit along a parameter, and locate folds, flips and grazing.
 
     Example: snapbeam dynamics branch --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --bounds 0.005:0.3
     """
-    from snapbeam.dynamics.branches import continuation
-    from snapbeam.dynamics.periodic_orbits import periodic_orbit
-    from snapbeam.dynamics.shooting import OrbitNotFoundError
-
-    settings = configured(given)
-    _checked(output, plot)
-    limits = _interval("bounds (--bounds)", bounds, settings, parameter)
-    begun = time.monotonic()
-    options = None if given.get("integration.accuracy") is None else settings.integration
-    try:
-        orbit = periodic_orbit(
-            settings.system, period=1 if period is None else period, transient=500 if transient is None else transient,
-            integration=options,
-        )  # fmt: skip
-    except OrbitNotFoundError as error:
-        from snapbeam.util.validation import InputError
-
-        raise InputError(f"no orbit of period {1 if period is None else period}: {error}") from None
-    found = continuation(
-        orbit, parameter, limits, direction=direction, max_points=500 if max_points is None else max_points
+    limits = request.interval("bounds", request.parameter)
+    orbit = _orbit(request, f"no orbit of period {request.period}", transient=request.transient)
+    found = library.continuation(
+        orbit, request.parameter, limits, direction=request.direction, max_points=request.max_points
     )
-    lines = [_plain(found), *map(_plain, found.special_points), f"in {duration(time.monotonic() - begun)}"]
-    _finish(found.to_dataset(), output, plot, lines)
+    return found.to_dataset(), [_plain(found), *map(_plain, found.special_points), f"in {request.took}"]
 
 
-@dynamics.command("manifold", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL)
-def manifold(
-    given: Any,
-    stability: Annotated[
-        str, typer.Option(help="Manifold: unstable or stable.", rich_help_panel=_OWN, metavar="KIND")
-    ] = "unstable",
-    period: Annotated[
-        int | None, opt.count_option("Period of the saddle in periods of the drive (1).", _OWN)
-    ] = None,
-    max_arclength: Annotated[
-        float | None, opt.number_option("Length of each branch, in units of the well's amplitude (10).", _OWN)
-    ] = None,
-    max_seconds: Annotated[
-        float | None, opt.number_option("Time after which the manifold ends as it is, s.", _OWN)
-    ] = None,
-    output: Output = Path("manifold.nc"),
-    plot: opt.Plot = None,
-) -> None:
+@_analysis(
+    *ALL,
+    stability=_text("Manifold: unstable or stable", "unstable", "KIND"),
+    period=_count("Period of the saddle in periods of the drive", 1),
+    max_arclength=_number("Length of each branch, in units of the well's amplitude", 10.0),
+    max_seconds=_number("Time after which the manifold ends as it is, s"),
+)
+def manifold(request: _Request) -> _Found:
     """Compute the one-dimensional unstable or stable manifold of the saddle orbit near the straight beam.
 
     Example: snapbeam dynamics manifold --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --plot manifold.png
     """
-    from snapbeam.dynamics.manifolds import invariant_manifold
-    from snapbeam.dynamics.periodic_orbits import periodic_orbit
-    from snapbeam.dynamics.shooting import OrbitNotFoundError
-    from snapbeam.util.validation import InputError
-
-    settings = configured(given)
-    _checked(output, plot)
-    begun = time.monotonic()
-    options = None if given.get("integration.accuracy") is None else settings.integration
-    straight = np.zeros(2 * settings.system.model.modes)
-    try:
-        saddle = periodic_orbit(
-            settings.system, straight, 1 if period is None else period, integration=options
-        )
-    except OrbitNotFoundError as error:
-        raise InputError(f"no saddle near the straight beam: {error}") from None
+    straight = np.zeros(2 * request.system.model.modes)
+    saddle = _orbit(request, "no saddle near the straight beam", straight)
     with progress(None, "manifold", "percent of the length") as report:
-        curve = invariant_manifold(
-            saddle, stability, max_arclength=10.0 if max_arclength is None else max_arclength, max_seconds=max_seconds,
+        curve = library.invariant_manifold(
+            saddle,
+            request.stability,
+            max_arclength=request.max_arclength,
+            max_seconds=request.max_seconds,
             progress=lambda share: report(round(100.0 * share), 100),
-        )  # fmt: skip
-    lines = [
+        )
+    return curve, [
         _plain(saddle),
-        f"{curve.sizes['point']} points in {duration(time.monotonic() - begun)}",
+        f"{curve.sizes['point']} points in {request.took}",
         f"ends of the branches: {curve.attrs['termination_reason']}",
     ]
-    _finish(curve, output, plot, lines)
 
 
-@dynamics.command("bifurcation-curve", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL)
-def bifurcation_curve(
-    given: Any,
-    parameter: Parameter = "velocity_amplitude",
-    bounds: Annotated[
-        str, typer.Option(help="Bounds of the parameter, low:high.", rich_help_panel=_OWN)
-    ] = "0.005:0.3",
-    second: Annotated[
-        str, typer.Option(help="Second parameter of the curve.", rich_help_panel=_OWN)
-    ] = "frequency_ratio",
-    second_bounds: Annotated[
-        str, typer.Option(help="Bounds of the second parameter, low:high.", rich_help_panel=_OWN)
-    ] = "0.5:3",
-    number: Annotated[
-        int | None,
-        opt.count_option(
-            "Number of the fold, flip, Neimark-Sacker point or grazing of the branch (1).", _OWN
-        ),
-    ] = None,
-    period: Annotated[
-        int | None, opt.count_option("Period of the orbit in periods of the drive (1).", _OWN)
-    ] = None,
-    transient: Annotated[
-        int | None, opt.count_option("Transient periods to integrate before the search (500).", _OWN)
-    ] = None,
-    max_points: Annotated[
-        int | None, opt.count_option("Maximum number of points to either side (200).", _OWN)
-    ] = None,
-    output: Output = Path("bifurcation_curve.nc"),
-    plot: opt.Plot = None,
-) -> None:
+@_analysis(
+    *ALL,
+    parameter=_PARAMETER,
+    bounds=_BOUNDS,
+    second=_text("Second parameter of the curve", "frequency_ratio"),
+    second_bounds=_text("Bounds of the second parameter, low:high", "0.5:3"),
+    number=_count("Number of the fold, flip, Neimark-Sacker point or grazing of the branch", 1),
+    period=_PERIOD,
+    transient=_SEARCHED,
+    max_points=_count("Maximum number of points to either side", 200),
+)
+def bifurcation_curve(request: _Request) -> _Found:
     """Continue a fold, flip, Neimark-Sacker point or grazing in two parameters, and locate points of codimension two.
 
     A periodic orbit is continued along the first parameter until the point with this number is found.
@@ -586,78 +509,42 @@ def bifurcation_curve(
     Example: snapbeam dynamics bifurcation-curve --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --second-bounds 1.2:2
     """
     from snapbeam.dynamics.bifurcation_curves import CURVES
-    from snapbeam.dynamics.bifurcation_curves import bifurcation_curve as curve_of
-    from snapbeam.dynamics.branches import continuation
-    from snapbeam.dynamics.periodic_orbits import periodic_orbit
-    from snapbeam.dynamics.shooting import OrbitNotFoundError
-    from snapbeam.util.validation import InputError
 
-    settings = configured(given)
-    _checked(output, plot)
-    limits = _interval("bounds (--bounds)", bounds, settings, parameter)
-    others = _interval("second_bounds (--second-bounds)", second_bounds, settings, second)
-    wanted = 1 if number is None else number
-    begun = time.monotonic()
-    options = None if given.get("integration.accuracy") is None else settings.integration
+    parameter, second, wanted = request.parameter, request.second, request.number
+    limits, others = request.interval("bounds", parameter), request.interval("second_bounds", second)
+    orbit = _orbit(request, "no such curve", transient=request.transient)
     try:
-        orbit = periodic_orbit(
-            settings.system, period=1 if period is None else period, transient=500 if transient is None else transient,
-            integration=options,
-        )  # fmt: skip
-        branch = continuation(orbit, parameter, limits)
+        branch = library.continuation(orbit, parameter, limits)
         found = [point for point in branch.special_points if point.kind in CURVES]
         if len(found) < wanted:
             raise InputError(
                 f"number (--number) = {wanted}: the branch in {parameter} has {len(found)} such points: "
                 f"{', '.join(map(_plain, branch.special_points)) or 'none'}"
             )
-        curve = curve_of(
-            found[wanted - 1],
-            (second, parameter),
-            (others, limits),
-            max_points=200 if max_points is None else max_points,
+        curve = library.bifurcation_curve(
+            found[wanted - 1], (second, parameter), (others, limits), max_points=request.max_points
         )
-    except OrbitNotFoundError as error:
+    except library.OrbitNotFoundError as error:
         raise InputError(f"no such curve: {error}") from None
-    names = curve.attrs["parameters"]
-    lines = [
-        f"{_plain(found[wanted - 1])}: {curve.sizes['point']} points in {duration(time.monotonic() - begun)}",
-        *(
-            f"{kind} at "
-            + ", ".join(f"{name} = {float(curve[f'special_point_{name}'][k]):.8g}" for name in names)
-            for k, kind in enumerate(curve["special_point_kind"].values)
-        ),
-        f"The curve ends: {curve.attrs['termination_reason']}",
-    ]
-    _finish(curve, output, plot, lines)
+    lines = [f"{_plain(found[wanted - 1])}: {curve.sizes['point']} points in {request.took}"]
+    for k, kind in enumerate(curve["special_point_kind"].values):
+        at = (f"{name} = {float(curve[f'special_point_{name}'][k]):.8g}" for name in curve.attrs["parameters"])
+        lines.append(f"{kind} at {', '.join(at)}")
+    return curve, [*lines, f"The curve ends: {curve.attrs['termination_reason']}"]
 
 
-@dynamics.command("basins", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL)
-def basins(
-    given: Any,
-    amplitudes: Annotated[
-        str, typer.Option(help="Values of amplitude[1], start:stop:count.", rich_help_panel=_OWN)
-    ] = "-1.6:1.6:200",
-    velocities: Annotated[
-        str, typer.Option(help="Values of velocity[1], start:stop:count.", rich_help_panel=_OWN)
-    ] = "-1:1:200",
-    periods: Annotated[
-        int | None,
-        opt.count_option(
-            "Periods after which a state counts as undecided (16 time constants of the slowest decay, at least 200 "
-            "and at most 20,000).",
-            _OWN,
-        ),
-    ] = None,
-    states: Annotated[
-        int | None, opt.count_option("Initial states of the search for attractors (200).", _OWN)
-    ] = None,
-    output: Output = Path("basins.nc"),
-    plot: opt.Plot = None,
-    threads: opt.Threads = None,
-) -> None:
+@_analysis(
+    *ALL,
+    threads=True,
+    amplitudes=_text("Values of amplitude[1], start:stop:count", "-1.6:1.6:200"),
+    velocities=_text("Values of velocity[1], start:stop:count", "-1:1:200"),
+    periods=_count(
+        "Periods after which a state counts as undecided (16 time constants of the slowest decay, at least 200 and at "
+        "most 20,000)"
+    ),
+    states=_count("Initial states of the search for attractors", 200),
+)
+def basins(request: _Request) -> _Found:
     """Find and verify attractors, and compute their basins over the first modal amplitude and its velocity.
 
     The search draws amplitude[1] from -1.4 to 1.4 and velocity[1] from -0.6 to 0.6, and discards 16 time constants, at
@@ -665,26 +552,16 @@ def basins(
 
     Example: snapbeam dynamics basins --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --plot basins.png
     """
-    from snapbeam.dynamics.attractors import find_attractors
-    from snapbeam.dynamics.basins import basin_entropy
-    from snapbeam.dynamics.basins import basins_of_attraction as basins_of
     from snapbeam.model.parameter_axes import parse_axis
 
-    settings = configured(given)
-    _checked(output, plot)
-    begun = time.monotonic()
     grid = {
-        "amplitude[1]": parse_axis("amplitudes", amplitudes),
-        "velocity[1]": parse_axis("velocities", velocities),
+        "amplitude[1]": parse_axis("amplitudes", request.amplitudes),
+        "velocity[1]": parse_axis("velocities", request.velocities),
     }
-    found = find_attractors(
-        settings.system,
-        200 if states is None else states,
-        integration=settings.integration.replace(threads=threads),
-    )
+    found = library.find_attractors(request.system, request.states, integration=request.integration)
     with progress(None, "basins", "periods") as report:
-        dataset = basins_of(found, grid, periods=periods, progress=report)
-    lines = [f"{len(found.attractors)} attractors in {duration(time.monotonic() - begun)}"]
+        dataset = library.basins_of_attraction(found, grid, periods=request.periods, progress=report)
+    lines = [f"{len(found.attractors)} attractors in {request.took}"]
     for number, each in enumerate(found.attractors):
         share = 100.0 * float((dataset["basin"] == number).mean())
         lines.append(f"{number}: {_plain(each)}, {share:.3g} % of the plane")
@@ -699,8 +576,7 @@ def basins(
         f"undecided: {100 * dataset.attrs['undecided']:.3g} %; label changes at half the step: {share:.2g} % of the plane "
         f"({low:.2g} to {high:.2g} % at 95 %)"
     )
-    lines += _entropy_lines(basin_entropy(dataset["basin"].values, 5))
-    _finish(dataset, output, plot, lines)
+    return dataset, lines + _entropy_lines(library.basin_entropy(dataset["basin"].values, 5))
 
 
 def _entropy_lines(entropy: BasinEntropy) -> list[str]:
@@ -718,48 +594,26 @@ def _entropy_lines(entropy: BasinEntropy) -> list[str]:
     return lines
 
 
-@dynamics.command("edge", cls=ShortHelpCommand)
-@cli_command
-@with_parameters(*_ALL)
-def edge(
-    given: Any,
-    initial_velocity: Annotated[
-        float | None,
-        opt.number_option(
-            "Initial velocity of the first mode, divided by omega_1 times the amplitude of the well, that makes the beam "
-            "snap through (doubled from 0.1 until it does).",
-            _OWN,
-        ),
-    ] = None,
-    periods: Annotated[int | None, opt.count_option("Periods to track the edge for (60).", _OWN)] = None,
-    horizon: Annotated[
-        int | None, opt.count_option("Periods after which a run is classified as snapping or not (40).", _OWN)
-    ] = None,
-    output: Output = Path("edge.nc"),
-    plot: opt.Plot = None,
-) -> None:
+@_analysis(
+    *ALL,
+    initial_velocity=_number(
+        "Initial velocity of the first mode, divided by omega_1 times the amplitude of the well, that makes the beam "
+        "snap through (doubled from 0.1 until it does)"
+    ),
+    periods=_count("Periods to track the edge for", 60),
+    horizon=_count("Periods after which a run is classified as snapping or not", 40),
+)
+def edge(request: _Request) -> _Found:
     """Track the edge state between two outcomes, and find the unstable orbit on it.
 
     Example: snapbeam dynamics edge --modes 1 --damping-ratio 0.05 --frequency-ratio 0.7 --velocity-amplitude 0.14
     --plot edge.png
     """
-    from snapbeam.dynamics.edge_states import edge_tracking, kicked
+    from snapbeam.dynamics.edge_states import kicked
     from snapbeam.dynamics.stroboscope import Stroboscope
 
-    settings = configured(given)
-    _checked(output, plot)
-    ahead = 40 if horizon is None else horizon
-    how = settings.integration
-    flow = Stroboscope(
-        settings.system,
-        how if given.get("integration.accuracy") is not None else how.replace(accuracy="reference"),
-    )
-    begun = time.monotonic()
-    found = edge_tracking(
-        flow,
-        *kicked(flow, initial_velocity, ahead),
-        periods=60 if periods is None else periods,
-        horizon=ahead,
-    )
-    lines = [_plain(found), f"in {duration(time.monotonic() - begun)}"]
-    _finish(found.to_dataset(), output, plot, lines)
+    exact = request.settings.integration.replace(accuracy="reference")
+    flow = Stroboscope(request.system, request.chosen_integration or exact)
+    ends = kicked(flow, request.initial_velocity, request.horizon)
+    found = library.edge_tracking(flow, *ends, periods=request.periods, horizon=request.horizon)
+    return found.to_dataset(), [_plain(found), f"in {request.took}"]

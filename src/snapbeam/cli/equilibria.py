@@ -39,12 +39,10 @@ _OUTCOMES = {
 def equilibria(
     given: Any,
     lower_frequency: Annotated[
-        float | None,
-        opt.number_option("First frequency measured about the lower well, Hz.", "Identification"),
+        float | None, opt.number_option("First frequency measured about the lower well, Hz.", "Identification")
     ] = None,
     upper_frequency: Annotated[
-        float | None,
-        opt.number_option("First frequency measured about the upper well, Hz.", "Identification"),
+        float | None, opt.number_option("First frequency measured about the upper well, Hz.", "Identification")
     ] = None,
     identify: Annotated[
         str,
@@ -63,8 +61,7 @@ def equilibria(
         ),
     ] = False,
     location: Annotated[
-        float | None,
-        opt.number_option("Location of the force over the length (0.5).", "Force-displacement"),
+        float | None, opt.number_option("Location of the force over the length (0.5).", "Force-displacement")
     ] = None,
     well: Annotated[
         str | None,
@@ -121,9 +118,7 @@ def equilibria(
         if value is not None
     ]
     if asked and not with_force:
-        raise InputError(
-            f"{', '.join(asked)}: belongs to the force-displacement curve; add --force-displacement"
-        )
+        raise InputError(f"{', '.join(asked)}: belongs to the force-displacement curve; add --force-displacement")
     if with_force and over is not None:
         raise InputError("--over, --force-displacement: give one of the two")
     check_pictures(("plot", plot))
@@ -171,9 +166,7 @@ def equilibria(
     for name, row, barrier in zip_longest(potential.well_names, freq, barriers):
         own = ", ".join(f"{each:.3f}" for each in row)
         console.print(
-            f"monostable: {own} Hz"
-            if barrier is None
-            else f"{name}: {own} Hz; barrier {prefixed(barrier, 'J', 4)}"
+            f"monostable: {own} Hz" if barrier is None else f"{name}: {own} Hz; barrier {prefixed(barrier, 'J', 4)}"
         )
     if len(freq) < 2 and model.imperfection is not None and potential.is_of_the_structure_alone:
         console.print(model.two_well_limits)
@@ -238,9 +231,7 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) 
         if (own["stable_end_kind"] == "none").all():
             first, last = (prefixed(float(each), "m", 4) for each in own["stable_displacement"].values)
             between = " to ".join(shown(float(each)) for each in own["stable_value"].values)
-            console.print(
-                f"the stable branch with the centre at {first} to {last} does not end, {name} = {between}"
-            )
+            console.print(f"the stable branch with the centre at {first} to {last} does not end, {name} = {between}")
     add_json(
         parameter=name,
         critical_values=found["critical_value"].values,
@@ -256,12 +247,7 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) 
 
 
 def _force_displacement(
-    system: System,
-    potential: Potential,
-    location: float,
-    well: str | None,
-    output: Path | None,
-    plot: Path | None,
+    system: System, potential: Potential, location: float, well: str | None, output: Path | None, plot: Path | None
 ) -> None:
     """Print snap-through and snap-back, and write the curve and its figure."""
     from snapbeam.cli.frequencies import modal_error_text
@@ -284,9 +270,7 @@ def _force_displacement(
             )
         else:
             console.print(f"{words}: none; the stable path does not end")
-    error = modal_error(
-        system, lambda each: force_displacement(each, location, well=well)["snap_through_force"]
-    )
+    error = modal_error(system, lambda each: force_displacement(each, location, well=well)["snap_through_force"])
     if error == error:
         console.print(modal_error_text("snap-through force", error, system.model.modes))
     add_json(

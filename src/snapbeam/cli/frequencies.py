@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 @cli_command
 @with_parameters(*BEAM, *BOUNDARY, *IMPERFECTION, *MODEL)
 def frequencies(
-    given: Any,
-    count: Annotated[int, opt.count_option("Number of frequencies to print (10).", "Output")] = 10,
+    given: Any, count: Annotated[int, opt.count_option("Number of frequencies to print (10).", "Output")] = 10
 ) -> None:
     """Print the natural frequencies about the equilibrium: reduced, exact, and without load.
 
@@ -88,16 +87,11 @@ def _print_wells(potential: Potential, count: int, error: float) -> None:
         reference_well=model.reference_well, reference_frequency=model.reference_frequency,
     )  # fmt: skip
     console = out()
-    console.print(
-        f"{model.modes} modes, reduced model; exact frequencies are of perfect beams without forces only"
-    )
+    console.print(f"{model.modes} modes, reduced model; exact frequencies are of perfect beams without forces only")
     for line in potential.force_texts:
         console.print(line)
     table = Table(box=None, pad_edge=False)
-    for title in (
-        "",
-        *(f"{name}, centre at {1e6 * at:.4g} µm (Hz)" for name, at in zip(names, heights, strict=True)),
-    ):
+    for title in ("", *(f"{name}, centre at {1e6 * at:.4g} µm (Hz)" for name, at in zip(names, heights, strict=True))):
         table.add_column(title, justify="right")
     for at in range(freq.shape[1]):
         table.add_row(str(at + 1), *(f"{row[at]:.3f}" for row in freq))

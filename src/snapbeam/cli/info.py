@@ -51,9 +51,7 @@ def info(
         variable = dataset[name]
         units = variable.attrs.get("units")
         about = variable.attrs.get("long_name", "")
-        text = (
-            f"  {name:<{max(map(len, names)) + 2}}{about}{f' ({units})' if units not in (None, '1') else ''}"
-        )
+        text = f"  {name:<{max(map(len, names)) + 2}}{about}{f' ({units})' if units not in (None, '1') else ''}"
         console.print(printable(text), markup=False)
     if "response_class" in dataset:
         console.print(class_table(dataset), *status_lines(dataset), sep="\n")

@@ -10,35 +10,16 @@ import typer
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import FAILED, add_json, cli_command, out
-from snapbeam.cli.parameter_options import (
-    BEAM,
-    CONTACT,
-    DRIVE,
-    MODEL,
-    RUN,
-    STRIKER,
-    configured,
-    with_parameters,
-)
-
-_AXES = (
-    "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
-    "contact.location", "contact.location_m", "model.modes",
-)  # fmt: skip
+from snapbeam.cli.parameter_options import ALL, AXES, configured, with_parameters
 
 
 @cli_command
-@with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, axes=_AXES)
+@with_parameters(*ALL, axes=AXES)
 @opt.with_checkpoint
 def compute_map(
     given: Any,
     keeping: Any,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"
-        ),
-    ] = Path("map.nc"),
+    output: opt.Output = Path("map.nc"),
     plot: opt.Plot = None,
     variable: Annotated[
         str | None,
@@ -60,16 +41,15 @@ def compute_map(
     Example: snapbeam map --modes 32 --cycles 200 --frequency-ratio 0.1:4:64 --velocity-amplitude
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
     """
-    from snapbeam.cli.console import check_pictures, draw_computed, read_overlay
+    from snapbeam.cli.console import check_outputs, draw_computed, read_overlay
     from snapbeam.cli.summary import map_facts, map_summary
-    from snapbeam.util.files import check_writable, require_room, set_request
+    from snapbeam.util.files import require_room, set_request
 
     settings = opt.resumed(given, keeping, configured(given, _axes_of))
     axes = _axes_of(settings, given)
     stored = opt.kept_config(settings, keeping)
     set_request([settings.system.hash, settings.integration, axes, stored["options"]])
-    check_writable(output, "output", (".nc",))
-    check_pictures(("plot", plot))
+    check_outputs(output, plot)
     if plot is not None:
         _check_two_axes(plot, axes)
     _check_variable(variable, plot, overlaid=measurements is not None or quasi_static_line)
@@ -117,14 +97,7 @@ def compute_map(
             else draw_computed(dataset, plot, output, "response_class", **overlays)
         )
     add_json(**map_facts(dataset), seconds=elapsed, files=files)
-    out().print(
-        map_summary(
-            dataset,
-            files,
-            None if opt.is_long(keeping) else elapsed,
-            variable,
-        )
-    )
+    out().print(map_summary(dataset, files, None if opt.is_long(keeping) else elapsed, variable))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
     if counts.failed:
         raise typer.Exit(FAILED)

@@ -38,13 +38,7 @@ CONTACT = ("contact.stiffness", "contact.radius", "contact.young_modulus", "cont
            "contact.coefficient", "contact.damping_factor", "contact.restitution", "contact.speed")  # fmt: skip
 STRIKER = ("contact.location", "contact.location_m", "contact.side", "contact.gap", "contact.mass", "contact.suspension_stiffness",
            "contact.suspension_damping")  # fmt: skip
-DRIVE = (
-    "drive.frequency_ratio",
-    "drive.frequency_hz",
-    "drive.velocity_amplitude",
-    "drive.velocity_m_s",
-    "drive.phase",
-)
+DRIVE = ("drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s", "drive.phase")
 RUN = (
     "integration.cycles",
     "integration.step",
@@ -54,6 +48,14 @@ RUN = (
     "integration.max_steps",
     "initial_state.initial_well",
 )
+
+ALL = (*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN)
+"""Parameters of the commands that compute runs."""
+AXES = (
+    "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
+    "contact.location", "contact.location_m", "model.modes",
+)  # fmt: skip
+"""Those of them that may be axes of a map."""
 
 _PANELS = {
     "beam": "Beam (default: the paper's)",
@@ -100,7 +102,7 @@ _WORDS = {
     "model.damping_ratio": "damping ratio of every linear mode, or one for each: zeta1,zeta2,...",
     "integration.step": "step in free flight, s; follows from the model by default",
     "integration.accuracy": "accuracy level: standard, or reference (much shorter steps, to check results)",
-    "integration.engine": "solver: auto or native, the core in C++; python, the equations in Python, slow",
+    "integration.engine": "solver: auto or native, the core in C++; python, the equations in Python, slow; cuda, the core on a GPU, for maps",
     "integration.early_termination": "end a run once its response class is certain; its statistics then cover the time until then",
 }
 _PAIRS = ("contact.young_modulus", "contact.poisson_ratio")
@@ -108,9 +110,7 @@ _LISTS = ("model.damping_ratio",)
 """One number, or one for each linear mode."""
 
 
-def with_parameters(
-    *names: str, axes: tuple[str, ...] = ()
-) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def with_parameters(*names: str, axes: tuple[str, ...] = ()) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Give a command options for parameters, and for a parameter file and anything else by name.
 
     The command gets a parameter ``given``, a mapping of what was given: values by dotted name, and the file.
@@ -185,16 +185,10 @@ def import_laws(given: Sequence[str] | None) -> None:
         if path.suffix != ".py" or not path.is_file():
             raise InputError(f"{where}: must be an existing Python file, such as mylaw.py or mylaw.py:Magnet")
         module = sys.modules.get(path.stem)
-        known = (
-            None
-            if module is not None or not path.stem.isidentifier()
-            else importlib.util.find_spec(path.stem)
-        )
+        known = None if module is not None or not path.stem.isidentifier() else importlib.util.find_spec(path.stem)
         origin = getattr(module, "__file__", None) if known is None else known.origin
         if (module is not None or known is not None) and Path(origin or "").resolve() != path.resolve():
-            raise InputError(
-                f"{where}: has the name of the installed module {path.stem!r}; give the file another name"
-            )
+            raise InputError(f"{where}: has the name of the installed module {path.stem!r}; give the file another name")
         if module is None:
             spec = importlib.util.spec_from_file_location(path.stem, path.resolve())
             assert spec is not None and spec.loader is not None
@@ -214,9 +208,7 @@ def _identifier(name: str) -> str:
 
 
 def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
-    config = typer.Option(
-        "--config", "-c", help="TOML parameter file; other options override it.", metavar="FILE"
-    )
+    config = typer.Option("--config", "-c", help="TOML parameter file; other options override it.", metavar="FILE")
     anything = typer.Option(
         "--set", help="Any parameter by its dotted name, such as contact.stiffness=2e8; repeat for further parameters.",
         metavar="NAME=VALUE",
@@ -226,8 +218,7 @@ def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
         metavar="FILE",
     )  # fmt: skip
     point = typer.Option(
-        help="Point of the map of --from, the nearest one: name=value,name=value.",
-        metavar="NAME=VALUE,...",
+        help="Point of the map of --from, the nearest one: name=value,name=value.", metavar="NAME=VALUE,..."
     )
     shown = typer.Option(
         "--print-config", help="Print all parameters, defaults included, as a parameter file, and stop."
@@ -496,9 +487,14 @@ def count_option(about: str, panel: str) -> Any:
 Threads = Annotated[int | None, count_option("Number of processor cores; all by default.", "Integration")]
 Plot = Annotated[
     Path | None,
-    typer.Option(
-        "--plot", help="Figure file to write: .png, .pdf or .svg.", rich_help_panel=_OUTPUT, metavar="FILE"
-    ),
+    typer.Option("--plot", help="Figure file to write: .png, .pdf or .svg.", rich_help_panel=_OUTPUT, metavar="FILE"),
+]
+Output = Annotated[
+    Path, typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel=_OUTPUT, metavar="FILE")
+]
+CheckpointFolder = Annotated[
+    Path | None,
+    typer.Option(help="Checkpoint folder; an existing one is resumed.", rich_help_panel=_OUTPUT, metavar="DIR"),
 ]
 Measurements = Annotated[
     Path | None,
@@ -516,8 +512,7 @@ QuasiStaticLine = Annotated[
     ),
 ]
 Window = Annotated[
-    str | None,
-    typer.Option(help="Cycles to draw, first:last.", rich_help_panel=_OUTPUT, metavar="FIRST:LAST"),
+    str | None, typer.Option(help="Cycles to draw, first:last.", rich_help_panel=_OUTPUT, metavar="FIRST:LAST")
 ]
 
 
@@ -561,9 +556,7 @@ CheckpointOption = Annotated[
 CheckCheckpoint = Annotated[
     bool,
     typer.Option(
-        "--check-checkpoint",
-        help="Check the checkpoint and compute damaged tasks again.",
-        rich_help_panel=_LONG,
+        "--check-checkpoint", help="Check the checkpoint and compute damaged tasks again.", rich_help_panel=_LONG
     ),
 ]
 ClusterOption = Annotated[
@@ -577,26 +570,20 @@ ClusterOption = Annotated[
 ]
 RefineLevels = Annotated[
     int | None,
-    count_option(
-        "Number of times to halve the grid spacing where neighbours differ in response class.", _LONG
-    ),
+    count_option("Number of times to halve the grid spacing where neighbours differ in response class.", _LONG),
 ]
 Replicates = Annotated[
-    int | None,
-    count_option("Number of repeats of each run with slightly different initial conditions.", _LONG),
+    int | None, count_option("Number of repeats of each run with slightly different initial conditions.", _LONG)
 ]
 PerturbationRms = Annotated[
     float | None,
     number_option(
-        "Rms perturbation of the initial midspan displacement, m (3.5e-6, the resolution of the camera).",
-        _LONG,
+        "Rms perturbation of the initial midspan displacement, m (3.5e-6, the resolution of the camera).", _LONG
     ),
 ]
 CheckHalfStep = Annotated[
     bool,
-    typer.Option(
-        "--check-half-step", help="Repeat each run once more with half the time step.", rich_help_panel=_LONG
-    ),
+    typer.Option("--check-half-step", help="Repeat each run once more with half the time step.", rich_help_panel=_LONG),
 ]
 PointsPerTask = Annotated[
     int | None, count_option("Points in each task; chosen from the size of the map by default.", _LONG)
@@ -637,11 +624,7 @@ def with_checkpoint(function: Callable[..., Any]) -> Callable[..., Any]:
         for name, (default, kind) in _OPTIONS_LONG.items()
     ]
     kept = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.values()]
-    command.__name__, command.__doc__, command.__module__ = (
-        function.__name__,
-        function.__doc__,
-        function.__module__,
-    )
+    command.__name__, command.__doc__, command.__module__ = (function.__name__, function.__doc__, function.__module__)
     command.__signature__ = inspect.Signature(kept + added)  # type: ignore[attr-defined]
     return command
 
@@ -661,11 +644,7 @@ def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
     if count or keeping["check_half_step"]:
         size = MEASURING_ERROR if keeping["perturbation_rms"] is None else keeping["perturbation_rms"]
         repeats = Replicates(count, size, bool(keeping["check_half_step"]))
-    return {
-        "cluster": keeping["cluster"],
-        "refine_levels": keeping["refine_levels"] or 0,
-        "replicates": repeats,
-    }
+    return {"cluster": keeping["cluster"], "refine_levels": keeping["refine_levels"] or 0, "replicates": repeats}
 
 
 def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config) -> Config:
@@ -699,9 +678,7 @@ def kept_config(settings: Config, keeping: Mapping[str, Any]) -> dict[str, Any]:
 
     options = {name: keeping[name] for name in _STORED if keeping[name]}
     plain = {
-        section: {
-            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()
-        }
+        section: {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
         for section, values in settings.to_mapping().items()
     }
     return {"parameters": plain | settings.extension, "options": options}
@@ -783,9 +760,7 @@ def sweep_report_lines(counts: SweepReport, store: Path | None, elapsed: float) 
             f"{len(counts.damaged)} damaged, {len(counts.failed)} failed"
         )
     if counts.missing:
-        lines.append(
-            f"{counts.missing} tasks are not computed yet; run without --check-checkpoint to compute them"
-        )
+        lines.append(f"{counts.missing} tasks are not computed yet; run without --check-checkpoint to compute them")
     lines += [f"failed: {stage} task {task} {reason}" for stage, task, reason in counts.failed]
     return lines
 
@@ -823,9 +798,7 @@ def config_of_file(path: Path, point: str | None) -> Config:
         raise InputError(f"from = {str(path)!r}: is of a model given by matrices; use it from Python")
     run = {
         name: value
-        for name, value in parsed_json(
-            dataset.attrs.get("integration", "{}"), f"from = {str(path)!r}"
-        ).items()
+        for name, value in parsed_json(dataset.attrs.get("integration", "{}"), f"from = {str(path)!r}").items()
         if value is not None and name != "engine"
     }
     if sections.get("initial_state", {}).keys() - {"initial_well"}:
@@ -852,9 +825,7 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
     for part in point.split(","):
         dim, number = coordinate_on_axis(dataset, "point", part)
         values = axes[dim].values
-        chosen = (
-            number if values.dtype.kind in "OU" else values[int(np.argmin(np.abs(values - number)))].item()
-        )
+        chosen = number if values.dtype.kind in "OU" else values[int(np.argmin(np.abs(values - number)))].item()
         found[str(axes[dim].attrs["parameter"])] = chosen
     missing = [name for name in axes if axes[name].attrs["parameter"] not in found and axes[name].size > 1]
     if missing:
@@ -879,9 +850,7 @@ def coordinate_on_axis(dataset: xr.Dataset, option: str, text: str) -> tuple[str
     from snapbeam.util.validation import InputError
 
     name, value = _assignment(text, option)
-    axes = {
-        str(dim): dataset[dim].attrs["parameter"] for dim in dataset.dims if "parameter" in dataset[dim].attrs
-    }
+    axes = {str(dim): dataset[dim].attrs["parameter"] for dim in dataset.dims if "parameter" in dataset[dim].attrs}
     row = lookup(named_in(name, {split_name(full)[0]: {} for full in axes.values()}))
     dim = next((each for each, full in axes.items() if full in (row.name, ratio_of(row.name))), None)
     if dim is None:
@@ -943,6 +912,5 @@ def _of_list(dataset: xr.Dataset, point: str, path: Path) -> dict[str, Any]:
 def point_text(coordinates: dict[str, Any]) -> str:
     """Coordinates as ``--point`` takes them, to the last digit."""
     return ",".join(
-        f"{name}={value!r}" if isinstance(value, float) else f"{name}={value}"
-        for name, value in coordinates.items()
+        f"{name}={value!r}" if isinstance(value, float) else f"{name}={value}" for name, value in coordinates.items()
     )

@@ -21,8 +21,7 @@ _OVER = ("lower_threshold", "threshold", "probability", "lifetime", "response_cl
 @cli_command
 def plot(
     file: Annotated[
-        Path,
-        typer.Argument(help="NetCDF file of a map, a run, or the result of an analysis.", metavar="FILE"),
+        Path, typer.Argument(help="NetCDF file of a map, a run, or the result of an analysis.", metavar="FILE")
     ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Figure file to write: .png, .pdf or .svg.", metavar="FILE")
@@ -50,22 +49,13 @@ def plot(
     window: opt.Window = None,
 ) -> None:
     """Plot a stored result: in another format, another variable, with measured responses, or a slice of a map."""
-    from snapbeam.cli.console import (
-        check_pictures,
-        draw,
-        open_result,
-        read_overlay,
-    )
+    from snapbeam.cli.console import check_pictures, draw, open_result, read_overlay
     from snapbeam.plot.dataset import figures_of
     from snapbeam.util.validation import InputError
 
     check_pictures(("output", output))
     dataset = open_result(file)
-    wanted = {
-        "frequency_ratio": frequency_ratio,
-        "velocity_amplitude": velocity_amplitude,
-        "location": location,
-    }
+    wanted = {"frequency_ratio": frequency_ratio, "velocity_amplitude": velocity_amplitude, "location": location}
     dataset = _sliced(dataset, wanted, at or [])
     kind, figures = figures_of(dataset)
     figure = next(iter(figures), None) if variable is None else variable
@@ -77,9 +67,7 @@ def plot(
                 f"{figure!r} (file: {kind}); leave them out"
             )
         attrs = dataset.attrs
-        overlay = read_overlay(
-            measurements, attrs.get("reference_frequency"), attrs.get("beam_buckling_level")
-        )
+        overlay = read_overlay(measurements, attrs.get("reference_frequency"), attrs.get("beam_buckling_level"))
         options = {"measurements": overlay, "quasi_static_line": quasi_static_line}
     if window is not None:
         if figure != "run":

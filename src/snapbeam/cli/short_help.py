@@ -59,9 +59,7 @@ def _width() -> int:
 
 def _wrapped(text: str, indent: str = "") -> list[str]:
     plain = " ".join(text.split())
-    return textwrap.wrap(
-        plain, _width(), initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False
-    )
+    return textwrap.wrap(plain, _width(), initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
 
 
 def _first_screen(command: Any, ctx: Any, params: list[Any]) -> str:

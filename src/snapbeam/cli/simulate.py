@@ -22,16 +22,7 @@ from snapbeam.cli.console import (
     notes,
     out,
 )
-from snapbeam.cli.parameter_options import (
-    BEAM,
-    CONTACT,
-    DRIVE,
-    MODEL,
-    RUN,
-    STRIKER,
-    configured,
-    with_parameters,
-)
+from snapbeam.cli.parameter_options import BEAM, CONTACT, DRIVE, MODEL, RUN, STRIKER, configured, with_parameters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,17 +35,14 @@ def simulate(
     recorded_drive: Annotated[
         Path | None,
         typer.Option(
-            help="Recorded motion instead of the sinusoidal one: a file that snapbeam vibrometer "
-            "--drive-output wrote.",
+            help="Recorded motion instead of the sinusoidal one: a file that snapbeam vibrometer --drive-output wrote.",
             rich_help_panel="Striker and drive",
             metavar="FILE",
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"
-        ),
+        typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"),
     ] = None,
     plot: opt.Plot = None,
     animate: Annotated[
@@ -69,9 +57,7 @@ def simulate(
     window: opt.Window = None,
     samples: Annotated[
         int | None,
-        opt.count_option(
-            "Evenly spaced samples per cycle (default: 200, and every step in contact).", "Output"
-        ),
+        opt.count_option("Evenly spaced samples per cycle (default: 200, and every step in contact).", "Output"),
     ] = None,
     stream: Annotated[
         bool,
@@ -108,16 +94,12 @@ def simulate(
     import snapbeam as sb
 
     if stream and (output is None or plot is not None or animate is not None):
-        raise sb.InputError(
-            "--stream: writes one file, name it with --output; draw it later with snapbeam plot"
-        )
+        raise sb.InputError("--stream: writes one file, name it with --output; draw it later with snapbeam plot")
 
     system, integration = settings.system, settings.integration
     if recorded_drive is not None:
         _require_striker(system)
-        named = [
-            name for name in ("frequency_ratio", "velocity_amplitude") if given[f"drive.{name}"] is not None
-        ]
+        named = [name for name in ("frequency_ratio", "velocity_amplitude") if given[f"drive.{name}"] is not None]
         if named:
             raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
         system = system.replace(drive=sb.RecordedMotion.from_dataset(_recorded(recorded_drive)))
@@ -129,9 +111,7 @@ def simulate(
             size = least_file_size(system, integration, None if times is None else len(times))
             require_room_of({"output": (output, size), **pictures})
         if stream and output is not None:
-            summary = sb.simulate_to_file(
-                system, integration, path=output, sample_times=times, progress=progress
-            )
+            summary = sb.simulate_to_file(system, integration, path=output, sample_times=times, progress=progress)
         else:
             run = sb.simulate(system, integration, sample_times=times, progress=progress)
             summary = run.summary
@@ -143,9 +123,7 @@ def simulate(
             run.save(output)
         console.print(f"Written: {file_line(output)}")
     if run is not None and plot is not None:
-        console.print(
-            f"Written: {file_line(draw_computed(run.dataset, plot, output, save=run.save, window=part))}"
-        )
+        console.print(f"Written: {file_line(draw_computed(run.dataset, plot, output, save=run.save, window=part))}")
     if run is not None and animate is not None:
         console.print(f"Written: {file_line(_animated(run, animate, part, output))}")
     files = [path for path in (output, plot, animate) if path is not None]
@@ -214,10 +192,7 @@ class _share_done:
         self._bar.update(self._task, completed=share)
 
 
-_OWN_RECORD = {
-    "base_excitation": "recorded_acceleration",
-    "force": "recorded_force",
-}
+_OWN_RECORD = {"base_excitation": "recorded_acceleration", "force": "recorded_force"}
 """Type of a record that a section takes from a parameter file."""
 
 
@@ -234,9 +209,7 @@ def _require_striker(system: Any) -> None:
         if instead is None
         else f"give the record in the parameter file: [{instead}] with type = {_OWN_RECORD[instead]!r} and its file"
     )
-    raise InputError(
-        f"recorded_drive (--recorded-drive): moves a striker, but the system does not have one; {way}"
-    )
+    raise InputError(f"recorded_drive (--recorded-drive): moves a striker, but the system does not have one; {way}")
 
 
 def _recorded(path: Path) -> xr.Dataset:
@@ -294,20 +267,14 @@ def _summary_text(summary: Any, elapsed: float, system: Any) -> str:
     crossings = f"{summary.zero_crossings}, {summary.zero_crossings_last_quarter} of them in the last quarter"
     contact = f"{summary.impacts}, in contact {100.0 * summary.contact_time_fraction:.3g} % of the time"
     scale = prefixed(system.model.length_scale, "m", 4)
-    center = (
-        f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b (b = {scale})"
-    )
+    center = f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b (b = {scale})"
     end = f"in the {well} well{final}"
     reached = "" if summary.other_well_reached else "not "
     other, wells = f"the other well was {reached}reached", 2
     if not system.model.is_bistable:
         wells, end = 1, f"the centre is {'above' if summary.final_well > 0 else 'below'} 0"
         other = f"the beam has one well; its shape was {reached}inverted"
-    force = (
-        "no finite force"
-        if summary.peak_force != summary.peak_force
-        else prefixed(summary.peak_force, "N", 4)
-    )
+    force = "no finite force" if summary.peak_force != summary.peak_force else prefixed(summary.peak_force, "N", 4)
     work, lost = (prefixed(each, "J", 4) for each in (summary.striker_work, summary.energy_dissipated))
     lines = [
         f"[bold]{kind.label_of(wells)}[/] (in {duration(elapsed)}; {status.advice})",

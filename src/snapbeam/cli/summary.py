@@ -30,10 +30,7 @@ _PAPER = ("frequency_ratio", "velocity_amplitude", "location")
 
 
 def map_summary(
-    dataset: xr.Dataset,
-    files: Sequence[Path],
-    elapsed: float | None = None,
-    variable: str | None = None,
+    dataset: xr.Dataset, files: Sequence[Path], elapsed: float | None = None, variable: str | None = None
 ) -> RenderableType:
     """Return the classes, the lowest interwell amplitude, the highest statistic, failures, files and next commands.
 
@@ -61,9 +58,7 @@ def map_summary(
         lines_after.append(f"No run snapped through{advice}.")
     elif low is not None and (name := _strength_axis(dataset)) is not None:
         lowest = (
-            f"Lowest {_words(dataset, name)} with snap-through"
-            if one
-            else f"Lowest interwell {_words(dataset, name)}"
+            f"Lowest {_words(dataset, name)} with snap-through" if one else f"Lowest interwell {_words(dataset, name)}"
         )
         lines_after.append(f"{lowest}: {_where(dataset, low, name)}")
         notch = deepest_notch(dataset)
@@ -133,12 +128,8 @@ def map_facts(dataset: xr.Dataset) -> dict[str, Any]:
     low = lowest_interwell(dataset)
     return {
         "sizes": {str(name): int(size) for name, size in dataset["response_class"].sizes.items()},
-        "classes": {
-            kind.label_of(wells_of(dataset.attrs)): int((kinds == kind).sum()) for kind in ResponseClass
-        },
-        "statuses": {
-            kind.name.lower(): int((codes == kind).sum()) for kind in RunStatus if (codes == kind).any()
-        },
+        "classes": {kind.label_of(wells_of(dataset.attrs)): int((kinds == kind).sum()) for kind in ResponseClass},
+        "statuses": {kind.name.lower(): int((codes == kind).sum()) for kind in RunStatus if (codes == kind).any()},
         "lowest_interwell": low,
         "deepest_notch": None if low is None else deepest_notch(dataset),
     }
@@ -252,9 +243,7 @@ def class_table(dataset: xr.Dataset) -> Table:
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
         count = int((kinds == kind).sum())
         if count or kind is not ResponseClass.UNKNOWN:
-            table.add_row(
-                kind.label_of(wells_of(dataset.attrs)), str(count), f"{100.0 * count / kinds.size:.1f} %"
-            )
+            table.add_row(kind.label_of(wells_of(dataset.attrs)), str(count), f"{100.0 * count / kinds.size:.1f} %")
     return table
 
 
@@ -311,10 +300,7 @@ def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
     if not dips.size:
         return None
     at = dips[np.argmax(shape["prominences"])]
-    place = {
-        across: float(dataset[across][known][at]),
-        raised: float(threshold[at]),
-    }
+    place = {across: float(dataset[across][known][at]), raised: float(threshold[at])}
     return place | {"location": float(dataset["location"].squeeze())}
 
 
@@ -356,8 +342,7 @@ def status_lines(dataset: xr.Dataset) -> list[str]:
     inferred = int((codes == RunStatus.FILLED).sum())
     if inferred:
         lines.append(
-            f"{codes.size - inferred} of {codes.size} points were run, "
-            "the others were filled from their neighbours."
+            f"{codes.size - inferred} of {codes.size} points were run, the others were filled from their neighbours."
         )
     return lines
 
@@ -378,9 +363,7 @@ def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any]
         at = f" --point {shlex.quote(point)}" if point else ""
         lines.append(f"run this point    snapbeam simulate --from {file}{at} --plot run.png")
         ratios = {ratio_name(name): name for name in axes}
-        if {"frequency_ratio", "velocity_amplitude"} <= ratios.keys() and min(
-            dataset.sizes[name] for name in axes
-        ) > 1:
+        if {"frequency_ratio", "velocity_amplitude"} <= ratios.keys() and min(dataset.sizes[name] for name in axes) > 1:
             closer = _closer(files[0].stem)
             names = [ratios[name] for name in ("frequency_ratio", "velocity_amplitude")]
             options = [f"--{name.replace('_', '-')}" for name in names]
@@ -395,9 +378,7 @@ def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any]
         line = " --quasi-static-line" if set(map(ratio_name, axes)) <= set(_PAPER) else ""
         if sum(dataset.sizes[name] > 1 for name in axes) == 2:
             lines.append(f"plot again        snapbeam plot {file}{line} -o map.pdf")
-        lines.append(
-            f'open the file     python -c "import xarray; print(xarray.open_dataset({str(files[0])!r}))"'
-        )
+        lines.append(f'open the file     python -c "import xarray; print(xarray.open_dataset({str(files[0])!r}))"')
     return [escape(line) for line in lines]
 
 

@@ -10,17 +10,8 @@ import numpy as np
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
-from snapbeam.cli.parameter_options import (
-    BEAM,
-    CONTACT,
-    DRIVE,
-    MODEL,
-    RUN,
-    STRIKER,
-    configured,
-    with_parameters,
-)
+from snapbeam.cli.console import add_json, check_outputs, cli_command, duration, print_written, progress
+from snapbeam.cli.parameter_options import ALL, AXES, configured, with_parameters
 from snapbeam.cli.summary import coordinate_text, initial_well_lines, status_lines, value_text
 from snapbeam.util.status_codes import wells_of
 
@@ -29,15 +20,11 @@ if TYPE_CHECKING:
 
     from snapbeam.model.parameter_file import Config
 
-_AXES = (
-    "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
-    "contact.location", "contact.location_m", "model.modes",
-)  # fmt: skip
 _VALUES = "0.005:0.64:128"
 
 
 @cli_command
-@with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, axes=_AXES)
+@with_parameters(*ALL, axes=AXES)
 def threshold(
     given: Any,
     parameter: Annotated[
@@ -51,12 +38,7 @@ def threshold(
             metavar="VALUES",
         ),
     ] = None,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"
-        ),
-    ] = Path("threshold.nc"),
+    output: opt.Output = Path("threshold.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
@@ -68,12 +50,10 @@ def threshold(
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png
     """
-    from snapbeam.cli.console import check_pictures, draw_computed, write_map
-    from snapbeam.util.files import check_writable
+    from snapbeam.cli.console import draw_computed, write_map
 
     settings = configured(given, lambda config, _: _axes_of(config, parameter, values))
-    check_writable(output, "output", (".nc",))
-    check_pictures(("plot", plot))
+    check_outputs(output, plot)
     axes = _axes_of(settings, parameter, values)
     name, chosen = axes.popitem()
 
@@ -83,9 +63,7 @@ def threshold(
     system = settings.system
     start = time.monotonic()
     with progress(None, "threshold", "runs") as report:
-        dataset = find(
-            system, name, chosen, axes, settings.integration.replace(threads=threads), progress=report
-        )
+        dataset = find(system, name, chosen, axes, settings.integration.replace(threads=threads), progress=report)
     elapsed = time.monotonic() - start
     files = [write_map(dataset, output)]
     if plot is not None:
@@ -103,7 +81,7 @@ def threshold(
         outcome=np.array(_kinds(dataset))[dataset["outcome"].values],
         runs=dataset.attrs["runs"], seconds=elapsed, files=files,
     )  # fmt: skip
-    out().print(*_summary(told, elapsed), *(f"Written: {file_line(path)}" for path in files), sep="\n")
+    print_written(_summary(told, elapsed), files)
 
 
 def _axes_of(settings: Config, parameter: str, text: str | None) -> dict[str, Any]:
@@ -199,7 +177,5 @@ def _curve(curve: xr.Dataset, parameter: str, across: str | None, chosen: dict[s
         )
     higher = always.notnull() & ~(curve["upper_threshold_max"] == always)
     if bool(higher.any()):
-        lines.append(
-            f"  failed runs leave the top of the band open, at {int(higher.sum())} of {first.size} points"
-        )
+        lines.append(f"  failed runs leave the top of the band open, at {int(higher.sum())} of {first.size} points")
     return lines

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, cli_command, duration, file_line, notes, out, progress
+from snapbeam.cli.console import add_json, check_outputs, cli_command, duration, notes, print_written, progress
 from snapbeam.cli.summary import initial_well_lines
 
 if TYPE_CHECKING:
@@ -23,22 +23,10 @@ if TYPE_CHECKING:
     from snapbeam.uncertainty.distributions import ParameterUncertainty
 
 File = Annotated[
-    Path,
-    typer.Argument(
-        help="TOML parameter file with [uncertainty] and the section of the command.", metavar="FILE"
-    ),
-]
-Checkpoint = Annotated[
-    Path | None,
-    typer.Option(
-        help="Checkpoint folder; an existing one is resumed.",
-        rich_help_panel="Output",
-        metavar="DIR",
-    ),
+    Path, typer.Argument(help="TOML parameter file with [uncertainty] and the section of the command.", metavar="FILE")
 ]
 Yes = Annotated[
-    bool,
-    typer.Option("--yes", "-y", help="Compute without asking for confirmation.", rich_help_panel="Cost"),
+    bool, typer.Option("--yes", "-y", help="Compute without asking for confirmation.", rich_help_panel="Cost")
 ]
 EstimateCost = Annotated[
     bool,
@@ -48,14 +36,9 @@ EstimateCost = Annotated[
         rich_help_panel="Cost",
     ),
 ]
-Output = typer.Option(
-    "--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"
-)
 
 
-def read(
-    file: Path, section: str, law: list[str] | None = None
-) -> tuple[Config, ParameterUncertainty, dict[str, Any]]:
+def read(file: Path, section: str, law: list[str] | None = None) -> tuple[Config, ParameterUncertainty, dict[str, Any]]:
     """The system, its parameter uncertainty and the section of the command.
 
     Raises
@@ -103,12 +86,7 @@ def agreed(cost: CostEstimate, yes: bool, stop: bool) -> bool:
 
     notes().print(f"{cost}", markup=False)
     add_json(
-        estimated_cost={
-            "runs": cost.runs,
-            "max_runs": cost.max_runs,
-            "seconds": cost.seconds,
-            "disk_bytes": cost.disk,
-        }
+        estimated_cost={"runs": cost.runs, "max_runs": cost.max_runs, "seconds": cost.seconds, "disk_bytes": cost.disk}
     )
     if stop:
         return False
@@ -117,15 +95,30 @@ def agreed(cost: CostEstimate, yes: bool, stop: bool) -> bool:
     return True
 
 
+def _compute(
+    question: Any, words: tuple[str, str], arguments: tuple[Any, ...], settings: Config, estimate_cost: bool, yes: bool,
+    threads: int | None, checkpoint: Path | None,
+) -> tuple[xr.Dataset, float] | None:  # fmt: skip
+    """The result of a computation and its time, s; None if only its cost is wanted or the user does not agree."""
+    from snapbeam.uncertainty.cost import estimate_cost as cost_of
+
+    how = settings.integration.replace(threads=threads)
+    cost = cost_of(question, *arguments, integration=how, trial=10.0 if estimate_cost else 2.0)
+    if not agreed(cost, yes, estimate_cost):
+        return None
+    begun = time.monotonic()
+    with progress(None, *words) as report:
+        dataset = question(*arguments, integration=how, checkpoint=checkpoint, progress=report)
+    return dataset, time.monotonic() - begun
+
+
 def finish(dataset: xr.Dataset, output: Path, plot: Path | None, drawn: Any, lines: list[str]) -> None:
     """Write and plot the results and print a summary."""
     from snapbeam.cli.console import kept_if_not_drawn, plot_command, write_map
 
     files = [write_map(dataset, output)]
     if plot is not None:
-        with kept_if_not_drawn(
-            lambda file: plot_command(file, plot), output, functools.partial(write_map, dataset)
-        ):
+        with kept_if_not_drawn(lambda file: plot_command(file, plot), output, functools.partial(write_map, dataset)):
             import matplotlib
 
             matplotlib.use("Agg")
@@ -133,7 +126,7 @@ def finish(dataset: xr.Dataset, output: Path, plot: Path | None, drawn: Any, lin
 
             files.append(save_figure(drawn(dataset), plot))
     add_json(summary=lines, files=files)
-    out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
+    print_written(lines, files)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -143,9 +136,9 @@ def finish(dataset: xr.Dataset, output: Path, plot: Path | None, drawn: Any, lin
 @cli_command
 def design(
     file: File,
-    output: Annotated[Path, Output] = Path("design.nc"),
+    output: opt.Output = Path("design.nc"),
     plot: opt.Plot = None,
-    checkpoint: Checkpoint = None,
+    checkpoint: opt.CheckpointFolder = None,
     estimate_cost: EstimateCost = False,
     yes: Yes = False,
     law: opt.Law = None,
@@ -158,30 +151,20 @@ def design(
 
     Example: snapbeam design switch.toml -o design.nc --plot design.png --checkpoint design.checkpoint
     """
-    from snapbeam.cli.console import check_pictures
     from snapbeam.plot.uncertainty import plot_designs
-    from snapbeam.uncertainty.cost import estimate_cost as cost_of
     from snapbeam.uncertainty.optimization import optimize_design
-    from snapbeam.util.files import check_writable
 
     settings, uncertainty, asked = read(file, "design", law)
-    check_writable(output, "output", (".nc",))
-    check_pictures(("plot", plot))
+    check_outputs(output, plot)
     variables, objectives, constraints, optimizer = _question(asked)
-    how = settings.integration.replace(threads=threads)
     arguments = (settings.system, variables, objectives, constraints, uncertainty, optimizer)
-    cost = cost_of(optimize_design, *arguments, integration=how, trial=10.0 if estimate_cost else 2.0)
-    if not agreed(cost, yes, estimate_cost):
+    words = ("design", "generations")
+    found = _compute(optimize_design, words, arguments, settings, estimate_cost, yes, threads, checkpoint)
+    if found is None:
         return
-    begun = time.monotonic()
-    with progress(None, "design", "generations") as report:
-        dataset = optimize_design(*arguments, integration=how, checkpoint=checkpoint, progress=report)
-    add_json(
-        designs={
-            str(name): each.values for name, each in dataset.data_vars.items() if "tried" not in each.dims
-        }
-    )
-    finish(dataset, output, plot, plot_designs, _lines(dataset, time.monotonic() - begun))
+    dataset, elapsed = found
+    add_json(designs={str(name): each.values for name, each in dataset.data_vars.items() if "tried" not in each.dims})
+    finish(dataset, output, plot, plot_designs, _lines(dataset, elapsed))
 
 
 def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
@@ -213,10 +196,7 @@ def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
 
 def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
     runs, count = int(dataset.attrs["runs_made"]), dataset.sizes["design"]
-    lines = [
-        f"{runs} runs of {dataset.sizes['tried']} designs in {duration(elapsed)}",
-        *initial_well_lines(dataset),
-    ]
+    lines = [f"{runs} runs of {dataset.sizes['tried']} designs in {duration(elapsed)}", *initial_well_lines(dataset)]
     from snapbeam.cli.summary import coordinate_text, statistic_text, value_text
 
     words = str(dataset["constraints_satisfied"].attrs["flag_meanings"]).split()
@@ -232,11 +212,7 @@ def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
             kind, _, of = name.partition("_")
             ends = [value_text(one, name, float(one[f"{name}{end}"])) for end in ("_low", "_high")]
             value = statistic_text(one, name, float(one[name]))
-            value = (
-                f"satisfied: {of.replace('_', ' ')} {value.rpartition(': ')[2]}"
-                if kind == "satisfied"
-                else value
-            )
+            value = f"satisfied: {of.replace('_', ' ')} {value.rpartition(': ')[2]}" if kind == "satisfied" else value
             lines.append(f"  {value} ({' to '.join(ends)} at {share:g} %)")
             if kind == "satisfied":
                 lines.append(f"  {_distance(one, of)}")
@@ -262,9 +238,9 @@ def _distance(one: xr.Dataset, label: str) -> str:
 @cli_command
 def probability(
     file: File,
-    output: Annotated[Path, Output] = Path("probability.nc"),
+    output: opt.Output = Path("probability.nc"),
     plot: opt.Plot = None,
-    checkpoint: Checkpoint = None,
+    checkpoint: opt.CheckpointFolder = None,
     estimate_cost: EstimateCost = False,
     yes: Yes = False,
     law: opt.Law = None,
@@ -277,48 +253,26 @@ def probability(
 
     Example: snapbeam probability switch.toml -o probability.nc --plot probability.png
     """
-    from snapbeam.cli.console import check_pictures
     from snapbeam.plot.uncertainty import plot_probability
     from snapbeam.plot.units import in_units
-    from snapbeam.uncertainty.cost import estimate_cost as cost_of
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
-    from snapbeam.util.files import check_writable
 
     settings, uncertainty, asked = read(file, "probability", law)
-    check_writable(output, "output", (".nc",))
-    check_pictures(("plot", plot))
+    check_outputs(output, plot)
     runs: Any = asked["runs"] if set(asked) == {"runs"} else taken(SamplingPlan, asked, "probability")
-    axes = settings.axes() or _default_axes(settings.system)
-    how = settings.integration.replace(threads=threads)
-    cost = cost_of(
-        probability_map,
-        settings.system,
-        axes,
-        uncertainty,
-        runs,
-        integration=how,
-        trial=10.0 if estimate_cost else 2.0,
-    )
-    if not agreed(cost, yes, estimate_cost):
+    arguments = (settings.system, settings.axes() or _default_axes(settings.system), uncertainty, runs)
+    words = ("probability map", "runs")
+    found = _compute(probability_map, words, arguments, settings, estimate_cost, yes, threads, checkpoint)
+    if found is None:
         return
-    begun = time.monotonic()
-    with progress(None, "probability map", "runs") as report:
-        dataset = probability_map(
-            settings.system, axes, uncertainty, runs, integration=how, checkpoint=checkpoint, progress=report
-        )
+    dataset, elapsed = found
     small = {name: dataset[name].values for name in ("probability", "probability_low", "probability_high", "runs")
              if dataset[name].size <= 4000}  # fmt: skip
     told = in_units(dataset)
     axes = {str(dim): told[dim].values for dim in told["runs"].dims if dim in told.coords}
     add_json(results=small, axes=axes)
     outcome = str(dataset.attrs["watched_outcome"])
-    finish(
-        dataset,
-        output,
-        plot,
-        lambda ds: plot_probability(ds, outcome),
-        _lines_probability(told, time.monotonic() - begun),
-    )
+    finish(dataset, output, plot, lambda ds: plot_probability(ds, outcome), _lines_probability(told, elapsed))
 
 
 def _default_axes(system: System) -> dict[str, Any]:
@@ -329,13 +283,9 @@ def _default_axes(system: System) -> dict[str, Any]:
 
     if DEFAULT_AXES.keys() <= system.parameters.keys():
         return {name: parsed_axis(name, text) for name, text in DEFAULT_AXES.items()}
-    numbers = [
-        name for name, each in system.parameters.items() if isinstance(each, float) and lookup(name).is_run
-    ]
+    numbers = [name for name, each in system.parameters.items() if isinstance(each, float) and lookup(name).is_run]
     if not numbers:
-        raise InputError(
-            "[contact]: missing, as is any other excitation; add one, and name the axes in [sweep]"
-        )
+        raise InputError("[contact]: missing, as is any other excitation; add one, and name the axes in [sweep]")
     return {numbers[0]: np.array([system.get(numbers[0])])}
 
 
@@ -357,9 +307,7 @@ def _probabilities(one: xr.Dataset) -> list[str]:
         values = {dim: point[dim].values.item() for dim in found.dims if dim in point.coords}
         where = ", ".join(coordinate_text(one, str(dim), value) for dim, value in values.items())
         low, high = float(point["probability_low"]), float(point["probability_high"])
-        lines.append(
-            f"  {where or 'probability'}: {float(point['probability']):.4g} ({low:.4g} to {high:.4g})"
-        )
+        lines.append(f"  {where or 'probability'}: {float(point['probability']):.4g} ({low:.4g} to {high:.4g})")
     return lines
 
 

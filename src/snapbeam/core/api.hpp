@@ -132,4 +132,15 @@ struct Batch {
 
 typedef void (*Kernel)(const Problem &, const Batch &);
 
+// Every array of a Problem and of a Batch: *moved*(pointer) may let it point elsewhere.
+template <class F> void each_array(Problem &p, F moved) {
+    moved(p.omega), moved(p.sigma), moved(p.G), moved(p.g), moved(p.shift), moved(p.far_force), moved(p.block_sizes), moved(p.laws);
+    moved(p.signal_kinds), moved(p.windows), moved(p.uses), moved(p.center), moved(p.high), moved(p.beam), moved(p.second), moved(p.update);
+}
+template <class F> void each_array(Batch &b, F moved) {
+    moved(b.run), moved(b.signals), moved(b.pieces), moved(b.jumps), moved(b.numbers), moved(b.offset), moved(b.since), moved(b.rows);
+    moved(b.row_of), moved(b.rest), moved(b.q), moved(b.p), moved(b.order), moved(b.states), moved(b.statistics), moved(b.of_channels);
+    moved(b.held);
+}
+
 }  // namespace snapbeam

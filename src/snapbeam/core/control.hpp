@@ -48,45 +48,55 @@ template <class L> struct Group {
     const Batch *batch;
     Runs<L> z;
     Totals<L> totals;
-    Plain *tables, *own, *amplitude;
-    Cell *scratch;
+    static constexpr int FLOWS = DISTINCT_FLOWS * CELLS * 4;
+    Held<Plain, FLOWS * LEVELS> tables;  // flows of the steps of every length, and of another one
+    Held<Plain, FLOWS> own;
+    Held<Cell, CELLS * Inside<L>::ROWS> scratch;
+    Held<Plain, CELLS> amplitude;
+    Held<Channel<L>, CHANNELS> channel;
+    Held<Signal<L>, KNOWN_SIGNALS> signal;
+    Held<Number, CHANNELS * BLOCK_ARRAYS> block;
+    Held<int, CHANNELS> late;
     Marks alive, again, landing;  // running; taking a step again that was cut; a step up to an output or the end
     Real ticks, wanted;           // length of the step, and of the next one if it is taken again
     Real event, tries, cuts;      // contact at whose event the step is cut, corrections of it, cuts in all
     Real key;                     // ticks for which the flows were formed
-    Event<L> *events;             // of each channel
-    Cell *spare;                  // rows and channels that a record puts aside
-    Channel<L> *spare_channel;
+    Held<Event<L>, CHANNELS> events;  // of each channel
+    Held<Cell, 0, false> spare;          // rows and channels that a record puts aside
+    Held<Channel<L>, 0, false> spare_channel;
     Real jump, turned;            // next jump of a signal, ticks; steps since tones were taken from the time
     Real step, contact_step, end, limit, output_interval, halvings, most_steps, stretch, stretch_at_rest, calm, energy, lowest;
     int run[L::runs], output[L::runs], next_jump[L::runs];
 
-    void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
+    SNAPBEAM_SELDOM void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
         s = &structure, problem = s->problem, batch = &b;
         const int n = s->cells, channels = problem->channels, signals = problem->signals;
-        z.s = s, z.channels = channels, z.signals = signals, z.account = b.account || b.recorder;
-        Cell **rows[] = {&z.q, &z.p, &z.k, &z.q1, &z.p1, &z.k1, &z.r};
-        for (Cell **row : rows) *row = arena.take<Cell>(n);
-        scratch = arena.take<Cell>(long(n) * Inside<L>::ROWS), amplitude = arena.take<Plain>(n);
+        z.s = s, z.channels = channels, z.signals = signals, z.account = b.account || (RECORDS && b.recorder);
+        Held<Cell, CELLS> *rows[] = {&z.q, &z.p, &z.k, &z.q1, &z.p1, &z.k1, &z.r};
+        for (auto *row : rows) row->take(arena, n);
+        scratch.take(arena, long(n) * Inside<L>::ROWS), amplitude.take(arena, n);
         const long flow = long(s->composition.distinct) * n * 4;
-        tables = arena.take<Plain>(flow * problem->levels);
-        own = arena.take<Plain>(flow);
-        z.channel = arena.take<Channel<L>>(channels), z.signal = arena.take<Signal<L>>(signals);
-        z.block = arena.take<Number>(long(channels) * BLOCK_ARRAYS), z.late = arena.take<int>(channels);
-        events = arena.take<Event<L>>(channels);
-        spare = arena.take<Cell>(b.recorder ? 3l * n : 0), spare_channel = arena.take<Channel<L>>(b.recorder ? channels : 0);
+        tables.take(arena, flow * problem->levels), own.take(arena, flow);
+        channel.take(arena, channels), signal.take(arena, signals), block.take(arena, long(channels) * BLOCK_ARRAYS), late.take(arena, channels);
+        z.channel = channel, z.signal = signal, z.block = block, z.late = late;
+        events.take(arena, channels);
+        spare.take(arena, b.recorder ? 3l * n : 0), spare_channel.take(arena, b.recorder ? channels : 0);
         totals.lay_out(*s, z, arena);
-        Channel<L> unused;
-        for (int j = 0; j < channels; ++j) {
-            Channel<L> &c = arena.base ? z.channel[j] : unused;
-            c.signal = arena.take<int>(signals), c.factor = arena.take<double>(signals);
-            if (problem->laws[j] == CIRCUIT) c.along_q = arena.take<Cell>(n), c.along_p = arena.take<Cell>(n), c.along_M = arena.take<Number>(channels);
-            c.row = arena.take<Cell>(n), c.P = arena.take<Number>(problem->law_numbers), c.M = arena.take<Number>(channels);
+        if constexpr (!KNOWN) {
+            Channel<L> unused;
+            for (int j = 0; j < channels; ++j) {
+                Channel<L> &c = arena.base ? z.channel[j] : unused;
+                c.signal.take(arena, signals), c.factor.take(arena, signals);
+                if (problem->laws[j] == CIRCUIT) c.along_q.take(arena, n), c.along_p.take(arena, n), c.along_M.take(arena, channels);
+                c.row.take(arena, n), c.P.take(arena, problem->law_numbers), c.M.take(arena, channels);
+            }
         }
     }
 
+    SNAPBEAM_FN const Recorder *recorder() const { return RECORDS ? batch->recorder : nullptr; }
+
     // Does the first contact act where the displacement is observed, in every run?
-    bool shares_row() const {
+    SNAPBEAM_SELDOM bool shares_row() const {
         if (!z.channels || !z.channel[0].contact) return false;
         for (int i = 0; i < batch->runs; ++i) {
             const int *row_of = batch->row_of + long(i) * (z.channels + 1);
@@ -97,11 +107,11 @@ template <class L> struct Group {
         return true;
     }
 
-    void begin() {
+    SNAPBEAM_SELDOM void begin() {
         const int n = s->cells;
-        Cell *rows[] = {z.q, z.p, z.k, z.q1, z.p1, z.k1, z.r};
-        for (Cell *row : rows)
-            for (int i = 0; i < n; ++i) row[i] = Cell(0.0);
+        Held<Cell, CELLS> *rows[] = {&z.q, &z.p, &z.k, &z.q1, &z.p1, &z.k1, &z.r};
+        for (auto *row : rows)
+            for (int i = 0; i < n; ++i) (*row)[i] = Cell(0.0);
         for (long i = 0; i < long(s->composition.distinct) * n * 4; ++i) own[i] = Plain(0.0);
         for (long i = 0; i < long(s->composition.distinct) * n * 4 * problem->levels; ++i) tables[i] = Plain(0.0);
         alive = again = landing = z.jumping = FromBits<Marks>::of(0);
@@ -174,8 +184,8 @@ template <class L> struct Group {
     double of_run(int i, snapbeam::RunNumber k) const { return batch->run[long(i) * snapbeam::RUN_NUMBERS + k]; }
 
     // The next run takes lane l; false if there is none.
-    bool load(int l) {
-        const int taken = __atomic_fetch_add(batch->next, 1, __ATOMIC_RELAXED);
+    SNAPBEAM_SELDOM bool load(int l) {
+        const int taken = count(batch->next);
         const bool there = taken < batch->runs;
         set_lane(alive, l, there), set_lane(again, l, false), set_lane(landing, l, false);
         set_lane(z.h, l, 0.0), set_lane(z.drift, l, 0.0), set_lane(ticks, l, 0.0), set_lane(key, l, -1.0);
@@ -284,7 +294,7 @@ template <class L> struct Group {
     };
 
     // What carries a circuit of run l along with the beam.
-    void load_circuit(Channel<L> &c, int l, const double *row, const int *row_of) {
+    SNAPBEAM_SELDOM void load_circuit(Channel<L> &c, int l, const double *row, const int *row_of) {
         double lam = lane(value(c.P[0]), l);
         // an overdamped mode may decay as the circuit does: the circuit then decays otherwise by as little as tells them apart
         const auto alike = [&](int m) {
@@ -313,7 +323,7 @@ template <class L> struct Group {
     }
 
     // First observation of runs that begin, or begin again from their state alone at an output.
-    void start(unsigned fresh, bool continued = false) {
+    SNAPBEAM_SELDOM void start(unsigned fresh, bool continued = false) {
         if (!fresh) return;
         const Marks which = FromBits<Marks>::of(fresh);
         const int n = s->size();
@@ -350,7 +360,7 @@ template <class L> struct Group {
         }
         assign(which, energy, value(totals.energy(z, true, true)));
         if (!continued) totals.start(z, which, totals.energy(z, true));
-        const bool saved = batch->recorder && batch->recorder->marks[4];
+        const bool saved = recorder() && batch->recorder->marks[4];
         for (int j = 0; j < z.channels; ++j) {  // in touch and closing
             Channel<L> &c = z.channel[j];
             if (!c.impulsive || (saved && !continued)) continue;
@@ -394,12 +404,14 @@ template <class L> struct Group {
         // the longest step that is wanted, in ticks, and the first level whose steps are not longer
         Real want = step, reach = Real(STRETCH_LIMIT) * stretch_at_rest;
         Marks far = (abs(stretch) > reach) & (stretch_at_rest > Real(0.0));
+        SNAPBEAM_LOOP
         for (int i = 0; i < problem->levels && any(far); ++i) {
             want = select(far, Real(0.5) * want, want), reach = Real(STRETCH_FACTOR) * reach;
             far = far & (abs(stretch) > reach);
         }
         Real most = calm, by_energy = step;
         Marks strong = energy > most;
+        SNAPBEAM_LOOP
         for (int i = 0; i < problem->levels && any(strong); ++i) {
             by_energy = select(strong, Real(0.5) * by_energy, by_energy), most = Real(4.0) * most;
             strong = strong & (energy > most);
@@ -408,11 +420,11 @@ template <class L> struct Group {
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
             if (c.timed || c.circuit || (c.contact && !any(c.closed))) continue;
-            const Real stiffness = with_law(c.law, [&](auto law) { return value(law.stiffness(c.contact ? max(c.d0, Number(0.0)) : c.x, c.P)); });
+            const Real stiffness = with_law(c.law, [&](auto law) { return value(law.stiffness(c.contact ? max(c.d0, Number(0.0)) : c.x, c.numbers())); });
             const Real by_stiffness = Real(CONTACT_TURN) / (sqrt(max(stiffness * value(c.M[j]), Real(1e-300))) * z.tick);
             if (!c.contact) {
                 // towards the end of its range, where a force may be infinite, a share of the way
-                const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.P) - c.x, c.x - law.low(c.P)); });
+                const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.numbers()) - c.x, c.x - law.low(c.numbers())); });
                 want = min(want, by_stiffness);
                 if (any(value(space) < Real(NEVER))) want = min(want, Real(NEARER) * value(space) / (abs(value(dot<L>(c.row, z.p, n))) * z.tick));
                 continue;
@@ -423,6 +435,7 @@ template <class L> struct Group {
             want = select(c.closed, min(want, own), want);
         }
         Real level = Real(0.0), length = step, next = shorter_than_flight(step, contact_step);
+        SNAPBEAM_LOOP
         for (int i = 0; i < problem->levels - 1; ++i) {
             const Marks more = ((length > want) | half_resolved(length)) & (level <= halvings);
             if (!any(more)) break;
@@ -520,18 +533,18 @@ template <class L> struct Group {
     }
 
     SNAPBEAM_FN static Number yield_of(const Channel<L> &c) {
-        return with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.yield(c.P); else return Number(0.0); });
+        return with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.yield(c.numbers()); else return Number(0.0); });
     }
     // Positive while a closed contact goes on as it does: it presses, it yields and deepens, or it is elastic.
     SNAPBEAM_FN static Number going_on(const Channel<L> &c, Number d, Number r, Number f) {
         if (c.memory) return select(c.pressing, r, yield_of(c) - d);
-        const Number raw = c.impulsive ? f : with_law(c.law, [&](auto law) { return law.pressing(max(d, Number(0.0)), r, c.P); });
+        const Number raw = c.impulsive ? f : with_law(c.law, [&](auto law) { return law.pressing(max(d, Number(0.0)), r, c.numbers()); });
         return select(c.pressing, raw, -raw);
     }
 
     // --- inspect --------------------------------------------------------------------------------------------------------
     // Fraction of the step at which the gap of a contact closes; 2 where it does not.
-    Real closing(Channel<L> &c, Marks near, Real noise) {
+    SNAPBEAM_SELDOM Real closing(Channel<L> &c, Marks near, Real noise) {
         const Real rest = (z.sign - Real(1.0)) * value(c.rest);
         Inside<L> inside;
         Real found = Real(2.0), off = Real(0.0), tilt = Real(0.0);
@@ -539,7 +552,7 @@ template <class L> struct Group {
         // Impacts without duration leave gaps as small as the error of what is followed inside: first that at the end of the step is
         // found, which a cubic without value and slope at the beginning then takes away.
         for (int pass = c.impulsive ? 0 : 1; pass < 2; ++pass) {
-            inside.begin(z, reinterpret_cast<Plain *>(scratch));
+            inside.begin(z, reinterpret_cast<Plain *>(static_cast<Cell *>(scratch)));
             for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].begun), z.signal[i].ahead(0, Number(inside.part));
             Real d0 = min(value(c.d0), Real(0.0)), r0 = value(c.r0);
             for (;;) {
@@ -581,6 +594,7 @@ template <class L> struct Group {
     SNAPBEAM_FN Marks may_close(Channel<L> &c, Marks open, bool touching) {
         const int n = s->size();
         Plain speed = Plain(0.0), doubt = Plain(0.0);
+        SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) {
             const Plain h = Plain(value(z.h)), weight = abs(value(c.row[i])), w = h * s->omega[i];
             speed = fma(weight, amplitude[i], speed);
@@ -589,6 +603,7 @@ template <class L> struct Group {
         }
         const Real horizon = Real(TRUST) * step * z.tick, h = value(z.h), d0 = value(c.d0), d1 = value(c.d1);
         Real tip = Real(0.0), tip_doubt = Real(0.0);
+        SNAPBEAM_LOOP
         for (int i = 0; i < c.uses; ++i) {
             const Signal<L> &one = z.signal[c.signal[i]];
             const Real factor = Real(c.factor[i] < 0 ? -c.factor[i] : c.factor[i]);
@@ -650,8 +665,8 @@ template <class L> struct Group {
             Channel<L> &c = z.channel[j];
             if (c.contact || c.timed) continue;
             const Number u = along(z, c, z.q1);
-            const Number low_end = with_law(c.law, [&](auto law) { return law.low(c.P); });
-            const Number high_end = with_law(c.law, [&](auto law) { return law.high(c.P); });
+            const Number low_end = with_law(c.law, [&](auto law) { return law.low(c.numbers()); });
+            const Number high_end = with_law(c.law, [&](auto law) { return law.high(c.numbers()); });
             const Marks out = !((u > low_end) & (u < high_end));
             broken = broken | out, pulled = pulled | (out & (value(c.first_f * (u - c.rest)) > Real(0.0)));
         }
@@ -758,17 +773,16 @@ template <class L> struct Group {
         const int n = s->size();
         bool was_touching = false;
         if constexpr (L::directions > 0) follow_event();
-        if (batch->recorder) {
+        if (recorder()) {
             record_inside(*this);
             for (int j = 0; j < z.channels; ++j) was_touching |= z.channel[j].contact && lane(z.channel[j].closed, 0);
         }
-        if (problem->updates) totals.update(z, ok, *batch, run);
+        if (!KNOWN && problem->updates) totals.update(z, ok, *batch, run);
         totals.add_step(z, ok, amplitude, scratch);
-        if (bits(alive & (!ok)) || batch->recorder) {
+        if (bits(alive & (!ok)) || recorder()) {
             for (int i = 0; i < n; ++i) assign(ok, z.q[i], z.q1[i]), assign(ok, z.p[i], z.p1[i]), assign(ok, z.k[i], z.k1[i]);
         } else {  // runs that ended may hold anything
-            Cell *q = z.q, *p = z.p, *k = z.k;
-            z.q = z.q1, z.p = z.p1, z.k = z.k1, z.q1 = q, z.p1 = p, z.k1 = k;
+            z.q.swap(z.q1), z.p.swap(z.p1), z.k.swap(z.k1);
         }
         z.t = select(ok, z.t + ticks, z.t), turned += select(ok, Real(1.0), Real(0.0));
         for (int i = 0; i < z.signals; ++i) assign(ok, z.signal[i].begun.sine, z.signal[i].at.sine), assign(ok, z.signal[i].begun.cosine, z.signal[i].at.cosine);
@@ -806,7 +820,7 @@ template <class L> struct Group {
             if (c.memory) {  // from an intact surface it yields at once
                 c.pressing = (c.pressing & (!(off | force))) | (force & (!c.pressing)) | (on & (!(value(yield_of(c)) > Real(0.0))));
             } else if (any(force)) {  // what is stored where the force ceases is lost, and is there again where it begins
-                const Number d = max(c.d1, Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(d, c.P); });
+                const Number d = max(c.d1, Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(d, c.numbers()); });
                 c.sums[snapbeam::LOST] += select(force, select(c.pressing, stored, -stored), Number(0.0));
             }
             if (!c.memory) c.pressing = (c.pressing & (!(off | force))) | begins;
@@ -835,7 +849,7 @@ template <class L> struct Group {
             for (int j = 0; j < z.channels; ++j) held |= z.channel[j].contact && z.channel[j].closed;
             if (!held || z.t >= min(limit, end)) move_in_time(*this, -z.drift);
         }
-        if (batch->recorder) record_end(*this, was_touching);
+        if (recorder()) record_end(*this, was_touching);
         const Marks finite = abs(totals.center.u) < Real(1e9);
         const Marks diverged = ok & (broken | (!finite));
         const Marks early = ok & totals.decided(z);
@@ -845,16 +859,16 @@ template <class L> struct Group {
     }
 
     // A contact begins to yield, or turns back: then it keeps a larger indentation, and what it stored and does not give back is lost.
-    void turn_back(Channel<L> &c, Marks at) {
+    SNAPBEAM_SELDOM void turn_back(Channel<L> &c, Marks at) {
         const Marks turns = at & c.pressing;
-        const Number grown = with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.grown(select(turns, c.d1, Number(0.0)), c.P); else return Number(0.0); });
-        const Number growth = select(turns, grown - c.P[c.state], Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(c.d1, c.P); });
+        const Number grown = with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.grown(select(turns, c.d1, Number(0.0)), c.numbers()); else return Number(0.0); });
+        const Number growth = select(turns, grown - c.P[c.state], Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(c.d1, c.numbers()); });
         c.P[c.state] += growth, c.offset -= growth, c.d0 -= growth, c.d1 -= growth;
         assign(turns, c.deepest, c.d1);
-        c.sums[snapbeam::LOST] += select(turns, stored - with_law(c.law, [&](auto law) { return law.potential(c.d1, c.P); }), Number(0.0));
+        c.sums[snapbeam::LOST] += select(turns, stored - with_law(c.law, [&](auto law) { return law.potential(c.d1, c.numbers()); }), Number(0.0));
     }
 
-    void close_impact(Channel<L> &c, int j, Marks off) {
+    SNAPBEAM_SELDOM void close_impact(Channel<L> &c, int j, Marks off) {
         using namespace snapbeam;
         const Number zero = Number(0.0), peak = peak_of(c), lasted = Number((z.t - max(c.onset, Real(0.0))) * z.tick) + (z.drift - c.begun);
         const Marks counts = off & (c.deepest > zero);
@@ -863,7 +877,7 @@ template <class L> struct Group {
         c.sums[CONTACT_TIME] += select(counts, lasted, zero);
         assign(counts, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], peak));
         assign(counts, c.sums[DEEPEST], max(c.sums[DEEPEST], c.deepest));
-        if (batch->recorder && any(counts)) {
+        if (recorder() && any(counts)) {
             Recorder &to = *batch->recorder;
             double *row = to.impact_rows + to.marks[2]++ * OF_IMPACT;
             row[IMPACT_CHANNEL] = j, row[IMPACT_ONSET] = lane(c.onset, 0) * lane(z.tick, 0);
@@ -874,18 +888,18 @@ template <class L> struct Group {
     }
     SNAPBEAM_FN Number peak_of(const Channel<L> &c) const {
         if (c.lossy) return c.hardest;
-        return with_law(c.law, [&](auto law) { return law.force(max(c.deepest, Number(0.0)), Number(0.0), c.P); });
+        return with_law(c.law, [&](auto law) { return law.force(max(c.deepest, Number(0.0)), Number(0.0), c.numbers()); });
     }
 
     // Runs at an output, at their end, or that stop before it.
-    __attribute__((noinline)) void stop_at(unsigned diverged, unsigned early, unsigned spent, unsigned reached) {
+    SNAPBEAM_RARE void stop_at(unsigned diverged, unsigned early, unsigned spent, unsigned reached) {
         using namespace snapbeam;
         unsigned fresh = 0, going_on = 0;
         for (int l = 0; l < L::runs; ++l) {
             const unsigned bit = 1u << l;
             if (!((diverged | early | spent | reached) & bit)) continue;
             const bool over = lane(z.t, l) >= lane(end, l) || (diverged & bit);
-            if (batch->outputs > output[l] && (batch->recorder || ((reached | early) & bit))) write_output(l);
+            if (batch->outputs > output[l] && (recorder() || ((reached | early) & bit))) write_output(l);
             int status = RUNNING;
             if (diverged & bit) status = DIVERGED;
             else if (early & bit) status = EARLY_STOP;
@@ -896,14 +910,14 @@ template <class L> struct Group {
                 continue;
             }
             finish(l, status);
-            if (batch->recorder) set_lane(alive, l, false);
+            if (recorder()) set_lane(alive, l, false);
             else fresh |= unsigned(load(l)) << l;
         }
         if (going_on) start(going_on, true);
         if (fresh) start(fresh);
     }
 
-    void write_output(int l) {
+    SNAPBEAM_SELDOM void write_output(int l) {
         const int modes = problem->modes, width = 2 * modes + 1 + 2 * z.channels;
         double *to = batch->states + (long(run[l]) * batch->outputs + output[l]++) * width;
         for (int m = 0; m < modes; ++m) to[m] = element<L>(z.q, s->place[m], l), to[modes + m] = element<L>(z.p, s->place[m], l);
@@ -935,7 +949,7 @@ template <class L> struct Group {
         move_in_time(*this, -later);
     }
 
-    void finish(int l, int status) {
+    SNAPBEAM_SELDOM void finish(int l, int status) {
         using namespace snapbeam;
         const Marks mine = FromBits<Marks>::of(1u << l);
         if constexpr (L::directions > 0) move_in_time(*this, later_end());
@@ -943,7 +957,7 @@ template <class L> struct Group {
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             const bool pressed = c.contact && lane(Marks(acting(c)), l);
-            const bool goes_on = batch->outputs && !batch->recorder;
+            const bool goes_on = batch->outputs && !recorder();
             if (pressed && goes_on) {  // the run goes on elsewhere: what the contact gave so far
                 c.sums[CONTACT_TIME] += select(mine, Number((z.t - max(c.onset, Real(0.0))) * z.tick) + (z.drift - c.begun), Number(0.0));
                 c.sums[IMPULSE] += select(mine, c.own_impulse, Number(0.0));
@@ -953,9 +967,9 @@ template <class L> struct Group {
             if (pressed && !goes_on) close_impact(c, j, mine);
         }
         write_statistics(l, status);
-        __atomic_fetch_add(batch->done, 1, __ATOMIC_RELAXED);
+        count(batch->done);
     }
-    void write_statistics(int l, int status) {
+    SNAPBEAM_SELDOM void write_statistics(int l, int status) {
         using namespace snapbeam;
         set_lane(totals.sum[STATUS], l, status), set_lane(totals.sum[TIME], l, lane(z.t, l));
         if (status == EARLY_STOP) set_lane(totals.sum[EARLY_STOP_TIME], l, lane(z.t, l) * lane(z.tick, l));
@@ -976,7 +990,7 @@ template <class L> struct Group {
     void interrupt() {
         for (int l = 0; l < L::runs; ++l)
             if (lane(alive, l)) write_statistics(l, snapbeam::RUNNING);
-        if (!batch->recorder) return;
+        if (!recorder()) return;
         write_output(0), --output[0];
         double *to = batch->recorder->saved;
         visit([&](auto &x) { __builtin_memcpy(to, &x, sizeof(x)), to += sizeof(x) / sizeof(double); });

@@ -33,15 +33,18 @@ template <class L, class Cell = typename L::Plain, class Number = typename L::Re
         const int n = s.size();
         q = memory, p = q + n, a = p + n, change = a + n, flow = reinterpret_cast<Plain *>(change + n);
         parts = z.parts;
+        SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) q[i] = as<Cell>(z.q[i]), p[i] = as<Cell>(z.p[i]), a[i] = as<Cell>(z.k[i]), change[i] = as<Cell>(z.k1[i]);
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
             if (!c.active || c.law == AXIAL_LOAD) continue;
             const Cell first = Cell(as<Number>(c.first_f)), last = Cell(as<Number>(c.f));
+            SNAPBEAM_LOOP
             for (int i = 0; i < n; ++i) a[i] = fma(first, as<Cell>(c.row[i]), a[i]), change[i] = fma(last, as<Cell>(c.row[i]), change[i]);
         }
         const Real per = Real(1.0) / parts;
         part = as<Number>(z.h) * per, half = Number(0.5) * part, share = Real(0.0);
+        SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) {
             change[i] = Cell(per) * (change[i] - a[i]);
             set_flow(Plain(value(part)), Plain(s.sigma[i]), Plain(s.omega[i]), flow + 4 * i);
@@ -51,6 +54,7 @@ template <class L, class Cell = typename L::Plain, class Number = typename L::Re
         const Cell first = Cell(half * share);
         share += Real(1.0);
         const Cell last = Cell(half * share), h = Cell(half);
+        SNAPBEAM_LOOP
         for (int i = 0; i < s.size(); ++i) {
             const Cell x = q[i], y = fma(h, a[i], fma(first, change[i], p[i]));
             const Plain *f = flow + 4 * i;
@@ -61,8 +65,9 @@ template <class L, class Cell = typename L::Plain, class Number = typename L::Re
         }
     }
     // Acceleration along a row.
-    template <class Row> SNAPBEAM_FN Number bend(const Structure<L> &s, const Row *row) const {
+    template <class Row> SNAPBEAM_FN Number bend(const Structure<L> &s, const Row &row) const {
         Cell sum = Cell(0.0);
+        SNAPBEAM_LOOP
         for (int i = 0; i < s.size(); ++i) {
             const Plain omega = Plain(s.omega[i]), sigma = Plain(s.sigma[i]);
             const Cell own = fma(Cell(share), change[i], a[i]) - Cell(omega * omega) * q[i] - Cell(Plain(2.0) * sigma) * p[i];
@@ -73,11 +78,12 @@ template <class L, class Cell = typename L::Plain, class Number = typename L::Re
 };
 
 // Acceleration along a row at the beginning (*last* false) or the end of a step.
-template <class L, class Row> SNAPBEAM_FN typename L::Number bend_at(const Runs<L> &z, const Row *row, bool last) {
+template <class L, class Row> SNAPBEAM_CALLED typename L::Number bend_at(const Runs<L> &z, const Row &row, bool last) {
     typedef typename L::Cell Cell;
     const Structure<L> &s = *z.s;
     const Cell *q = last ? z.q1 : z.q, *p = last ? z.p1 : z.p, *k = last ? z.k1 : z.k;
     Cell sum = Cell(0.0);
+    SNAPBEAM_LOOP
     for (int i = 0; i < s.size(); ++i) {
         const Cell omega = Cell(s.omega[i]), sigma = Cell(s.sigma[i]);
         Cell own = k[i] - omega * omega * q[i] - Cell(2.0) * sigma * p[i];
@@ -92,6 +98,7 @@ template <class L, class Row> SNAPBEAM_FN typename L::Number bend_at(const Runs<
 
 // Amplitudes (p^2 + omega^2 q^2)^(1/2) of the modes at the beginning of the step.
 template <class L> SNAPBEAM_FN void amplitudes(const Runs<L> &z, typename L::Plain *amplitude) {
+    SNAPBEAM_LOOP
     for (int i = 0; i < z.s->size(); ++i) {
         const typename L::Plain oq = z.s->omega[i] * value(z.q[i]), p = value(z.p[i]);
         amplitude[i] = sqrt(fma(p, p, oq * oq));
@@ -100,7 +107,7 @@ template <class L> SNAPBEAM_FN void amplitudes(const Runs<L> &z, typename L::Pla
 
 // Largest acceleration along a row that forces may have within a horizon (s); *row_of* j gives r.r_j.
 template <class L, class Row, class Product>
-SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row *row, typename L::Real horizon, const typename L::Plain *amplitude, Product product) {
+SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row &row, typename L::Real horizon, const typename L::Plain *amplitude, Product product) {
     typedef typename L::Real Real;
     typedef typename L::Number Number;
     const int n = z.s->size();
@@ -111,6 +118,7 @@ SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row *row, type
         Real most = max(abs(value(c.first_f)), abs(value(c.f)));
         if (c.timed) {
             most = Real(0.0);
+            SNAPBEAM_LOOP
             for (int i = 0; i < c.uses; ++i) {
                 const Signal<L> &one = z.signal[c.signal[i]];
                 const Real own = value(c.law == BASE ? one.greatest_bend() : one.greatest_value());
@@ -118,18 +126,19 @@ SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row *row, type
             }
         } else if (!c.contact) {
             typename L::Plain sum = typename L::Plain(0.0);
+            SNAPBEAM_LOOP
             for (int i = 0; i < n; ++i) sum = fma(abs(value(c.row[i])), amplitude[i], sum);
             const Real speed = L::total(sum);
             const Number x = c.x, reach = Number(Real(MARGIN) * speed * horizon);
             const Real damping = with_law(c.law, [&](auto law) {
-                const auto at = [&](Number u) { return law.damping(u, Number(speed), c.P); };
+                const auto at = [&](Number u) { return law.damping(u, Number(speed), c.numbers()); };
                 return value(law.rough ? most_within(law, x, reach, at) : at(x));
             });
             // where the range may be left, nothing is known
             const Real stiffness = with_law(c.law, [&](auto law) {
                 const Number left = x - reach, right = x + reach;
-                const Number known = most_within(law, x, reach, [&](Number u) { return law.stiffness(u, c.P); });
-                return value(select((left > law.low(c.P)) & (right < law.high(c.P)), known, Number(NEVER)));
+                const Number known = most_within(law, x, reach, [&](Number u) { return law.stiffness(u, c.numbers()); });
+                return value(select((left > law.low(c.numbers())) & (right < law.high(c.numbers())), known, Number(NEVER)));
             });
             most += speed * (stiffness * horizon + damping);
         } else {

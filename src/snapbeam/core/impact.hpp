@@ -39,7 +39,7 @@ template <int K> void move_in_time(Group<Tangents<K>> &runs, Dual<K> later) {
     typedef Tangents<K> L;
     Runs<L> &z = runs.z;
     const Structure<L> &s = *z.s;
-    double *rate = reinterpret_cast<double *>(runs.scratch);
+    double *rate = reinterpret_cast<double *>(static_cast<Dual<K> *>(runs.scratch));
     runs.totals.move_in_time(z, later);
     for (int i = 0; i < s.size(); ++i) rate[i] = z.k[i].v - s.omega[i] * s.omega[i] * z.q[i].v - 2.0 * s.sigma[i] * z.p[i].v;
     for (int j = 0; j < z.channels; ++j) {
@@ -79,7 +79,7 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
     const auto counts = on & (!lands);
     c.sums[IMPACTS] += select(counts, Number(1.0), zero), c.sums[IMPULSE] += select(counts, impulse, zero);
     assign(lands, c.own_impulse, impulse);
-    if (runs.batch->recorder && any(counts)) {
+    if (runs.recorder() && any(counts)) {
         Recorder &to = *runs.batch->recorder;
         double *row = to.impact_rows + to.marks[2]++ * OF_IMPACT;
         row[IMPACT_CHANNEL] = number, row[IMPACT_ONSET] = lane(z.t, 0) * lane(z.tick, 0), row[IMPACT_DURATION] = 0.0;
@@ -106,7 +106,7 @@ template <class L> void jumped_velocity(Group<L> &runs, typename L::Marks which)
     using namespace snapbeam;
     Runs<L> &z = runs.z;
     const int n = z.s->size();
-    for (int i = 0; runs.batch->recorder && i < n; ++i) z.p1[i] = z.p[i];  // what is recorded at the end of the step
+    for (int i = 0; runs.recorder() && i < n; ++i) z.p1[i] = z.p[i];  // what is recorded at the end of the step
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         if (c.circuit) assign(which, c.r0, -fma(c.P[0], c.P[c.state], dot<L>(c.row, z.p, n)));

@@ -252,8 +252,8 @@ struct User {
         return most;
     }
 
-    template <class F> static __attribute__((noinline)) double each(double x, double y, const double *P, F f) { return f(x, y, P); }
-    template <int W, class F> static __attribute__((noinline)) Pack<W> each(const Pack<W> &x, const Pack<W> &y, const Pack<W> *P, F f) {
+    template <class F> static SNAPBEAM_RARE double each(double x, double y, const double *P, F f) { return f(x, y, P); }
+    template <int W, class F> static SNAPBEAM_RARE Pack<W> each(const Pack<W> &x, const Pack<W> &y, const Pack<W> *P, F f) {
         Pack<W> found;
         for (int l = 0; l < W; ++l) {
             double own[MOST];
@@ -263,7 +263,7 @@ struct User {
         return found;
     }
     // Derivatives by differences.
-    template <int K, class F> static __attribute__((noinline)) Dual<K> each(const Dual<K> &x, const Dual<K> &y, const Dual<K> *P, F f) {
+    template <int K, class F> static SNAPBEAM_RARE Dual<K> each(const Dual<K> &x, const Dual<K> &y, const Dual<K> *P, F f) {
         const int count = OWN + int(P[COUNT].v);
         double own[MOST], u = x.v, v = y.v;
         for (int i = 0; i < count; ++i) own[i] = P[i].v;
@@ -330,30 +330,58 @@ template <class Law, class T, class F> SNAPBEAM_FN T most_within(Law, T x, T rea
     return most;
 }
 
-// The one place that knows every law by its number: calls function(law).
-template <class F> SNAPBEAM_FN auto with_law(int number, F function) {
+// The one place that knows every law by its number: calls function(law).  A kernel for one structure knows its laws only.
+#if !defined(SNAPBEAM_LAWS)
+#define SNAPBEAM_LAWS ~0u
+#endif
+#define SNAPBEAM_LAW(NUMBER, LAW) case NUMBER: if constexpr ((SNAPBEAM_LAWS) >> NUMBER & 1u) return function(LAW()); break;
+template <class F> constexpr SNAPBEAM_FN auto with_law(int number, F function) {
     switch (number) {
-    case POWER_LAW: return function(PowerLaw());
-    case LAYERED_HERTZ: return function(LayeredHertz());
-    case HUNT_CROSSLEY: return function(HuntCrossley());
-    case KELVIN_VOIGT: return function(KelvinVoigt());
-    case LOCAL_SPRING: return function(LocalSpring());
-    case ELECTROSTATIC: return function(Electrostatic());
-    case MAGNETIC: return function(Magnetic());
-    case QUADRATIC_DAMPING: return function(QuadraticDamping());
-    case COULOMB_FRICTION: return function(CoulombFriction());
-    case LINEAR_DAMPING: return function(LinearDamping());
-    case ELASTIC_PLASTIC: return function(ElasticPlastic());
-    case RESTITUTION: return function(Restitution());
-    case CIRCUIT: return function(Circuit());
-    case USER_CONTACT: return function(UserContact());
-    case USER_LOSSY_CONTACT: return function(UserLossyContact());
-    case USER_MEMORY_CONTACT: return function(UserMemoryContact());
-    case USER_FORCE: return function(UserForce());
-    case USER_LOSSY_FORCE: return function(UserLossyForce());
-    case EXTERNAL_FORCE: case BASE: case AXIAL_LOAD: return function(Timed());
-    default: return function(Hertz());
+    SNAPBEAM_LAW(POWER_LAW, PowerLaw)
+    SNAPBEAM_LAW(LAYERED_HERTZ, LayeredHertz)
+    SNAPBEAM_LAW(HUNT_CROSSLEY, HuntCrossley)
+    SNAPBEAM_LAW(KELVIN_VOIGT, KelvinVoigt)
+    SNAPBEAM_LAW(LOCAL_SPRING, LocalSpring)
+    SNAPBEAM_LAW(ELECTROSTATIC, Electrostatic)
+    SNAPBEAM_LAW(MAGNETIC, Magnetic)
+    SNAPBEAM_LAW(QUADRATIC_DAMPING, QuadraticDamping)
+    SNAPBEAM_LAW(COULOMB_FRICTION, CoulombFriction)
+    SNAPBEAM_LAW(LINEAR_DAMPING, LinearDamping)
+    SNAPBEAM_LAW(ELASTIC_PLASTIC, ElasticPlastic)
+    SNAPBEAM_LAW(RESTITUTION, Restitution)
+    SNAPBEAM_LAW(CIRCUIT, Circuit)
+    SNAPBEAM_LAW(USER_CONTACT, UserContact)
+    SNAPBEAM_LAW(USER_LOSSY_CONTACT, UserLossyContact)
+    SNAPBEAM_LAW(USER_MEMORY_CONTACT, UserMemoryContact)
+    SNAPBEAM_LAW(USER_FORCE, UserForce)
+    SNAPBEAM_LAW(USER_LOSSY_FORCE, UserLossyForce)
+    SNAPBEAM_LAW(EXTERNAL_FORCE, Timed)
+    SNAPBEAM_LAW(BASE, Timed)
+    SNAPBEAM_LAW(AXIAL_LOAD, Timed)
     }
+    return function(Hertz());
 }
+
+// What a kernel knows of its laws: a property that none or all of them have is known without a look.
+constexpr bool known(int law) { return (SNAPBEAM_LAWS) >> law & 1u; }
+template <class F> constexpr int laws_with(F property) {
+    int count = 0;
+    for (int law = 0; law < LAWS; ++law) count += known(law) && with_law(law, property);
+    return count;
+}
+template <class F> constexpr bool of_some_law(F property) { return laws_with(property) > 0; }
+template <class F> constexpr bool of_every_law(F property) { return laws_with(property) == laws_with([](auto) { return true; }); }
+template <bool POSSIBLE, bool CERTAIN = false> struct Flag {
+    bool on;
+    SNAPBEAM_FN operator bool() const { return CERTAIN || (POSSIBLE && on); }
+    SNAPBEAM_FN Flag &operator=(bool value) { on = value; return *this; }
+};
+struct LawOf {
+    int number;
+    SNAPBEAM_FN operator int() const { return number; }
+    SNAPBEAM_FN LawOf &operator=(int value) { number = value; return *this; }
+    SNAPBEAM_FN bool operator==(LawNumber law) const { return known(law) && number == law; }
+    SNAPBEAM_FN bool operator!=(LawNumber law) const { return !(*this == law); }
+};
 
 }  // namespace SNAPBEAM_SET

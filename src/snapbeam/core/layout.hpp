@@ -73,6 +73,16 @@ template <int W, int FIXED = 0> struct ModeLanes {
     static SNAPBEAM_FN double mode(const Cell *row, int i) { return reinterpret_cast<const double *>(row)[i]; }
 };
 
+// A kernel for one structure knows how many there are of each (GPU); else the numbers are 0, and arrays lie in an arena.
+#if defined(SNAPBEAM_CELLS)
+constexpr int CELLS = SNAPBEAM_CELLS, BLOCKS = SNAPBEAM_BLOCKS, CHANNELS = SNAPBEAM_CHANNELS, KNOWN_SIGNALS = SNAPBEAM_SIGNALS;
+constexpr int LAW_NUMBERS = SNAPBEAM_LAW_NUMBERS, LEVELS = SNAPBEAM_LEVELS, DISTINCT_FLOWS = SNAPBEAM_DISTINCT_FLOWS;
+constexpr bool KNOWN = true, RECORDS = false;
+#else
+constexpr int CELLS = 0, BLOCKS = 0, CHANNELS = 0, KNOWN_SIGNALS = 0, LAW_NUMBERS = 0, LEVELS = 0, DISTINCT_FLOWS = 0;
+constexpr bool KNOWN = false, RECORDS = true;
+#endif
+
 template <int FIXED = 0> struct Thread {
     typedef double Number;
     typedef double Real;
@@ -95,6 +105,29 @@ struct Arena {
         T *at = base ? reinterpret_cast<T *>(base + used) : nullptr;
         used += count * long(sizeof(T));
         return at;
+    }
+};
+
+// An array of a length that the compiler knows, or in an arena.
+template <class T, int LENGTH, bool INSIDE = KNOWN> struct Held {
+    T at[LENGTH > 0 ? LENGTH : 1];
+    SNAPBEAM_FN operator T *() { return at; }
+    SNAPBEAM_FN operator const T *() const { return at; }
+    SNAPBEAM_FN void take(Arena &, long) {}
+    SNAPBEAM_FN void swap(Held &other) {
+        for (int i = 0; i < LENGTH; ++i) {
+            const T kept = at[i];
+            at[i] = other.at[i], other.at[i] = kept;
+        }
+    }
+};
+template <class T, int LENGTH> struct Held<T, LENGTH, false> {
+    T *at;
+    SNAPBEAM_FN operator T *() const { return at; }
+    void take(Arena &arena, long length) { at = arena.take<T>(length); }
+    SNAPBEAM_FN void swap(Held &other) {
+        T *const kept = at;
+        at = other.at, other.at = kept;
     }
 };
 

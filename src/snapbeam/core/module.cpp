@@ -406,6 +406,19 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
     in_threads(1, shared, 1, nb::none(), [&] { with_python(p, [&] { chosen.layouts[which](p, b); }); });
 }
 
+// For a GPU: a problem and a batch as bytes, whose arrays lie where *moved* says (addresses there by addresses here).
+static nb::tuple moved_arguments(nb::dict problem, nb::dict batch, nb::dict moved) {
+    Arguments of_problem(problem, "problem"), of_batch(batch, "batch");
+    Shared shared;
+    Problem p = problem_of(of_problem);
+    Batch b = batch_of(of_batch, p, shared);
+    const auto move = [&](auto *&at) {
+        if (at) at = reinterpret_cast<std::remove_reference_t<decltype(at)>>(nb::cast<size_t>(moved[nb::int_(reinterpret_cast<size_t>(at))]));
+    };
+    snapbeam::each_array(p, move), snapbeam::each_array(b, move);
+    return nb::make_tuple(nb::bytes(reinterpret_cast<const char *>(&p), sizeof p), nb::bytes(reinterpret_cast<const char *>(&b), sizeof b));
+}
+
 // Force, potential and bounds of a law at many points, from the same text as in a step.
 static void law_values(int law, nb::dict arrays) {
     Arguments a(arrays, "arrays");
@@ -447,6 +460,7 @@ NB_MODULE(_core, m) {
     m.attr("DIRECTIONS") = int(snapbeam::DIRECTIONS);
     m.def("integrate_tangents", &integrate_tangents, nb::arg("problem"), nb::arg("batch"), nb::arg("tangent"), nb::arg("set"), nb::arg("threads"), nb::arg("progress").none());
     m.def("record", &record, nb::arg("problem"), nb::arg("batch"), nb::arg("recorder"), nb::arg("layout"), nb::arg("set"));
+    m.def("moved_arguments", &moved_arguments, nb::arg("problem"), nb::arg("batch"), nb::arg("moved"));
     m.def("law_values", &law_values, nb::arg("law"), nb::arg("arrays"));
     m.def("instruction_sets", [] {
         std::vector<std::string> names;

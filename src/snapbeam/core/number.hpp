@@ -8,19 +8,37 @@
 // times with different flags and the linker must not mix them.  Kernels use no part of the standard library but <math.h>.
 #pragma once
 
+#if defined(__CUDACC_RTC__)  // NVRTC brings the functions of <math.h>, and no headers
+#define INFINITY __longlong_as_double(0x7ff0000000000000)
+#define NAN __longlong_as_double(0x7ff8000000000000)
+#define __builtin_memcpy memcpy
+#else
 #include <math.h>
+#endif
 
 #ifndef SNAPBEAM_SET
 #define SNAPBEAM_SET plain
 #endif
-#if defined(__CUDACC__)
-#define SNAPBEAM_FN __host__ __device__ __forceinline__
+#if defined(__CUDACC_RTC__)
+#define SNAPBEAM_FN __forceinline__
+#define SNAPBEAM_RARE __noinline__
+#define SNAPBEAM_SELDOM __noinline__
+#define SNAPBEAM_CALLED __noinline__
+#define SNAPBEAM_LOOP _Pragma("unroll 1")
 #elif defined(__GNUC__)
 #define SNAPBEAM_FN inline __attribute__((always_inline))
+#define SNAPBEAM_RARE __attribute__((noinline))
+#define SNAPBEAM_SELDOM
+#define SNAPBEAM_CALLED SNAPBEAM_FN
+#define SNAPBEAM_LOOP
 #else
 #define SNAPBEAM_FN inline
+#define SNAPBEAM_RARE
+#define SNAPBEAM_SELDOM
+#define SNAPBEAM_CALLED SNAPBEAM_FN
+#define SNAPBEAM_LOOP
 #endif
-#if defined(__GNUC__) && !defined(SNAPBEAM_ARRAYS)
+#if defined(__GNUC__) && !defined(__CUDACC_RTC__) && !defined(SNAPBEAM_ARRAYS)
 #define SNAPBEAM_VECTORS 1  // vector types of GCC and Clang; elsewhere packs are arrays
 #endif
 #if defined(SNAPBEAM_VECTORS) && (defined(__AVX512F__) || defined(__AVX2__))
@@ -28,6 +46,15 @@
 #endif
 
 namespace SNAPBEAM_SET {
+
+// The next number of a counter that threads share.
+SNAPBEAM_FN int count(int *counter) {
+#if defined(__CUDACC_RTC__)
+    return atomicAdd(counter, 1);
+#else
+    return __atomic_fetch_add(counter, 1, __ATOMIC_RELAXED);
+#endif
+}
 
 // --- packs and masks ----------------------------------------------------------------------------------------------------
 #if defined(SNAPBEAM_VECTORS)
@@ -146,7 +173,9 @@ template <int W> SNAPBEAM_FN Pack<W> value(Pack<W> x) { return x; }
 
 // --- functions ----------------------------------------------------------------------------------------------------------
 SNAPBEAM_FN double fma(double a, double b, double c) {
-#if defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(__CUDACC__)
+#if defined(__CUDACC_RTC__)
+    return ::fma(a, b, c);
+#elif defined(__FMA__) || defined(__ARM_FEATURE_FMA)
     return __builtin_fma(a, b, c);
 #else
     return a * b + c;
@@ -183,7 +212,13 @@ template <int W, class F> SNAPBEAM_FN Pack<W> each(Pack<W> x, F f) {
 template <class T> SNAPBEAM_FN T max(T a, T b) { return select(a > b, a, b); }
 template <class T> SNAPBEAM_FN T min(T a, T b) { return select(a < b, a, b); }
 template <class T> SNAPBEAM_FN T abs(T a) { return select(a < T(0.0), -a, a); }
-SNAPBEAM_FN double sqrt(double x) { return __builtin_sqrt(x); }
+SNAPBEAM_FN double sqrt(double x) {
+#if defined(__CUDACC_RTC__)
+    return ::sqrt(x);
+#else
+    return __builtin_sqrt(x);
+#endif
+}
 template <int W> SNAPBEAM_FN Pack<W> sqrt(Pack<W> x) {
 #if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
     if constexpr (W == 8) {
@@ -199,7 +234,7 @@ template <int W> SNAPBEAM_FN Pack<W> sqrt(Pack<W> x) {
         return r;
     }
 #endif
-    return each(x, [](double y) { return __builtin_sqrt(y); });
+    return each(x, [](double y) { return sqrt(y); });
 }
 template <class T> SNAPBEAM_FN T exp(T x) { return each(x, [](double y) { return ::exp(y); }); }
 template <class T> SNAPBEAM_FN T log(T x) { return each(x, [](double y) { return ::log(y); }); }
@@ -221,7 +256,7 @@ template <class T> SNAPBEAM_FN T remainder(T x, T y) {
 template <class T> struct Turn { T sine, cosine, cosine_less_one; };
 
 // Sine, cosine and cosine - 1 by argument reduction in three steps and Taylor polynomials; within 3e-16 for |x| < 1e5.
-template <class T> SNAPBEAM_FN Turn<T> turn(T x) {
+template <class T> SNAPBEAM_CALLED Turn<T> turn(T x) {
     const T k = nearest(x * T(0.6366197723675814));
     T r = fma(k, T(-1.5707963267341256), x);
     r = fma(k, T(-6.077100506303966e-11), r);
@@ -287,7 +322,7 @@ template <class T> struct Cubic {
 };
 
 // Maximum of a cubic: inside, where it rises at 0 and falls at 1, else at an end.
-template <class T> SNAPBEAM_FN T crest(const Cubic<T> &u, T v0, T v1) {
+template <class T> SNAPBEAM_CALLED T crest(const Cubic<T> &u, T v0, T v1) {
     const auto turns = (v0 > T(0.0)) & (v1 < T(0.0));
     const T ends = max(u.c0, u.at(T(1.0)));
     if (!any(turns)) return ends;
@@ -296,8 +331,9 @@ template <class T> SNAPBEAM_FN T crest(const Cubic<T> &u, T v0, T v1) {
 
 // First fraction in (0, high] at which a cubic that is not positive at 0 and positive at high becomes positive: Newton's method
 // between bounds.  Events are corrected on the true motion afterwards.
-template <class T> SNAPBEAM_FN T root(const Cubic<T> &u, T high) {
+template <class T> SNAPBEAM_CALLED T root(const Cubic<T> &u, T high) {
     T low = T(0.0), x = T(0.5) * high;
+    SNAPBEAM_LOOP
     for (int i = 0; i < 8; ++i) {
         const T y = u.at(x);
         const auto above = y > T(0.0);

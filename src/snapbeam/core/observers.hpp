@@ -30,7 +30,7 @@ template <class L> void write_sample(Group<L> &run, double time, bool within) {
         row[m] = element<L>(z.q1, run.s->place[m], 0) + (there && problem.shift ? problem.shift[m] : 0.0);
         row[modes + m] = element<L>(z.p1, run.s->place[m], 0);
     }
-    typename L::Cell *q = z.q, *p = z.p;
+    const auto q = z.q, p = z.p;
     z.q = z.q1, z.p = z.p1;
     values[SAMPLE_TIME] = time;
     values[BEAM_ENERGY] = lane(value(run.totals.energy(z, false)), 0);
@@ -43,7 +43,7 @@ template <class L> void write_sample(Group<L> &run, double time, bool within) {
         const auto x = c.contact ? penetration(z, c, z.q1) : along(z, c, z.q1);
         const auto v = dot<L>(c.row, z.p1, run.s->size()), y = c.contact ? signal_slope(z, c) - v : v;
         const auto pressed = max(x, typename L::Number(0.0));
-        const auto stored = c.timed ? typename L::Number(0.0) : with_law(c.law, [&](auto law) { return law.potential(c.contact ? pressed : x, c.P); });
+        const auto stored = c.timed ? typename L::Number(0.0) : with_law(c.law, [&](auto law) { return law.potential(c.contact ? pressed : x, c.numbers()); });
         own[SAMPLE_DEPTH] = lane(value(x), 0);
         typename L::Number force = x;
         if (c.impulsive) force = select(acting(c), pressed_by(z, c, z.q1, z.p1, z.k1) / c.M[j], typename L::Number(0.0));

@@ -14,6 +14,11 @@
 
 namespace SNAPBEAM_SET {
 
+#if defined(SNAPBEAM_ONLY_TONES)  // as a kernel for one structure may know
+constexpr bool ONLY_TONES = true;
+#else
+constexpr bool ONLY_TONES = false;
+#endif
 constexpr double ANCHOR = 64.0;
 constexpr int WHOLE = MOST_DISTINCT;  // the whole step, among the flows
 
@@ -35,19 +40,20 @@ template <class L> struct Signal {
     Number ahead_sine[WHOLE + 1], ahead_cosine[WHOLE + 1];  // over each flow of the step and all of it; of others than tones times
     int piece[L::runs];                                   // the piece at hand, at which the search begins
 
-    SNAPBEAM_FN bool is_tone() const { return kind == snapbeam::TONE; }
+    SNAPBEAM_FN bool is_tone() const { return ONLY_TONES || kind == snapbeam::TONE; }
+    SNAPBEAM_FN bool windowed() const { return !ONLY_TONES && window; }
     SNAPBEAM_FN Number own_value(const Moment<L> &m) const { return is_tone() ? fma(p[snapbeam::AMPLITUDE], m.sine, p[snapbeam::MEAN]) : m.value; }
     SNAPBEAM_FN Number own_slope(const Moment<L> &m) const { return is_tone() ? p[snapbeam::AMPLITUDE] * p[snapbeam::RATE] * m.cosine : m.slope; }
     SNAPBEAM_FN Number own_bend(const Moment<L> &m) const {
         return is_tone() ? -(p[snapbeam::AMPLITUDE] * p[snapbeam::RATE] * p[snapbeam::RATE] * m.sine) : m.bend;
     }
-    SNAPBEAM_FN Number value_at() const { return window ? window->own_value(window->at) * own_value(at) : own_value(at); }
+    SNAPBEAM_FN Number value_at() const { return windowed() ? window->own_value(window->at) * own_value(at) : own_value(at); }
     SNAPBEAM_FN Number slope() const {
-        if (!window) return own_slope(at);
+        if (!windowed()) return own_slope(at);
         return fma(window->own_slope(window->at), own_value(at), window->own_value(window->at) * own_slope(at));
     }
-    SNAPBEAM_FN Number acceleration() const { return acceleration_of(at, window ? &window->at : nullptr); }
-    SNAPBEAM_FN Number acceleration_at_begin() const { return acceleration_of(begun, window ? &window->begun : nullptr); }
+    SNAPBEAM_FN Number acceleration() const { return acceleration_of(at, windowed() ? &window->at : nullptr); }
+    SNAPBEAM_FN Number acceleration_at_begin() const { return acceleration_of(begun, windowed() ? &window->begun : nullptr); }
     SNAPBEAM_FN Number acceleration_of(const Moment<L> &m, const Moment<L> *w) const {
         if (!w) return own_bend(m);
         return fma(window->own_bend(*w), own_value(m), fma(Number(2.0) * window->own_slope(*w), own_slope(m), window->own_value(*w) * own_bend(m)));
@@ -59,12 +65,12 @@ template <class L> struct Signal {
     // Error of the cubic through values and slopes at the ends of *h*.
     SNAPBEAM_FN Number doubt(Number h) const {
         const Number w = p[snapbeam::RATE] * h, square = w * w;
-        if (is_tone() && !window) return abs(p[snapbeam::AMPLITUDE]) * min(square * square * Number(1.0 / 384.0), Number(2.5));
+        if (is_tone() && !windowed()) return abs(p[snapbeam::AMPLITUDE]) * min(square * square * Number(1.0 / 384.0), Number(2.5));
         return min(greatest_bend() * h * h * Number(1.0 / 16.0), Number(2.5) * greatest_value());
     }
 
     // Value and derivatives of others than tones at at.now.
-    SNAPBEAM_FN void evaluate() {
+    SNAPBEAM_CALLED void evaluate() {
         if constexpr (L::directions > 0) {
             evaluate(0, at.now, p, at.value, at.slope, at.bend);
         } else {
@@ -132,10 +138,11 @@ template <class L> struct Signal {
     SNAPBEAM_FN void set_length(Number h) { ahead(WHOLE, h), formed = false; }
     SNAPBEAM_FN void act(const Composition &c, Number h) {
         act_alone(c, h);
-        if (window) window->act_alone(c, h);
+        if (windowed()) window->act_alone(c, h);
     }
     SNAPBEAM_FN void act_alone(const Composition &c, Number h) {
         acts = true;
+        SNAPBEAM_LOOP
         for (int f = 0; f < c.distinct && !formed; ++f) ahead(f, h * Number(c.flow[f]));
         formed = true;
     }

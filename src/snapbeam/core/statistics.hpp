@@ -30,13 +30,13 @@ template <class L> struct Totals {
     typedef typename L::Marks Marks;
 
     const Structure<L> *s;
-    Cell *row;                 // of the displacement observed
+    Held<Cell, CELLS> row;     // of the displacement observed
     bool shared;               // it is that of the first contact
     Number rest;
     Observed<L> point, center;
     Number sum[snapbeam::STATISTICS];
     Real late, decide_energy, decide_reach, decide_crossings;
-    Plain *swing_u, *swing_v;  // weights of squared amplitudes, whose sums bound the errors of the cubics in a flight step
+    Held<Plain, CELLS> swing_u, swing_v;  // weights of squared amplitudes, whose sums bound the errors of the cubics in a flight step
     Number modal_energy, high_energy;  // and those sums, where they were evaluated last
     Real most_u, most_v;
     Number length;             // of the last step, s
@@ -44,7 +44,7 @@ template <class L> struct Totals {
 
     void lay_out(const Structure<L> &structure, const Runs<L> &, Arena &arena) {
         s = &structure;
-        row = arena.take<Cell>(s->cells), swing_u = arena.take<Plain>(s->cells), swing_v = arena.take<Plain>(s->cells);
+        row.take(arena, s->cells), swing_u.take(arena, s->cells), swing_v.take(arena, s->cells);
     }
     void clear(bool of_contact) {
         shared = of_contact;
@@ -82,7 +82,7 @@ template <class L> struct Totals {
     SNAPBEAM_FN Number center_height(const Runs<L> &z, const Cell *q) const {
         return fma(z.sign, Number(s->problem->center_rest), dot<L>(s->center, q, s->size()));
     }
-    void start(Runs<L> &z, Marks which, Number energy_now) {
+    SNAPBEAM_SELDOM void start(Runs<L> &z, Marks which, Number energy_now) {
         using namespace snapbeam;
         const int n = s->size();
         assign(which, point.u, height(z, z.q)), assign(which, point.v, dot<L>(row, z.p, n));
@@ -97,9 +97,10 @@ template <class L> struct Totals {
     }
 
     // Energy of the state q, p; with what contacts store, or of the beam alone, without its strikers and local forces.
-    Number energy(Runs<L> &z, bool contacts, bool beam = false) {
+    SNAPBEAM_SELDOM Number energy(Runs<L> &z, bool contacts, bool beam = false) {
         const int n = s->size();
         Cell sum_of = Cell(0.0);
+        SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) {
             const Cell own = Cell(beam ? s->beam[i] : typename L::Coef(1.0)), oq = s->omega[i] * z.q[i];
             sum_of = fma(own * z.p[i], z.p[i], fma(own * oq, oq, sum_of));
@@ -114,7 +115,7 @@ template <class L> struct Totals {
             const Channel<L> &c = z.channel[j];
             if (c.timed || (c.contact && !contacts)) continue;
             const Number x = c.contact ? max(c.d0, Number(0.0)) : along(z, c, z.q);
-            const Number stored = with_law(c.law, [&](auto law) { return law.potential(x, c.P); });
+            const Number stored = with_law(c.law, [&](auto law) { return law.potential(x, c.numbers()); });
             all += c.contact ? select(acting(c), stored, Number(0.0)) : stored;
         }
         return all;
@@ -132,11 +133,12 @@ template <class L> struct Totals {
     }
     // Energies of the modes of the beam about the nearest well and of the high ones, and the sums that bound the errors of the cubics:
     // by the inequality of Cauchy and Schwarz (sum_i c_i A_i)^2 <= N sum_i c_i^2 A_i^2.
-    void modal(const Runs<L> &z, Number *found, Real *most) {
+    SNAPBEAM_SELDOM void modal(const Runs<L> &z, Number *found, Real *most) {
         Cell whole = Cell(0.0), high = Cell(0.0);
         Plain u = Plain(0.0), v = Plain(0.0);
         const Real near = well(z);
         const bool apart = s->problem->second || any(differ(near, z.sign));
+        SNAPBEAM_LOOP
         for (int i = 0; i < s->size(); ++i) {
             const Cell p = z.p[i], oq = s->omega[i] * z.q[i], square = fma(p, p, oq * oq);
             u = fma(swing_u[i], value(square), u), v = fma(swing_v[i], value(square), v);
@@ -156,7 +158,7 @@ template <class L> struct Totals {
     // well.  Their difference -sum_i omega_i^2 (b_i - a_i) (q_i - (a_i + b_i)/2), of a well b to a well a, is linear in q, and a cubic
     // in time.  From a step that ends on the other side (*once*) the rule of trapezoids gets the energy about the first well at its
     // end, and its correction h^2/12 by the rates there, which does not cancel where the wells change.
-    void change_well(const Runs<L> &z, Marks found, Marks once, Number from, Number until) {
+    SNAPBEAM_SELDOM void change_well(const Runs<L> &z, Marks found, Marks once, Number from, Number until) {
         using namespace snapbeam;
         const Real here = well(z);
         const Number h = z.h;
@@ -180,14 +182,14 @@ template <class L> struct Totals {
         };
         return h * (integral(until) - integral(from) + select(once, Number(1.0 / 12.0) * h * e[3] - Number(0.5) * e[2], Number(0.0)));
     }
-    void enter_well(const Runs<L> &z, Marks which) {
+    SNAPBEAM_SELDOM void enter_well(const Runs<L> &z, Marks which) {
         Number now[2];
         Real most[2];
         modal(z, now, most);
         assign(which, modal_energy, now[0]), assign(which, high_energy, now[1]), assign(which, most_u, most[0]), assign(which, most_v, most[1]);
     }
     // By the rule of trapezoids with its correction h^2/12 (E_0' - E_1'), which cancels between steps of equal length.
-    void correct(const Runs<L> &z, Marks which, Number h, bool last) {
+    SNAPBEAM_SELDOM void correct(const Runs<L> &z, Marks which, Number h, bool last) {
         using namespace snapbeam;
         Cell whole = Cell(0.0), high = Cell(0.0);
         const Real near = well(z);
@@ -250,7 +252,7 @@ template <class L> struct Totals {
     }
 
     // The extremes of what is observed, followed inside the step.
-    void follow(const Runs<L> &z, Marks near, Cell *memory) {
+    SNAPBEAM_SELDOM void follow(const Runs<L> &z, Marks near, Cell *memory) {
         using namespace snapbeam;
         Inside<L, Cell, Number> inside;
         inside.begin(z, memory);
@@ -269,7 +271,7 @@ template <class L> struct Totals {
             u = u1, v = v1, a = a1, c = c1, cv = cv1, ca = ca1;
         }
     }
-    static SNAPBEAM_FN Number speed_on(Number v0, Number a0, Number v1, Number a1, Number h) {
+    static SNAPBEAM_CALLED Number speed_on(Number v0, Number a0, Number v1, Number a1, Number h) {
         const Cubic<Number> up(v0, a0, v1, a1, h), down(-v0, -a0, -v1, -a1, h);
         return max(crest(up, a0, a1), crest(down, -a0, -a1));
     }
@@ -278,7 +280,7 @@ template <class L> struct Totals {
     }
 
     // Statistics of a user, before the step is added.
-    __attribute__((noinline)) void update(const Runs<L> &z, Marks ok, const Batch &batch, const int *run) const {
+    SNAPBEAM_RARE void update(const Runs<L> &z, Marks ok, const Batch &batch, const int *run) const {
         using namespace snapbeam;
         const int n = s->size(), updates = s->problem->updates;
         const Channel<L> *first = z.channels && z.channel[0].contact ? z.channel : nullptr;
@@ -294,7 +296,7 @@ template <class L> struct Totals {
             step[COMPLETED_TOUCHING] = first && lane(first->closed, l) ? 1.0 : 0.0;
             for (int k = 0; k < updates; ++k) {
                 double &held = batch.held[long(run[l]) * updates + k];
-                held = reinterpret_cast<Update>(static_cast<__UINTPTR_TYPE__>(s->problem->update[k]))(held, step);
+                held = reinterpret_cast<Update>(static_cast<decltype(sizeof 0)>(s->problem->update[k]))(held, step);
             }
         }
     }
@@ -375,6 +377,7 @@ template <class L> struct Totals {
         amplitudes(z, amplitude);
         Plain su = Plain(0.0), sv = Plain(0.0), sc = Plain(0.0), scv = Plain(0.0);
         const Plain h = Plain(value(z.h));
+        SNAPBEAM_LOOP
         for (int i = 0; i < s->size(); ++i) {
             Plain of_u, of_v;
             doubts_of_mode(h, Plain(s->omega[i]), of_u, of_v);
@@ -497,8 +500,9 @@ template <class L> struct Totals {
     }
 
     // Largest penetration in a step in which it turns: where the rate, a cubic by its values and slopes, is zero.
-    Number summit(const Runs<L> &z, const Channel<L> &c) {
+    SNAPBEAM_SELDOM Number summit(const Runs<L> &z, const Channel<L> &c) {
         Number a0 = -bend_at(z, c.row, false), a1 = signal_bend(z, c) - bend_at(z, c.row, true);
+        SNAPBEAM_LOOP
         for (int i = 0; i < c.uses; ++i) a0 = fma(Number(c.factor[i]), z.signal[c.signal[i]].acceleration_at_begin(), a0);
         const Cubic<Number> fall(-c.r0, -a0, -c.r1, -a1, z.h);
         const Number at = root(fall, Number(1.0));
@@ -518,7 +522,7 @@ template <class L> struct Totals {
         if (any(asks)) found = found | (asks & (value(energy(z, false)) < decide_energy));
         return found;
     }
-    void finish(Runs<L> &z, Marks which) {
+    SNAPBEAM_SELDOM void finish(Runs<L> &z, Marks which) {
         using namespace snapbeam;
         if (s->problem->high) correct(z, which, Number(0.0), true);
         assign(which, sum[ENERGY], energy(z, true));

@@ -38,17 +38,24 @@ namespace SNAPBEAM_SET {
 template <class L> struct Channel {
     typedef typename L::Number Number;
     typedef typename L::Real Real;
-    int law;
+    LawOf law;
     int state;                   // place of a state of its own in P, or -1
-    bool contact, lossy, timed, affine, memory, impulsive, circuit, harvests, active;
+    Flag<of_some_law([](auto law) { return law.contact; }), of_every_law([](auto law) { return law.contact; })> contact;
+    Flag<of_some_law([](auto law) { return law.lossy; })> lossy;
+    Flag<of_some_law([](auto law) { return law.timed; })> timed;
+    Flag<of_some_law([](auto law) { return law.memory; })> memory;
+    Flag<of_some_law([](auto law) { return law.impulsive; })> impulsive;
+    Flag<known(CIRCUIT)> circuit;
+    bool affine, harvests, active;
     int uses;                    // signals that it adds
-    int *signal;
-    double *factor;
-    typename L::Cell *row;       // r, of the runs at hand
-    typename L::Cell *along_q, *along_p;  // of a circuit
-    Number *along_M;             // products of along_p with the rows of all channels
+    Held<int, KNOWN_SIGNALS> signal;
+    Held<double, KNOWN_SIGNALS> factor;
+    Held<typename L::Cell, CELLS> row;  // r, of the runs at hand
+    Held<typename L::Cell, known(CIRCUIT) ? CELLS : 0> along_q, along_p;  // of a circuit
+    Held<Number, known(CIRCUIT) ? CHANNELS : 0> along_M;  // products of along_p with the rows of all channels
     typename L::Marks follows;   // the circuit follows the beam in the step at hand
-    Number *P, *M;               // numbers of the law; products with the rows of all channels
+    Held<Number, LAW_NUMBERS> P;  // numbers of the law
+    Held<Number, CHANNELS> M;    // products with the rows of all channels
     Number rest, offset;         // displacement in the first well; of a contact, penetration there with its signals at 0
     // at a kick: x and y of the law, force; force of the first kick; penetration and rate at both ends
     Number x, y, f, first_f, v;
@@ -64,6 +71,8 @@ template <class L> struct Channel {
     Number impulse, work, lost;
     Number own_impulse, deepest, hardest;
     Number sums[snapbeam::OF_CHANNEL];
+
+    SNAPBEAM_FN const Number *numbers() const { return P; }
 };
 
 template <class L> struct Runs {
@@ -75,7 +84,7 @@ template <class L> struct Runs {
     int channels, signals;
     Channel<L> *channel;
     Signal<L> *signal;
-    Cell *q, *p, *k, *q1, *p1, *k1, *r;   // state and acceleration by the tension at both ends; Gq at a kick
+    Held<Cell, CELLS> q, p, k, q1, p1, k1, r;  // state and acceleration by the tension at both ends; Gq at a kick
     const Plain *flows;                   // (distinct flows, cells, 4) of the step
     Number *block;                        // arrays of the velocity block
     int *late;                            // channels of it
@@ -93,12 +102,12 @@ constexpr int BLOCK_ARRAYS = 13;
 constexpr double FOLLOWS = 8.0;  // decay of a circuit in a step, lam h, beyond which it follows the beam
 constexpr double RESOLVED[3] = {3.0, 1.5, 1.5};  // and, of each composition, up to which a step is as long as wanted
 
-template <class L, class X, class Y> SNAPBEAM_FN typename L::Cell dot_cells(const X *a, const Y *b, int n) {
+template <class L, class X, class Y> SNAPBEAM_FN typename L::Cell dot_cells(const X &a, const Y &b, int n) {
     typename L::Cell s = a[0] * b[0];
     for (int i = 1; i < n; ++i) s = fma(a[i], b[i], s);
     return s;
 }
-template <class L, class X, class Y> SNAPBEAM_FN typename L::Number dot(const X *a, const Y *b, int n) { return L::total(dot_cells<L>(a, b, n)); }
+template <class L, class X, class Y> SNAPBEAM_FN typename L::Number dot(const X &a, const Y &b, int n) { return L::total(dot_cells<L>(a, b, n)); }
 
 // Rows at, ..., at + ROWS - 1 of r = Gq for columns of one block; returns their part of q.Gq.
 template <int ROWS, class L>
@@ -127,6 +136,7 @@ SNAPBEAM_FN typename L::Cell product_rows(const Structure<L> &s, const typename 
 // Sum of a channel's signals: displacement of a striker, force, load; acceleration of a base.
 template <class L> SNAPBEAM_FN typename L::Number signal_of(const Runs<L> &z, const Channel<L> &c) {
     typename L::Number s = typename L::Number(0.0);
+    SNAPBEAM_LOOP
     for (int i = 0; i < c.uses; ++i) {
         const Signal<L> &one = z.signal[c.signal[i]];
         s = fma(typename L::Number(c.factor[i]), c.law == BASE ? one.acceleration() : one.value_at(), s);
@@ -135,11 +145,13 @@ template <class L> SNAPBEAM_FN typename L::Number signal_of(const Runs<L> &z, co
 }
 template <class L> SNAPBEAM_FN typename L::Number signal_slope(const Runs<L> &z, const Channel<L> &c) {
     typename L::Number s = typename L::Number(0.0);
+    SNAPBEAM_LOOP
     for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), z.signal[c.signal[i]].slope(), s);
     return s;
 }
 template <class L> SNAPBEAM_FN typename L::Number signal_bend(const Runs<L> &z, const Channel<L> &c) {
     typename L::Number s = typename L::Number(0.0);
+    SNAPBEAM_LOOP
     for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), z.signal[c.signal[i]].acceleration(), s);
     return s;
 }
@@ -224,7 +236,7 @@ template <class L> SNAPBEAM_FN typename L::Marks changing(const Channel<L> &c) {
 template <class L>
 SNAPBEAM_FN typename L::Number force_at(const Channel<L> &c, typename L::Number x, typename L::Number y) {
     typedef typename L::Number Number;
-    const Number f = with_law(c.law, [&](auto law) { return law.force(c.contact ? max(x, Number(0.0)) : x, y, c.P); });
+    const Number f = with_law(c.law, [&](auto law) { return law.force(c.contact ? max(x, Number(0.0)) : x, y, c.numbers()); });
     return c.contact ? select(acting(c), f, Number(0.0)) : f;
 }
 
@@ -233,7 +245,7 @@ template <class L>
 SNAPBEAM_FN typename L::Number power_lost(const Channel<L> &c, typename L::Number x, typename L::Number y, typename L::Number f, typename L::Number elastic) {
     return with_law(c.law, [&](auto law) {
         if constexpr (law.contact) return (f - elastic) * y;
-        else return law.loss(x, y, f, c.P);
+        else return law.loss(x, y, f, c.numbers());
     });
 }
 
@@ -332,7 +344,7 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
         tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
         elastic[i] = c.contact ? force_at(c, c.x, Number(0.0)) : Number(0.0);
         const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]);
-        const Number damping = with_law(c.law, [&](auto law) { return law.damping(c.contact ? max(c.x, Number(0.0)) : c.x, fastest, c.P); });
+        const Number damping = with_law(c.law, [&](auto law) { return law.damping(c.contact ? max(c.x, Number(0.0)) : c.x, fastest, c.numbers()); });
         decay += value(product_seen(c, z.late[i]) * (c.contact ? select(acting(c), damping, Number(0.0)) : damping));
     }
     // nothing changes, or one that is linear alone
@@ -492,6 +504,7 @@ template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
         c.impulse = c.work = c.lost = Number(0.0), c.z = c.circuit ? c.P[c.state] : Number(0.0);
         if (c.circuit) c.follows = follows(c, j, c.P[0] * z.h);
         c.active = !c.contact || any(c.closed), z.direct &= !c.active;
+        SNAPBEAM_LOOP
         for (int i = 0; c.active && i < c.uses; ++i) z.signal[c.signal[i]].act(z.s->composition, z.h);
         if (!(c.law == AXIAL_LOAD)) c.f = c.first_f = Number(0.0);
     }
@@ -590,16 +603,18 @@ template <class L> SNAPBEAM_FN void take_step(Runs<L> &outer) {
     if constexpr (L::fixed > 0 && L::together == 1) {
         typedef typename L::Cell Cell;
         constexpr int N = L::fixed;
-        Cell q[N], p[N], k[N], r[N];
         Runs<L> z = outer;
-        z.q1 = q, z.p1 = p, z.k1 = k, z.r = r;
-        for (int i = 0; i < N; ++i) q[i] = p[i] = k[i] = r[i] = Cell(0.0);
+        Held<Cell, N, true> q, p, k, r;
+        if constexpr (!KNOWN) z.q1.at = q, z.p1.at = p, z.k1.at = k, z.r.at = r;
+        for (int i = 0; i < N; ++i) z.q1[i] = z.p1[i] = z.k1[i] = z.r[i] = Cell(0.0);
         begin_step(z);
+        SNAPBEAM_LOOP
         for (int stage = 0; stage <= flows; ++stage) take_stage(z, stage);
-        for (int i = 0; i < N; ++i) outer.q1[i] = q[i], outer.p1[i] = p[i], outer.k1[i] = k[i], outer.r[i] = r[i];
+        for (int i = 0; i < N; ++i) outer.q1[i] = z.q1[i], outer.p1[i] = z.p1[i], outer.k1[i] = z.k1[i], outer.r[i] = z.r[i];
         outer.gq = z.gq, outer.qr = z.qr, outer.next_gq = z.next_gq, outer.dissipated = z.dissipated;
     } else {
         begin_step(outer);
+        SNAPBEAM_LOOP
         for (int stage = 0; stage <= flows; ++stage) take_stage(outer, stage);
     }
 }

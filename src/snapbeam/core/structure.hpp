@@ -58,7 +58,7 @@ template <int K> SNAPBEAM_FN Dual<K> decay_of(const Dual<K> &x) {
 }
 
 // The four numbers of the flow of a mode over a time.
-template <class T> SNAPBEAM_FN void set_flow(T time, T sigma, T omega, T *a) {
+template <class T> SNAPBEAM_CALLED void set_flow(T time, T sigma, T omega, T *a) {
     const T omega2 = omega * omega, square = fma(sigma, -sigma, omega2), damped = sqrt(max(square, T(1e-200)));
     const Turn<T> w = turn(time * damped);
     T over = w.sine / damped, cosine_less = w.cosine_less_one, less = decay_of(time * sigma);
@@ -81,11 +81,13 @@ template <class L> struct Structure {
     Composition composition;
     int cells, padded;
     double fastest;                                // angular frequency
-    int *first, *count, *mode_first, *mode_count;  // of each block: cells and modes
-    int *place;                                    // of each mode in the padded order
-    Coef *omega, *sigma, *g, *G, *shift, *far_force, *center, *high, *beam, *second;
+    Held<int, BLOCKS> first, count, mode_first, mode_count;  // of each block: cells and modes
+    Held<int, CELLS> place;                                  // of each mode in the padded order
+    typedef Held<Coef, CELLS> Row;
+    Row omega, sigma, g, shift, far_force, center, high, beam, second;
+    Held<Coef, CELLS * CELLS> G;
 
-    SNAPBEAM_FN int size() const { return L::fixed ? L::fixed : cells; }
+    SNAPBEAM_FN int size() const { return KNOWN ? CELLS : L::fixed ? L::fixed : cells; }
 
     void build(const Problem &p, Arena &arena) {
         problem = &p;
@@ -93,12 +95,12 @@ template <class L> struct Structure {
         cells = 0;
         for (int b = 0; b < p.blocks; ++b) cells += (p.block_sizes[b] + L::lanes - 1) / L::lanes;
         padded = cells * L::lanes;
-        first = arena.take<int>(p.blocks), count = arena.take<int>(p.blocks);
-        mode_first = arena.take<int>(p.blocks), mode_count = arena.take<int>(p.blocks), place = arena.take<int>(p.modes);
-        Coef **rows[] = {&omega, &sigma, &g, &shift, &far_force, &center, &high, &beam, &second};
-        for (Coef **row : rows) *row = arena.take<Coef>(cells);
-        G = arena.take<Coef>(long(cells) * padded);
-        if (!arena.base) return;
+        first.take(arena, p.blocks), count.take(arena, p.blocks);
+        mode_first.take(arena, p.blocks), mode_count.take(arena, p.blocks), place.take(arena, p.modes);
+        Row *rows[] = {&omega, &sigma, &g, &shift, &far_force, &center, &high, &beam, &second};
+        for (Row *row : rows) row->take(arena, cells);
+        G.take(arena, long(cells) * padded);
+        if (!arena.base && !KNOWN) return;
         int cell = 0, mode = 0;
         for (int b = 0; b < p.blocks; ++b) {
             first[b] = cell, mode_first[b] = cell * L::lanes, mode_count[b] = p.block_sizes[b];
@@ -107,7 +109,7 @@ template <class L> struct Structure {
             cell += count[b];
         }
         for (int i = 0; i < padded; ++i) {
-            for (Coef **row : rows) set_coefficient<L>(*row, i, 0.0);
+            for (Row *row : rows) set_coefficient<L>(*row, i, 0.0);
             set_coefficient<L>(omega, i, 1.0);
             for (int j = 0; j < padded; ++j) set_coefficient<L>(G + long(j) * cells, i, 0.0);
         }

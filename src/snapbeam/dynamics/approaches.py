@@ -42,10 +42,7 @@ def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
     run, depths, impacts = _followed(flow, coordinates, periods)
     time = run.dataset["time"].values
     # a turning point within a contact, or as near to one as a sample, is part of it
-    turns, spacing = (
-        turning_points(flow, coordinates, periods, periodic=False),
-        1.000001 * (time[1] - time[0]),
-    )
+    turns, spacing = (turning_points(flow, coordinates, periods, periodic=False), 1.000001 * (time[1] - time[0]))
     free = np.isfinite(turns.depth)
     deepest = []
     for onset, duration, contact in impacts:
@@ -94,9 +91,7 @@ def penetrations(flow: Stroboscope, coordinates: _Array, periods: int, times: _A
     return _followed(flow, coordinates, periods, times)[1]
 
 
-def turning_points(
-    flow: Stroboscope, coordinates: _Array, periods: int, *, periodic: bool = True
-) -> TurningPoints:
+def turning_points(flow: Stroboscope, coordinates: _Array, periods: int, *, periodic: bool = True) -> TurningPoints:
     """Turning points of the gaps of a motion, by the quartic through the five nearest samples, sampled once more there.
 
     Of a *periodic* motion the samples go on from its end to its beginning.  An impact that lasts no time is no turning point: the

@@ -17,13 +17,7 @@ from snapbeam.dynamics.flow import AdvancedStates, Flow, minimal_period
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot
 from snapbeam.dynamics.results import coordinate_names, fixed_parameters, in_unit, labelled
-from snapbeam.dynamics.shooting import (
-    Family,
-    OrbitNotFoundError,
-    jacobian,
-    orbit_tolerance,
-    require_isolated_orbits,
-)
+from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, jacobian, orbit_tolerance, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -149,9 +143,7 @@ class Attractor:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> [(each.kind, each.period) for each in found.attractors]
     [('periodic', 1), ('periodic', 1), ('periodic', 1)]
@@ -196,9 +188,7 @@ class Attractors:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> found.undecided
     0.0
@@ -355,9 +345,7 @@ def find_attractors(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> f"{found.unseen_share():.2f}"  # upper bound at 95 % of the fraction of states that go to other attractors
     '0.22'
@@ -369,10 +357,7 @@ def find_attractors(
         if transient is None
         else (integer("transient", transient, 1, 10**7), "as given")
     )
-    most, lasts = (
-        integer("max_periods", max_periods, 1, 512),
-        integer("check_periods", check_periods, 20, 10**7),
-    )
+    most, lasts = (integer("max_periods", max_periods, 1, 512), integer("check_periods", check_periods, 20, 10**7))
     rows = _states_of(flow, states, seed_of(rng))
     allowed = orbit_tolerance(tolerance)
 
@@ -488,9 +473,7 @@ def _verify(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:
 
 
 def _is_same(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
-    return (
-        one.period == other.period and float(np.abs(other.points - one.coordinates).max(axis=1).min()) < _SAME
-    )
+    return one.period == other.period and float(np.abs(other.points - one.coordinates).max(axis=1).min()) < _SAME
 
 
 def _nearest(orbits: list[PeriodicOrbit], x: _Array) -> int:
@@ -527,9 +510,7 @@ def _chaotic(
     for group in _groups(later.every):
         if left[group].any():
             continue
-        exponents = lyapunov_spectrum(
-            flow, 1, max(lasts // 2, 100), transient=0, states=later.states[group[:_FEW]]
-        )
+        exponents = lyapunov_spectrum(flow, 1, max(lasts // 2, 100), transient=0, states=later.states[group[:_FEW]])
         value = float(exponents["exponent"].mean())
         error = float(exponents["exponent_error"].max())
         if not value > _SIGMAS * error:
@@ -559,8 +540,7 @@ def _mingle(tree_one: Any, tree_other: Any) -> bool:
     """Return whether each run comes as close to the points of the other as to its own."""
     own = max(float(np.median(tree.query(tree.data, 2)[0][:, 1])) for tree in (tree_one, tree_other))
     across = min(
-        float(np.median(tree_one.query(tree_other.data)[0])),
-        float(np.median(tree_other.query(tree_one.data)[0])),
+        float(np.median(tree_one.query(tree_other.data)[0])), float(np.median(tree_other.query(tree_one.data)[0]))
     )
     return across < 3.0 * own
 

@@ -36,9 +36,7 @@ _SAME_STATE = 1e-6
 _NEAR_ZERO = 0.1
 """Distance of a chord from zero, over its length, up to which the curve passes through zero."""
 _AT_REST, _OTHER_REST = "back at the equilibrium", "at another equilibrium"
-_RETRACED = (
-    "the turning points meet: the curve goes on through the same motions from their other turning points"
-)
+_RETRACED = "the turning points meet: the curve goes on through the same motions from their other turning points"
 _SAMPLES = 64
 """Instants of half a period from which means are taken."""
 _STABLE = 1e-4
@@ -182,9 +180,7 @@ class _Structure:
             )
         model, potential = system.model, system.potential
         if model.length_scale is None:
-            raise InputError(
-                "system: a straight beam has no length scale; give a buckled beam or a length_scale"
-            )
+            raise InputError("system: a straight beam has no length scale; give a buckled beam or a length_scale")
         if not potential.wells:
             raise InputError("system: its equilibrium is not stable; a backbone curve needs a well")
         alone = well == "lower" and len(potential.wells) == 1
@@ -233,9 +229,7 @@ class _Structure:
         facing = wells[0 if sides[0] > 0.0 else -1].amplitude
         row = np.zeros(self.size)
         row[: self.model.modes] = -sides[1] * np.asarray(self.model.shape_at(striker.location))
-        begin = -float(row[: self.model.modes] @ facing) - (
-            0.0 if striker.gap is None else float(striker.gap)
-        )
+        begin = -float(row[: self.model.modes] @ facing) - (0.0 if striker.gap is None else float(striker.gap))
         if number in self.bodies:
             row[self.model.modes + self.bodies.index(number)] = sides[1]
         return law, row, begin
@@ -434,9 +428,7 @@ class _Motions(Equations):
                 return z[1] if z[0] < 1.0 else -1.0
 
             turned.terminal = True  # type: ignore[attr-defined]
-            done = solve_ivp(
-                rate, (0.0, 200.0), [high, 0.0], method="DOP853", events=turned, rtol=1e-9, atol=1e-11
-            )
+            done = solve_ivp(rate, (0.0, 200.0), [high, 0.0], method="DOP853", events=turned, rtol=1e-9, atol=1e-11)
             if done.t_events[0].size:
                 along = np.append(way / np.sqrt(norm), 0.0)
                 try:
@@ -453,10 +445,7 @@ def _vanishing(before: _Array, after: _Array) -> float | None:
     """Part of the way between two points of a curve at which a vector vanishes; None where its chord misses zero."""
     chord = after - before
     square = float(chord @ chord)
-    if (
-        min(np.abs(before).max(), np.abs(after).max()) < _SAME_STATE
-        or not 0.0 < -float(before @ chord) < square
-    ):
+    if min(np.abs(before).max(), np.abs(after).max()) < _SAME_STATE or not 0.0 < -float(before @ chord) < square:
         return None
     part = -float(before @ chord) / square
     return part if np.linalg.norm(before + part * chord) < _NEAR_ZERO * np.sqrt(square) else None

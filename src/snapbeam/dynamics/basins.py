@@ -11,12 +11,12 @@ from scipy import ndimage, stats
 
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
 from snapbeam.dynamics.flow import Flow
-from snapbeam.dynamics.lifetimes import proportion
 from snapbeam.dynamics.periodic_orbits import state_of
 from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
 from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.state import State
 from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
+from snapbeam.util.proportions import proportion
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, integer, shown
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def basins_of_attraction(
     Near a fractal border the error of the integration changes labels.  Every state with a neighbour of another
     label, and a random sample of 300 others, is therefore integrated at half the step too.  ``sensitive`` marks
     the states whose label changes; the attribute ``sensitive_share`` is the share of such states of the plane,
-    with its interval at 95 % (Jeffreys, for the sampled part).  If it exceeds 1 %, a warning is given.
+    with its interval at 95 % (Wilson, for the sampled part).  If it exceeds 1 %, a warning is given.
 
     Parameters
     ----------
@@ -92,9 +92,7 @@ def basins_of_attraction(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> grid = {"amplitude[1]": [-1.2, 0.0, 1.2], "velocity[1]": [-0.5, 0.5]}
     >>> sb.dynamics.basins_of_attraction(found, grid).basin.shape
@@ -108,9 +106,7 @@ def basins_of_attraction(
     step = integer("every", every, 1, 10**4)
     rates = [-each.exponent for each in attractors.attractors if each.orbit is not None]
     total, rule = (
-        settling_periods(flow, rates)
-        if periods is None
-        else (integer("periods", periods, 1, 10**6), "as given")
+        settling_periods(flow, rates) if periods is None else (integer("periods", periods, 1, 10**6), "as given")
     )
     names, columns, rows = _plane(flow, grid, fixed_coordinates)
     label, after = _labelled(attractors, flow, rows, total, step, counting(progress, "basins", "periods"))
@@ -166,9 +162,7 @@ def _tested(labels: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
     return np.concatenate((np.flatnonzero(border), np.sort(chosen))), inside.size
 
 
-def _add_sensitivity(
-    dataset: xr.Dataset, tested: NDArray[np.int64], inside: int, changed: NDArray[np.bool_]
-) -> None:
+def _add_sensitivity(dataset: xr.Dataset, tested: NDArray[np.int64], inside: int, changed: NDArray[np.bool_]) -> None:
     """Add the labels that change at half the step, and their share of the plane with its interval."""
     basin = dataset["basin"]
     flags = np.full(basin.size, -1, dtype=np.int8)
@@ -184,9 +178,7 @@ def _add_sensitivity(
     if sampled < inside:
         shares = proportion(hits, sampled, _CONFIDENCE)
     for name, share in zip(("", "_low", "_high"), shares, strict=True):
-        dataset.attrs[f"sensitive_share{name}"] = (
-            int(changed[:border].sum()) + float(share) * inside
-        ) / basin.size
+        dataset.attrs[f"sensitive_share{name}"] = (int(changed[:border].sum()) + float(share) * inside) / basin.size
 
 
 def _plane(
@@ -212,12 +204,7 @@ def _plane(
 
 
 def _labelled(
-    found: Attractors,
-    flow: Flow,
-    rows: _Array,
-    total: int,
-    step: int,
-    progress: Callable[[int, int], object] | None,
+    found: Attractors, flow: Flow, rows: _Array, total: int, step: int, progress: Callable[[int, int], object] | None
 ) -> tuple[NDArray[np.int64], _Array]:
     label, after = np.full(len(rows), UNDECIDED), np.full(len(rows), np.nan)
     among = np.zeros((len(found.attractors), len(rows)), dtype=np.int64)
@@ -253,12 +240,7 @@ def _labelled(
 
 
 def _dataset(
-    found: Attractors,
-    names: list[str],
-    columns: list[_Array],
-    label: NDArray[np.int64],
-    after: _Array,
-    total: int,
+    found: Attractors, names: list[str], columns: list[_Array], label: NDArray[np.int64], after: _Array, total: int
 ) -> xr.Dataset:
     shape = tuple(column.size for column in columns)
     kinds = [f"period_{each.period}" if each.orbit else "chaotic" for each in found.attractors]
@@ -269,11 +251,7 @@ def _dataset(
         name: (name, column, {"units": "1", "long_name": _long_name(name)})
         for name, column in zip(names, columns, strict=True)
     }
-    attrs = {
-        "title": "basins of attraction",
-        "periods": total,
-        "undecided": float((label == UNDECIDED).mean()),
-    }
+    attrs = {"title": "basins of attraction", "periods": total, "undecided": float((label == UNDECIDED).mean())}
     return labelled(
         {
             "basin": (names, label.reshape(shape), words),
@@ -373,9 +351,7 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     boxes = boxes.reshape(-1, side**cut.ndim)
     kinds = np.unique(boxes[boxes >= 0])
     counts = (
-        np.stack([(boxes == kind).sum(axis=1) for kind in kinds], axis=1)
-        if kinds.size
-        else np.zeros((len(boxes), 1))
+        np.stack([(boxes == kind).sum(axis=1) for kind in kinds], axis=1) if kinds.size else np.zeros((len(boxes), 1))
     )
     decided = counts.sum(axis=1)
     lost = boxes.shape[1] - decided
@@ -400,9 +376,7 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
 def _entropy(counts: NDArray[Any]) -> _Array:
     """Entropy of rows of counts; 0 where all are 0."""
     share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
-    return np.asarray(
-        -np.where(share > 0.0, share * np.log(np.where(share > 0.0, share, 1.0)), 0.0).sum(axis=1)
-    )
+    return np.asarray(-np.where(share > 0.0, share * np.log(np.where(share > 0.0, share, 1.0)), 0.0).sum(axis=1))
 
 
 def _extremes(counts: NDArray[Any], lost: NDArray[Any]) -> tuple[_Array, _Array, _Array]:
@@ -415,11 +389,7 @@ def _extremes(counts: NDArray[Any], lost: NDArray[Any]) -> tuple[_Array, _Array,
     for i in range(1, high.shape[1] + 1):
         before = ordered[:, :i].sum(axis=1)
         level = (before + lost) / i
-        fits = (
-            (level >= ordered[:, i - 1])
-            & ((level <= ordered[:, i]) if i < high.shape[1] else True)
-            & (lost > 0)
-        )
+        fits = (level >= ordered[:, i - 1]) & ((level <= ordered[:, i]) if i < high.shape[1] else True) & (lost > 0)
         high[fits, :i] = level[fits, None]
     total = counts.sum(axis=1) + lost
     one = np.stack([np.ones_like(total, dtype=np.float64), np.maximum(total - 1.0, 0.0)], axis=1)
@@ -511,12 +481,7 @@ def uncertainty_exponent(labels: ArrayLike, sizes: ArrayLike | None = None) -> U
         for rising, falling in ((below, above), (above, below))
     )
     return UncertaintyExponent(
-        float(line.slope),
-        error,
-        np.array(steps, dtype=float),
-        shares,
-        float((grid < 0).mean()),
-        (bounds[0], bounds[1]),
+        float(line.slope), error, np.array(steps, dtype=float), shares, float((grid < 0).mean()), (bounds[0], bounds[1])
     )
 
 
@@ -587,21 +552,13 @@ def dynamical_integrity(
     inside = np.pad(grid == integer("label", label, -(2**31), 2**31), 1)
     steps = np.ones(grid.ndim) if spacing is None else np.asarray(spacing, dtype=float)
     if steps.shape != (grid.ndim,) or not (steps > 0.0).all():
-        raise InputError(
-            f"spacing = {shown(spacing)}: must be a number greater than 0 for each of {grid.ndim} axes"
-        )
+        raise InputError(f"spacing = {shown(spacing)}: must be a number greater than 0 for each of {grid.ndim} axes")
     away = ndimage.distance_transform_edt(inside, sampling=steps)
     away = away[(slice(1, -1),) * grid.ndim]
     center = tuple(int(i) for i in np.unravel_index(int(np.argmax(away)), grid.shape))
     local = float("nan")
     if attractor is not None:
-        if len(attractor) != grid.ndim or any(
-            not 0 <= i < n for i, n in zip(attractor, grid.shape, strict=True)
-        ):
-            raise InputError(
-                f"attractor = {shown(attractor)}: must be indices of a point of the grid {grid.shape}"
-            )
+        if len(attractor) != grid.ndim or any(not 0 <= i < n for i, n in zip(attractor, grid.shape, strict=True)):
+            raise InputError(f"attractor = {shown(attractor)}: must be indices of a point of the grid {grid.shape}")
         local = float(away[tuple(attractor)])
-    return Integrity(
-        float((grid == int(label)).mean()), local, float(away.max()), center, float((grid < 0).mean())
-    )
+    return Integrity(float((grid == int(label)).mean()), local, float(away.max()), center, float((grid < 0).mean()))

@@ -31,14 +31,7 @@ from snapbeam.dynamics.arclength import OrbitEquations, Point, follow, tangent_o
 from snapbeam.dynamics.branches import SpecialPoint
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels
-from snapbeam.dynamics.shooting import (
-    Family,
-    OrbitNotFoundError,
-    Return,
-    impacts_of,
-    jacobian,
-    orbit_tolerance,
-)
+from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, impacts_of, jacobian, orbit_tolerance
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.parameters import ratio_of
@@ -140,9 +133,7 @@ class _Curve(OrbitEquations):
     def _slope_of_test(self, y: _Array, moves: _Array, beside: list[Return]) -> _Array:
         """Derivative of the test function by state and parameters, from the return map at y + moves and y - moves."""
         if self.kind != "grazing":
-            tests = [
-                self.test(*each) for each in zip(np.concatenate([y + moves, y - moves]), beside, strict=True)
-            ]
+            tests = [self.test(*each) for each in zip(np.concatenate([y + moves, y - moves]), beside, strict=True)]
         else:
             # the instant of a turning point changes the gap in second order only
             time, contact, _ = self._approach(y)
@@ -235,9 +226,7 @@ def _without_contact_force(grazing: SpecialPoint, names: tuple[str, str]) -> Flo
     orbit = grazing.orbit
     flow = orbit.flow
     if not isinstance(flow, Stroboscope):
-        raise InputError(
-            f"special_point = {grazing!r}: must be of a System, since the gap of a map is not known"
-        )
+        raise InputError(f"special_point = {grazing!r}: must be of a System, since the gap of a map is not known")
     depth, summary = turning_points(flow, orbit.coordinates, orbit.period).depth, orbit.contact_summary
     # the turning point that grazes is free, or it is in an impact, on whichever side of the gap rounding puts it
     touches = bool(depth.size) and not np.isclose(summary.clearance, np.abs(depth).min(), rtol=1e-2, atol=0.0)
@@ -271,8 +260,7 @@ def _monitors(curve: _Curve, one: Point, point: Point) -> dict[str, float]:
     """Functions that change their sign at points of codimension two, from the point *one* on."""
     found, came = dict[str, float](), point.came
     signs = {
-        kind: float(np.linalg.slogdet(came.jacobian - sign * np.eye(len(came.x)))[0])
-        for kind, sign in _SIGNS.items()
+        kind: float(np.linalg.slogdet(came.jacobian - sign * np.eye(len(came.x)))[0]) for kind, sign in _SIGNS.items()
     }
     if curve.kind == "grazing":
         return {f"grazing {kind}": sign for kind, sign in signs.items()}
@@ -382,9 +370,7 @@ def bifurcation_curve(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
     >>> curve = sb.dynamics.bifurcation_curve(

@@ -34,9 +34,7 @@ def frequencies_of(
     """Section, drive and angular frequencies (rad/s) of every motion; None: it does not repeat."""
     runs, found = cycles_of(system, columns).size, []
     for section, drive in system.moving:
-        own = {
-            split_name(name)[1]: values for name, values in columns.items() if split_name(name)[0] == section
-        }
+        own = {split_name(name)[1]: values for name, values in columns.items() if split_name(name)[0] == section}
         found.append((section, drive, drive.frequencies(own or {"": np.zeros(runs)}, system.scale)))
     return found
 

@@ -45,9 +45,7 @@ class Coordinates:
     def _own(self) -> tuple[tuple[str, int, float], ...]:
         """States in addition to those of the beam: array of :class:`State`, place in it, and unit."""
         parts = self.system.contacts
-        if not self.system.harvesters and all(
-            each.striker.mass is None and not each.law.memory for each in parts
-        ):
+        if not self.system.harvesters and all(each.striker.mass is None and not each.law.memory for each in parts):
             return ()
         ensemble = make_ensemble(self.system, self.integration)
         structure, model = ensemble.structure, self.system.model
@@ -106,11 +104,7 @@ class Coordinates:
         for column, (name, place, _) in enumerate(self._own, 2 * self.modes):
             found[name][..., place] = full[..., column]
         own = {name: values if values.shape[-1] > 1 else values[..., 0] for name, values in found.items()}
-        return {
-            "amplitude": full[..., : self.modes],
-            "velocity": full[..., self.modes : 2 * self.modes],
-            **own,
-        }
+        return {"amplitude": full[..., : self.modes], "velocity": full[..., self.modes : 2 * self.modes], **own}
 
     def modal_directions(self, ensemble: Ensemble) -> tuple[_Array, _Array]:
         """Changes of q and p by each coordinate, shape (d, modes of the solver)."""

@@ -47,9 +47,7 @@ class EdgeState:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
     >>> edge.orbit.period, edge.orbit.is_stable
     (1, False)
@@ -149,19 +147,14 @@ def edge_tracking(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
     >>> edge.termination_reason
     '25 periods; it settled on an orbit of period 1'
     """
     flow = flow_of(system, integration, "reference")
     total, ahead = integer("periods", periods, 2, 10**6), integer("horizon", horizon, 1, 10**6)
-    near, far = (
-        positive("bisect_threshold", bisect_threshold),
-        positive("diverge_threshold", diverge_threshold),
-    )
+    near, far = (positive("bisect_threshold", bisect_threshold), positive("diverge_threshold", diverge_threshold))
     if not near < far:
         raise InputError(f"bisect_threshold = {near:g}: must be less than diverge_threshold = {far:g}")
     decide = _snaps if outcome is None else outcome
@@ -204,9 +197,7 @@ def edge_tracking(
         states.append(0.5 * (low + high))
         distances.append(size)
         if size == 0.0:
-            stopped = (
-                f"after {period + 1} periods the two states are equal to rounding; increase bisect_threshold"
-            )
+            stopped = f"after {period + 1} periods the two states are equal to rounding; increase bisect_threshold"
             break
         begin = size > far
         if report is not None:

@@ -115,12 +115,7 @@ class InitialConditions:
         generator = np.random.Generator(np.random.Philox(key=[self.seed, number]).jumped())
         phase = math.pi * (1.0 + generator.random())
         return dataclasses.replace(
-            found,
-            phase=np.array(phase),
-            contact_time=np.array(np.nan),
-            tangent=None,
-            statistics=None,
-            modal=None,
+            found, phase=np.array(phase), contact_time=np.array(np.nan), tangent=None, statistics=None, modal=None
         )
 
 
@@ -158,9 +153,7 @@ def starts_of(given: InitialConditions | int) -> InitialConditions:
     if isinstance(given, InitialConditions):
         return given
     if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, np.integer)):
-        raise InputTypeError(
-            f"initial_conditions = {shown(given)}: must be InitialConditions, or their number"
-        )
+        raise InputTypeError(f"initial_conditions = {shown(given)}: must be InitialConditions, or their number")
     return InitialConditions(count=int(given))
 
 
@@ -206,9 +199,7 @@ class AdvancedStates:
         states = np.concatenate([self.states, *later.every.transpose(1, 0, 2)[:-1]])
         if later.hidden_every is None:
             return AdvancedStates(states, None, None, hidden=states)
-        return AdvancedStates(
-            states, None, None, hidden=_joined_states([self.hidden, *later.hidden_every[:-1]])
-        )
+        return AdvancedStates(states, None, None, hidden=_joined_states([self.hidden, *later.hidden_every[:-1]]))
 
 
 def joined(parts: list[AdvancedStates]) -> AdvancedStates:
@@ -219,9 +210,7 @@ def joined(parts: list[AdvancedStates]) -> AdvancedStates:
         arrays = [getattr(part, name) for part in parts]
         return None if arrays[0] is None else np.concatenate(arrays)
 
-    statistics = {
-        name: np.concatenate([part.statistics[name] for part in parts]) for name in first.statistics
-    }
+    statistics = {name: np.concatenate([part.statistics[name] for part in parts]) for name in first.statistics}
     every = first.hidden_every and tuple(
         _joined_states(list(each)) for each in zip(*(part.hidden_every or () for part in parts), strict=True)
     )
@@ -230,20 +219,15 @@ def joined(parts: list[AdvancedStates]) -> AdvancedStates:
 
 
 def _joined_states(states: list[State]) -> State:
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(each, name) for each in states]) for name in FIELDS
-    }
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(each, name) for each in states]) for name in FIELDS}
     modals = [each.modal for each in states]
     first = modals[0]
     assert first is not None
     parts: dict[str, Any] = {
-        name: np.concatenate([getattr(each, name) for each in modals])
-        for name in ("q", "p", "well_sign", "offset")
+        name: np.concatenate([getattr(each, name) for each in modals]) for name in ("q", "p", "well_sign", "offset")
     }
     status = np.concatenate([np.asarray((each.statistics or {})["status"]) for each in states])
-    return State(
-        **arrays, statistics={"status": status}, modal=ModalState(**parts, structure=first.structure)
-    )
+    return State(**arrays, statistics={"status": status}, modal=ModalState(**parts, structure=first.structure))
 
 
 @runtime_checkable

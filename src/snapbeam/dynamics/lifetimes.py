@@ -24,6 +24,7 @@ from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
 from snapbeam.sweeps.tasks import PointWork, ResultTable
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.proportions import proportion
 from snapbeam.util.status_codes import RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, checked, integer, nonnegative, shown, within
 
@@ -88,9 +89,7 @@ class LifetimeSettings:
         if self.delay is not None:
             nonnegative("delay", self.delay, "cycles")
         if not nonnegative("settling_cycles", self.settling_cycles, "cycles") > 0.0:
-            raise InputError(
-                f"settling_cycles = {shown(self.settling_cycles)}: must be greater than 0 cycles"
-            )
+            raise InputError(f"settling_cycles = {shown(self.settling_cycles)}: must be greater than 0 cycles")
         within("confidence", self.confidence, 0.0, 1.0)
 
 
@@ -206,30 +205,9 @@ def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
     return count, lasting, exposure, distance, marks.size
 
 
-def proportion(hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:
-    """A probability from counts, with Jeffreys' interval (Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101).
-
-    Returns
-    -------
-    share, low, high : arrays
-        NaN, 0 and 1 where there are no runs.
-    """
-    good, total = np.broadcast_arrays(np.asarray(hits, dtype=np.float64), np.asarray(runs, dtype=np.float64))
-    if (good < 0).any() or (good > total).any():
-        raise InputError("hits: must be between 0 and the number of runs")
-    tail = 0.5 * (1.0 - within("confidence", confidence, 0.0, 1.0))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(total > 0, good / total, np.nan)
-    low = np.where(good > 0, stats.beta.ppf(tail, good + 0.5, total - good + 0.5), 0.0)
-    high = np.where(good < total, stats.beta.ppf(1.0 - tail, good + 0.5, total - good + 0.5), 1.0)
-    return share, low, high
-
-
 def checked_cycles(name: str, values: ArrayLike, most: float) -> NDArray[np.int64]:
     """Whole numbers of cycles in increasing order, at most *most*."""
-    found = [
-        integer(f"{name}[{i}]", value, 0, int(most)) for i, value in enumerate(np.atleast_1d(values).tolist())
-    ]
+    found = [integer(f"{name}[{i}]", value, 0, int(most)) for i, value in enumerate(np.atleast_1d(values).tolist())]
     if not found or (np.diff(found) <= 0).any():
         raise InputError(f"{name} = {found}: must be increasing whole numbers of cycles")
     return np.array(found, dtype=np.int64)
@@ -265,9 +243,7 @@ class LifetimeWork(PointWork):
         kept = list(_PER_START)
         return self.setup.identity() | {"lifetimes": kept, "starts": self.initial_conditions.describe()}
 
-    def compute(
-        self, points: Columns, threads: int | None = None, progress: Progress | None = None
-    ) -> ResultTable:
+    def compute(self, points: Columns, threads: int | None = None, progress: Progress | None = None) -> ResultTable:
         """Integrate every run of *points*."""
         size, count = next(iter(points.values())).size, self.initial_conditions.count
         integers = np.zeros((len(_PER_START), count, size), dtype=np.int32)
@@ -402,9 +378,7 @@ def lifetime_map(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> ds = sb.dynamics.lifetime_map(
     ...     system,
     ...     {"drive.velocity_amplitude": [0.1, 0.2]},
@@ -456,9 +430,7 @@ def _after(after: ArrayLike | None, cycles: int, settings: LifetimeSettings) -> 
             f"cycles = {cycles} with settling_cycles = {settings.settling_cycles:g}: must be more than settling_cycles"
         )
     if after is None:
-        after = sorted(
-            {int(part) for part in (cycles / 8, cycles / 4, cycles / 2, observed) if part <= observed}
-        )
+        after = sorted({int(part) for part in (cycles / 8, cycles / 4, cycles / 2, observed) if part <= observed})
     return checked_cycles("after", after, observed)
 
 
@@ -517,9 +489,7 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
     return dataset
 
 
-def refit(
-    dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: ArrayLike | None = None
-) -> xr.Dataset:
+def refit(dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: ArrayLike | None = None) -> xr.Dataset:
     """The lifetimes and probabilities of a lifetime map again, with other settings.
 
     Parameters
@@ -604,7 +574,5 @@ def _enter(
     settings: LifetimeSettings,
 ) -> None:
     parts = proportion(hits, np.broadcast_to(total[..., None], hits.shape), settings.confidence)
-    for ending, values, text in zip(
-        ("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True
-    ):
+    for ending, values, text in zip(("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True):
         result[f"{name}{ending}"] = (dims, values, {"units": "1", "long_name": f"{text}{words}"})

@@ -19,15 +19,7 @@ from snapbeam.model.system import System
 from snapbeam.simulation.request import cycle_of
 from snapbeam.sweeps.points import Points, points_of
 from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
-from snapbeam.util.validation import (
-    InputError,
-    InputTypeError,
-    checked,
-    finite_array,
-    integer,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,9 +95,7 @@ def lyapunov_spectrum(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> result = sb.dynamics.lyapunov_spectrum(system, 2, periods=40, transient=20)
     >>> result.exponent.dims, result.exponent.attrs["units"]
     (('run', 'exponent_number'), '1/s')
@@ -115,9 +105,7 @@ def lyapunov_spectrum(
     total = integer("periods", periods, _BLOCKS, 10**7)
     before, rule = _transient(flow, transient, 0)
     begun, points, columns = _runs(flow, states, axes)
-    advanced = (
-        flow.advance(begun, before, points=columns) if before else flow.advance(begun, 1, points=columns)
-    )
+    advanced = flow.advance(begun, before, points=columns) if before else flow.advance(begun, 1, points=columns)
     runs = advanced.states.shape[0]
     frame = np.tile(np.eye(flow.dimension)[:count], (runs, 1, 1))
     growth, crossed = np.empty((total, runs, count)), np.zeros((total, runs), dtype=bool)
@@ -145,9 +133,7 @@ def lyapunov_spectrum(
 
 
 def _transient(flow: Flow, given: int | None, least: int) -> tuple[int, str]:
-    return (
-        settling_periods(flow) if given is None else (integer("transient", given, least, 10**7), "as given")
-    )
+    return settling_periods(flow) if given is None else (integer("transient", given, least, 10**7), "as given")
 
 
 def _stopped(total: int, before: int, rule: str) -> str:
@@ -160,9 +146,7 @@ def _runs(
     """Initial states of the runs, the points of a map, and its columns."""
     if states is None or isinstance(states, State):
         if not isinstance(flow, Stroboscope):
-            raise InputTypeError(
-                f"states = {shown(states)}: must be an array of shape (runs, {flow.dimension})"
-            )
+            raise InputTypeError(f"states = {shown(states)}: must be an array of shape (runs, {flow.dimension})")
         begun = flow.coordinates(states)
     else:
         begun = np.atleast_2d(finite_array("states", states))
@@ -216,9 +200,7 @@ def _orthogonal(tangents: _Array | None) -> tuple[_Array, _Array]:
     return np.ascontiguousarray(q.transpose(0, 2, 1)), logs
 
 
-def _dataset(
-    flow: Flow, growth: _Array, crossed: NDArray[np.bool_], points: Points | None, before: int
-) -> xr.Dataset:
+def _dataset(flow: Flow, growth: _Array, crossed: NDArray[np.bool_], points: Points | None, before: int) -> xr.Dataset:
     total, _, count = growth.shape
     periods = np.array([flow.period]) if points is None else _periods(flow, points)
     rate = growth / np.reshape(periods, (1, -1, 1))
@@ -328,9 +310,7 @@ def largest_lyapunov(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> result = sb.dynamics.largest_lyapunov(system, 40, transient=20)
     >>> bool(result.exponent < 0.0)
     True
@@ -379,6 +359,4 @@ def _merged(lost: int, runs: int, size: float) -> tuple[Diagnostic, ...]:
         f"distance = {size:g}: the two trajectories become equal to rounding within a period, or fail, in {lost} of {runs} "
         "runs, whose exponents are NaN; increase distance, or use lyapunov_spectrum"
     )
-    return (
-        Diagnostic("dynamics.trajectories_merged", message, {"merged": float(lost), "runs": float(runs)}),
-    )
+    return (Diagnostic("dynamics.trajectories_merged", message, {"merged": float(lost), "runs": float(runs)}),)

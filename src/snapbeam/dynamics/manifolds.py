@@ -22,17 +22,7 @@ from snapbeam.dynamics.shooting import OrbitNotFoundError
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
 from snapbeam.util.diagnostics import Diagnostic, sharing, tell
-from snapbeam.util.validation import (
-    InputError,
-    checked,
-    choice,
-    instance,
-    integer,
-    interval,
-    positive,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, checked, choice, instance, integer, interval, positive, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -136,12 +126,7 @@ class _Segment(NamedTuple):
 
 
 def _grow(
-    segment: _Segment,
-    max_arclength: float,
-    max_distance: float,
-    max_turn: float,
-    max_points: int,
-    clock: _Clock,
+    segment: _Segment, max_arclength: float, max_distance: float, max_turn: float, max_points: int, clock: _Clock
 ) -> tuple[_Array, _Array, str]:
     """Age and state of the points of a branch, and the reason for its end."""
     ages = np.linspace(0.0, 1.0, _BEGUN)
@@ -281,9 +266,7 @@ def invariant_manifold(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> curve = sb.dynamics.invariant_manifold(saddle, max_arclength=1.0)
     >>> curve.sizes["coordinate"], bool(curve["arclength"].max() <= 1.05)
@@ -378,9 +361,7 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> both = [
     ...     sb.dynamics.invariant_manifold(saddle, kind, max_arclength=1.0) for kind in ("unstable", "stable")
@@ -419,10 +400,7 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
             "stable_arclength": ("point", table[:, 1], "length of the stable manifold"),
         },
         {"coordinate": unstable["coordinate"].values},
-        {
-            "title": "homoclinic points",
-            "chord_error": unstable.attrs["chord_error"] + stable.attrs["chord_error"],
-        },
+        {"title": "homoclinic points", "chord_error": unstable.attrs["chord_error"] + stable.attrs["chord_error"]},
     )
 
 
@@ -494,9 +472,7 @@ def homoclinic_tangency(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> found = sb.dynamics.homoclinic_tangency(
     ...     saddle, "velocity_amplitude", (0.02, 0.03), max_arclength=0.5, max_seconds=1e-3
@@ -559,9 +535,7 @@ def homoclinic_tangency(
         clock.report(1.0)
     if reason not in ("tolerance", "max_seconds"):
         tell([Diagnostic("no-tangency", reason, {"values": float(len(tried))})])
-    kept = [
-        next((each for each in (low, high) if tried.get(each) is state), np.nan) for state in (False, True)
-    ]
+    kept = [next((each for each in (low, high) if tried.get(each) is state), np.nan) for state in (False, True)]
     values = sorted(tried)
     labels = {"long_name": f"nearest values of {name}"}
     return labelled(

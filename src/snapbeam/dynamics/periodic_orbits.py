@@ -50,9 +50,7 @@ class PeriodicOrbit:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> orbit.is_stable, bool(abs(orbit.multipliers).max() < 1.0)
     (True, True)
@@ -241,9 +239,7 @@ def periodic_orbit(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> orbit.period, orbit.residual < 1e-10
     (1, True)
@@ -318,12 +314,7 @@ def state_of(flow: Flow, name: str, given: State | ArrayLike | None) -> _Array:
 
 
 def shoot(
-    flow: Flow,
-    x: _Array,
-    period: int,
-    tolerance: float,
-    iterations: int = 40,
-    deflate: tuple[_Array, ...] = (),
+    flow: Flow, x: _Array, period: int, tolerance: float, iterations: int = 40, deflate: tuple[_Array, ...] = ()
 ) -> PeriodicOrbit:
     """Newton's method for P^m(x) = x."""
     one, family = np.eye(x.size), Family(flow)
@@ -337,6 +328,4 @@ def shoot(
 
     shot = newton(residual, derivative, x, tolerance, iterations, deflate=deflate)
     came = jacobian(family, shot.x, period)
-    return PeriodicOrbit(
-        flow, shot.x, period, came.jacobian, float(np.abs(came.x - shot.x).max()), shot.iterations
-    )
+    return PeriodicOrbit(flow, shot.x, period, came.jacobian, float(np.abs(came.x - shot.x).max()), shot.iterations)

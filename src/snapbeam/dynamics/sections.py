@@ -83,9 +83,7 @@ def poincare_section(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> section = sb.dynamics.poincare_section(system, "impact", 20, transient=20)
     >>> sorted(section.data_vars)[:3]
     ['displacement_at_striker', 'drive_phase', 'midspan_displacement']
@@ -98,9 +96,7 @@ def poincare_section(
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)
     before, rule = (
-        settling_periods(flow)
-        if transient is None
-        else (integer("transient", transient, 0, 10**7), "as given")
+        settling_periods(flow) if transient is None else (integer("transient", transient, 0, 10**7), "as given")
     )
     begun = flow.coordinates()
     if before:

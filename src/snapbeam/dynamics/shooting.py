@@ -37,9 +37,7 @@ class OrbitNotFoundError(RuntimeError):
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> try:
     ...     sb.dynamics.periodic_orbit(system, [5.0, 3.0], iterations=2)
     ... except sb.dynamics.OrbitNotFoundError as error:
@@ -68,9 +66,7 @@ class Family:
 
     def __init__(self, flow: Flow, *names: str) -> None:
         self.flow, self.names = flow, names
-        self._beside = not isinstance(flow, Stroboscope) or all(
-            flow.system.parameter(name).is_run for name in names
-        )
+        self._beside = not isinstance(flow, Stroboscope) or all(flow.system.parameter(name).is_run for name in names)
 
     def advance(
         self, x: _Array, periods: int, values: ArrayLike = (), tangents: _Array | None = None
@@ -92,9 +88,7 @@ class Family:
         """Derivative by the one parameter of where the flow brings one state, shape (d,)."""
         if self._beside and isinstance(self.flow, Stroboscope):
             return self.flow.slope(x, periods, self.names[0], value, step)
-        above, below = (
-            self.advance(x[None], periods, [value + sign * step]).states[0] for sign in (1.0, -1.0)
-        )
+        above, below = (self.advance(x[None], periods, [value + sign * step]).states[0] for sign in (1.0, -1.0))
         change: _Array = (above - below) / (2.0 * step)
         return change
 

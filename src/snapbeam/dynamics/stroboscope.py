@@ -128,9 +128,7 @@ class Stroboscope:
         else:
             self.clock.require_phase(state)
         if state.modes != self.space.modes:
-            raise InputError(
-                f"state of {state.modes} modes: must have the {self.space.modes} modes of the model"
-            )
+            raise InputError(f"state of {state.modes} modes: must have the {self.space.modes} modes of the model")
         return self.space.of(state.flat())
 
     def state(self, coordinates: ArrayLike) -> State:
@@ -198,9 +196,7 @@ class Stroboscope:
             raise InputError(f"states of shape {rows.shape}: must have the shape (runs, {self.dimension})")
         # a failed state stands still and stays lost
         lost = ~np.asarray(np.isfinite(rows).all(axis=1))
-        passed: dict[str, Any] = {
-            "status": np.where(lost, int(RunStatus.DIVERGED), int(RunStatus.OK)).astype(np.int8)
-        }
+        passed: dict[str, Any] = {"status": np.where(lost, int(RunStatus.DIVERGED), int(RunStatus.OK)).astype(np.int8)}
         arrays = self.space.arrays(np.where(lost[:, None], 0.0, rows))
         return State(**arrays, phase=np.array(self.clock.given_phase), statistics=passed)
 
@@ -228,8 +224,7 @@ class Stroboscope:
             )
             if not native.differentiable(above, below):
                 ends = [
-                    self.advance(x[None], periods, points={name: np.array([at])})
-                    for at in (value + step, value - step)
+                    self.advance(x[None], periods, points={name: np.array([at])}) for at in (value + step, value - step)
                 ]
                 change: _Array = (ends[0].states - ends[1].states)[0] / (2.0 * step)
                 return change
@@ -241,12 +236,7 @@ class Stroboscope:
         return found
 
     def _advance_part(
-        self,
-        begun: State,
-        periods: int,
-        every: bool,
-        points: Mapping[str, _Array] | None,
-        tangents: _Array | None,
+        self, begun: State, periods: int, every: bool, points: Mapping[str, _Array] | None, tangents: _Array | None
     ) -> AdvancedStates:
         ensemble = self._ensemble(begun, periods, points or {})
         seen = engine_of(ensemble).integrate_with_output_states(ensemble, self.integration.threads)
@@ -288,23 +278,17 @@ class Stroboscope:
         q, p = self.space.modal_directions(ensemble)
         q, p = native.tangents(ensemble, tangents @ q, tangents @ p, self.integration.threads, beside)
         one, none = np.ones(q.shape[:2], np.int64), np.zeros_like(q)
-        found: _Array = self.space.of_modal(ensemble, q, p, one) - self.space.of_modal(
-            ensemble, none, none, one
-        )
+        found: _Array = self.space.of_modal(ensemble, q, p, one) - self.space.of_modal(ensemble, none, none, one)
         found[failed] = np.nan
         return found
 
 
-def flow_of(
-    system: System | Flow, integration: Integration | None = None, accuracy: str = "standard"
-) -> Flow:
+def flow_of(system: System | Flow, integration: Integration | None = None, accuracy: str = "standard") -> Flow:
     """The flow that a system makes, or one that is one; *accuracy* is meant where no integration is given."""
     if isinstance(system, System):
         return Stroboscope(system, Integration(accuracy=accuracy) if integration is None else integration)
     if not isinstance(system, Flow):
-        raise InputTypeError(
-            f"system = {shown(system)}: must be a System, or a Flow that takes states a period on"
-        )
+        raise InputTypeError(f"system = {shown(system)}: must be a System, or a Flow that takes states a period on")
     if integration is not None:
         raise InputTypeError("integration: is for a System; a Flow brings its own")
     return system

@@ -46,11 +46,7 @@ class _Axis:
         self.name, self.short = row.name, row.short
         low, high, closed = row.quantity.low, row.quantity.high, row.quantity.closed
         self.values = axis(row.short, values, low, high, closed=closed)
-        self._labels = {
-            "units": row.quantity.unit,
-            "long_name": row.quantity.long_name,
-            "parameter": row.name,
-        }
+        self._labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
 
     def order(self, kind: str) -> range:
         """Numbers of the values in the order of a sweep."""
@@ -60,10 +56,7 @@ class _Axis:
         self, kinds: list[str], variables: dict[str, tuple[Any, Any, Any]], attrs: dict[str, Any]
     ) -> xr.Dataset:
         """Results over the sweeps, the parameter and further dimensions."""
-        found = {
-            name: (("sweep", self.short, *more), table, words)
-            for name, (more, table, words) in variables.items()
-        }
+        found = {name: (("sweep", self.short, *more), table, words) for name, (more, table, words) in variables.items()}
         coords = {"sweep": kinds, self.short: (self.short, self.values, self._labels)}
         return labelled(found, coords, attrs | {"parameter": self.short})
 
@@ -124,9 +117,7 @@ def bifurcation_diagram(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> diagram = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", [0.02, 0.03, 0.04])
     >>> dict(diagram.sizes)
     {'sweep': 2, 'velocity_amplitude': 3, 'period': 32}
@@ -182,9 +173,7 @@ def _periods(periods: tuple[int | None, int]) -> tuple[int | None, int]:
     try:
         leave, keep = periods
     except (TypeError, ValueError):
-        raise InputTypeError(
-            f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep"
-        ) from None
+        raise InputTypeError(f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep") from None
     left = None if leave is None else integer("periods[0]", leave, 0, 10**7)
     return left, integer("periods[1]", keep, 2, 10**6)
 
@@ -300,9 +289,7 @@ def hysteresis(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.hysteresis(system, "velocity_amplitude", [0.02, 0.03], sb.Integration(cycles=20))
     >>> found["peak_force"].dims
     ('sweep', 'velocity_amplitude')
@@ -313,9 +300,7 @@ def hysteresis(
         raise InputError(f"sweeps = {shown(sweeps)}: must contain 'up', 'down' or both, each once")
     settings = Integration() if integration is None else integration
     if settings.early_termination:
-        raise InputError(
-            "early_termination = True: ends runs before their last state; set early_termination = False"
-        )
+        raise InputError("early_termination = True: ends runs before their last state; set early_termination = False")
     restarts, begun, count = _restarts(system), system.start_state.phase, swept.values.size
     for value in swept.values:
         make_ensemble(system.replace(**{swept.name: float(value)}), settings)
@@ -330,9 +315,7 @@ def hysteresis(
     for done, (i, k) in enumerate(places, 1):
         here = system.replace(**{swept.name: float(swept.values[k]), "initial_state": state})
         run = simulate(here, settings, sample_times=[0.0])
-        attrs = attrs or dict(
-            run.dataset.attrs
-        )  # of the first run: later ones begin where the one before ended
+        attrs = attrs or dict(run.dataset.attrs)  # of the first run: later ones begin where the one before ended
         for key, table in tables.items():
             table[i, k] = run.summary[key]
         state = run.final_state
@@ -345,8 +328,7 @@ def hysteresis(
     left_out = _OF_ONE_RUN | {swept.short, lookup(ratio_of(swept.name)).short}
     attrs = {key: value for key, value in attrs.items() if key not in left_out}
     variables = {
-        key: ((), table, {"units": rows[key].unit, "long_name": rows[key].long_name})
-        for key, table in tables.items()
+        key: ((), table, {"units": rows[key].unit, "long_name": rows[key].long_name}) for key, table in tables.items()
     }
     return swept.dataset(kinds, variables, attrs | {"title": "statistics swept up and down"})
 
@@ -374,15 +356,7 @@ def _restarts(system: System) -> bool:
     return True
 
 
-_OF_ONE_RUN = {
-    "title",
-    "response_class",
-    "status",
-    "system_hash",
-    "parameter_hash",
-    "gross_work",
-    "energy_error",
-}
+_OF_ONE_RUN = {"title", "response_class", "status", "system_hash", "parameter_hash", "gross_work", "energy_error"}
 """Attributes of a run that do not hold for all runs."""
 
 

@@ -34,15 +34,7 @@ from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.input_files import decoded, read_toml
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.status_codes import ResponseClass
-from snapbeam.util.validation import (
-    InputError,
-    instance,
-    integer,
-    positive,
-    require_texts,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, instance, integer, positive, require_texts, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,15 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.util.validation import (
-    InputError,
-    InputTypeError,
-    finite,
-    finite_array,
-    positive,
-    require_texts,
-    shown,
-)
+from snapbeam.util.validation import InputError, InputTypeError, finite, finite_array, positive, require_texts, shown
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,16 +17,7 @@ from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.singular_values import lstsq
 from snapbeam.util.status_codes import ResponseClass, classify
-from snapbeam.util.validation import (
-    InputError,
-    checked,
-    choice,
-    finite,
-    finite_array,
-    integer,
-    nonnegative,
-    positive,
-)
+from snapbeam.util.validation import InputError, checked, choice, finite, finite_array, integer, nonnegative, positive
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -55,13 +55,7 @@ class HarmonicLoad(LoadMotion):
         short="load_frequency_ratio", symbol=r"\Omega",
     )  # fmt: skip
     amplitude: float = quantity(
-        "N",
-        "amplitude of the axial load",
-        low=0.0,
-        closed="left",
-        scope=RUN,
-        short="load_amplitude",
-        symbol="P_1",
+        "N", "amplitude of the axial load", low=0.0, closed="left", scope=RUN, short="load_amplitude", symbol="P_1"
     )
     phase: float = quantity(
         "rad", "phase of the axial load at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN,
@@ -112,11 +106,7 @@ class LoadRamp(LoadMotion, Timed):
 
     change: float = quantity("N", "change of the axial load", scope=RUN, short="load_change")
     duration: float = quantity(
-        "1",
-        "periods of the first mode in which the axial load changes",
-        low=0.0,
-        scope=RUN,
-        short="load_duration",
+        "1", "periods of the first mode in which the axial load changes", low=0.0, scope=RUN, short="load_duration"
     )
     hold_periods: float = quantity(
         "1", "periods of the first mode for which the axial load stays changed", default=1e9, low=0.0, closed="left",

@@ -74,27 +74,15 @@ class Beam:
     """
 
     length: float = quantity(
-        "m",
-        "distance between the clamps",
-        low=0.0,
-        symbol="L",
-        short="beam_length",
-        plausible=(1e-6, 100.0, "mm"),
+        "m", "distance between the clamps", low=0.0, symbol="L", short="beam_length", plausible=(1e-6, 100.0, "mm")
     )
     thickness: float = quantity(
         "m", "thickness in the direction of bending", low=0.0, symbol="h", short="beam_thickness",
         plausible=(1e-9, 1.0, "mm"),
     )  # fmt: skip
-    width: float = quantity(
-        "m", "width of the section", low=0.0, short="beam_width", plausible=(1e-9, 10.0, "mm")
-    )
+    width: float = quantity("m", "width of the section", low=0.0, short="beam_width", plausible=(1e-9, 10.0, "mm"))
     density: float = quantity(
-        "kg/m^3",
-        "mass density",
-        low=0.0,
-        symbol=r"\rho",
-        short="beam_density",
-        plausible=(10.0, 3e4, "g/cm^3"),
+        "kg/m^3", "mass density", low=0.0, symbol=r"\rho", short="beam_density", plausible=(10.0, 3e4, "g/cm^3")
     )
     young_modulus: float = quantity(
         "Pa", "Young's modulus", low=0.0, symbol="E", short="beam_young_modulus", plausible=(1e3, 2e12, "GPa")
@@ -104,12 +92,7 @@ class Beam:
         short="beam_buckling_level", plausible=(1e-12, 10.0, "mm"),
     )  # fmt: skip
     axial_load: float = quantity(
-        "N",
-        "axial load, compression positive",
-        default=None,
-        symbol="P",
-        optional=True,
-        short="beam_axial_load",
+        "N", "axial load, compression positive", default=None, symbol="P", optional=True, short="beam_axial_load"
     )
     boundary: BoundaryConditions = CLAMPED
     _given: str = dataclasses.field(init=False, repr=False, compare=False)

@@ -11,13 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.equilibria import landscape_of
-from snapbeam.model.matrix_pairs import (
-    eigenpairs,
-    fixed_coordinates,
-    is_positive_definite,
-    is_sparse,
-    symmetric,
-)
+from snapbeam.model.matrix_pairs import eigenpairs, fixed_coordinates, is_positive_definite, is_sparse, symmetric
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.singular_values import svd
 from snapbeam.util.validation import InputError, finite_array, integer, nonnegative, positive, shown, within
@@ -172,11 +166,7 @@ def _conditions(z: float, left: float, right: float) -> _Array:
         [
             [cosine - 1.0, sine, 1.0],
             [bent0 * z * z, turned0 * z, turned0],
-            [
-                -bent1 * z * z * cosine - turned1 * z * sine,
-                -bent1 * z * z * sine + turned1 * z * cosine,
-                turned1,
-            ],
+            [-bent1 * z * z * cosine - turned1 * z * sine, -bent1 * z * z * sine + turned1 * z * cosine, turned1],
         ]
     )
 
@@ -378,15 +368,11 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         _require_shape("elongation_matrix", elongation, (count, count), "as large as the mass matrix")
         elongation = symmetric("elongation_matrix", elongation)
         if gamma == 0.0:
-            raise InputError(
-                "elongation_matrix with nonlinear_stiffness = 0: has no effect; give nonlinear_stiffness"
-            )
+            raise InputError("elongation_matrix with nonlinear_stiffness = 0: has no effect; give nonlinear_stiffness")
     if rows["transverse_force"] is not None and not rows["transverse_force"].any():
         rows["transverse_force"] = None
     if rows["well_amplitude"] is not None and rows["transverse_force"] is not None:
-        raise InputError(
-            "well_amplitude with transverse_force: leave it out, the equilibria follow from the force"
-        )
+        raise InputError("well_amplitude with transverse_force: leave it out, the equilibria follow from the force")
 
     ratio, damping = None, None
     if given.damping is None:
@@ -423,9 +409,7 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
             stiffness = np.diag(stiffness)
         stiffness, basis = eigenpairs(stiffness, mass, count=modes)
         if rows["base_shape"] is not None:
-            rows["base_shape"] = (
-                mass @ rows["base_shape"]
-            )  # back by the inverse of the modal mass, which is 1
+            rows["base_shape"] = mass @ rows["base_shape"]  # back by the inverse of the modal mass, which is 1
         rows = {name: None if row is None else basis.T @ row for name, row in rows.items()}
         if gamma > 0.0:
             elongation = basis.T @ (basis if elongation is None else elongation @ basis)
@@ -457,9 +441,7 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
         "base_shape": rows["base_shape"],
         "elongation_matrix": elongation,
         "patch_shape": rows["patch_shape"],
-        "given_reference_frequency": None
-        if reference is None
-        else positive("reference_frequency", reference, "Hz"),
+        "given_reference_frequency": None if reference is None else positive("reference_frequency", reference, "Hz"),
     }
 
 
@@ -580,11 +562,7 @@ def _losing(matrix: _Array) -> _Array:
 
 
 def _equilibrium(
-    a: _Array | None,
-    stiffness: _Array,
-    gamma: float,
-    midspan_shape: _Array,
-    elongation: _Array | None = None,
+    a: _Array | None, stiffness: _Array, gamma: float, midspan_shape: _Array, elongation: _Array | None = None
 ) -> _Array:
     if a is None or not a.any():
         return np.zeros(midspan_shape.size)
@@ -599,9 +577,7 @@ def _equilibrium(
         raise InputError(f"{given}: must satisfy K0 a + gamma (a . a) a = 0, but leaves {residual:g}")
     lift = float(midspan_shape @ a)
     if lift >= 0.0:
-        raise InputError(
-            f"{given}: must be the lower well, but displaces the centre by {lift:g}, not downward"
-        )
+        raise InputError(f"{given}: must be the lower well, but displaces the centre by {lift:g}, not downward")
     return a
 
 

@@ -7,14 +7,7 @@ from snapbeam.model.contact.hertz import HertzContact
 
 # Section 3.3.  The thickness and the buckling level are those the paper fitted to measured frequencies
 # (measured: 0.44 mm and 0.5 mm).
-BEAM = Beam(
-    length=0.161,
-    thickness=0.4e-3,
-    width=15e-3,
-    density=7800.0,
-    young_modulus=200e9,
-    buckling_level=0.335e-3,
-)
+BEAM = Beam(length=0.161, thickness=0.4e-3, width=15e-3, density=7800.0, young_modulus=200e9, buckling_level=0.335e-3)
 
 # Section 3.3: the same beam before compression, whose first two frequencies set the thickness.
 STRAIGHT_BEAM = BEAM.replace(axial_load=0.0)

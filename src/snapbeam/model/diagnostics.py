@@ -23,9 +23,7 @@ _CENTRAL = 0.05
 
 
 def doubts_of(
-    potential: Potential,
-    striker: Striker | None,
-    parts: Sequence[tuple[str, Any]] = (),
+    potential: Potential, striker: Striker | None, parts: Sequence[tuple[str, Any]] = ()
 ) -> tuple[Diagnostic, ...]:
     """Diagnostics about a structure, the forces on it, what strikes it, and its other parts, by section."""
     model = potential.model

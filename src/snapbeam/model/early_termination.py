@@ -87,9 +87,7 @@ def passed_heights(
     if model.landscape is None or model.landscape.saddle is None:
         return np.maximum(highest, 0.0)
     places, which = np.unique(location, return_inverse=True)
-    saddle = np.array([float(model.shape_at(float(x)) @ model.landscape.saddle.amplitude) for x in places])[
-        which
-    ]
+    saddle = np.array([float(model.shape_at(float(x)) @ model.landscape.saddle.amplitude) for x in places])[which]
     return np.maximum(highest, saddle)
 
 
@@ -139,9 +137,7 @@ def _uneven_energy(
     reach = passed_heights(model, location, np.where(bounded, highest, 0.0))
     places, which = np.unique(location, return_inverse=True)
     shapes = np.array([model.shape_at(float(x)) for x in places])[which.ravel()]
-    through = least_energy_through(
-        model.stiffness, model.nonlinear_stiffness, model.transverse_force, shapes, reach
-    )
+    through = least_energy_through(model.stiffness, model.nonlinear_stiffness, model.transverse_force, shapes, reach)
     limit = np.minimum(through, crossing_energy(model))
     kept = RESERVE * (model.saddle_energy - model.landscape.deepest.energy)
     well = shapes @ model.landscape.upper.amplitude

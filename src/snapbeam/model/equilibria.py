@@ -146,9 +146,7 @@ def _roots(kappa: _Array, force: _Array, gamma: float) -> list[tuple[int, float,
     return found
 
 
-def _lowest(
-    slope: Callable[[int, float], float], left: int, right: int, width: float
-) -> tuple[int, float] | None:
+def _lowest(slope: Callable[[int, float], float], left: int, right: int, width: float) -> tuple[int, float] | None:
     """Minimum of the convex function between two edges, from the nearer edge; None if it is at the left end."""
     if slope(left, 0.5 * width) > 0.0:
         if left < 0 and slope(left, 0.0) >= 0.0:
@@ -158,11 +156,7 @@ def _lowest(
 
 
 def _bracketed(
-    value: Callable[[int, float], float],
-    slope: Callable[[int, float], float],
-    origin: int,
-    reach: float,
-    sign: float,
+    value: Callable[[int, float], float], slope: Callable[[int, float], float], origin: int, reach: float, sign: float
 ) -> tuple[int, float, bool]:
     """The root between a pole, or 0, and a place at the distance *reach* where the function is negative."""
     shift = sign * _distance(lambda t: -value(origin, sign * t), reach, pole=origin >= 0)
@@ -184,9 +178,7 @@ def _distance(function: Callable[[float], float], reach: float, pole: bool) -> f
     if not function(reach) > 0.0:
         return reach
     if not pole:
-        return (
-            0.0 if function(0.0) >= 0.0 else float(brentq(function, 0.0, reach, xtol=1e-300, rtol=_ROUNDING))
-        )
+        return 0.0 if function(0.0) >= 0.0 else float(brentq(function, 0.0, reach, xtol=1e-300, rtol=_ROUNDING))
     low = high = math.log(reach)
     if not function(math.exp(high)) > 0.0:  # a fold, where the function touches 0: a matter of rounding
         return reach
@@ -252,9 +244,7 @@ class Landscape:
         return self.saddle is not None
 
 
-def tangent_stiffness(
-    stiffness: _Array, gamma: float, alpha: _Array, elongation: _Array | None = None
-) -> _Array:
+def tangent_stiffness(stiffness: _Array, gamma: float, alpha: _Array, elongation: _Array | None = None) -> _Array:
     """K0 + gamma (s S + 2 S alpha alpha^T S), shape (..., N, N), with s = alpha . S alpha; S is the identity by default."""
     k0 = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
     matrix = np.eye(alpha.shape[-1]) if elongation is None else elongation
@@ -316,11 +306,7 @@ def condensed(stiffness: _Array, force: _Array, elongation: _Array) -> Condensed
 
 
 def landscape_of(
-    stiffness: _Array,
-    gamma: float,
-    force: _Array,
-    midspan_shape: _Array,
-    elongation: _Array | None = None,
+    stiffness: _Array, gamma: float, force: _Array, midspan_shape: _Array, elongation: _Array | None = None
 ) -> Landscape:
     """All distinct equilibria under the transverse force B.
 
@@ -370,9 +356,7 @@ _HALVINGS = 120
 _BESIDE = 1e-9
 
 
-def least_energy_through(
-    stiffness: _Array, gamma: float, force: _Array, shapes: _Array, heights: _Array
-) -> _Array:
+def least_energy_through(stiffness: _Array, gamma: float, force: _Array, shapes: _Array, heights: _Array) -> _Array:
     """Minimum potential energy of any amplitudes with c . alpha = r, J.
 
     With S_cc = sum c_i^2/(K0_i - mu), S_cB = sum c_i B_i/(K0_i - mu) and S_BB alike, it is the maximum value of
@@ -435,9 +419,7 @@ def least_energy_through(
         gap = stiffness - low[:, None]
         first = np.sum(squares / gap, axis=1)
         off = heights - np.sum(shapes * force / gap, axis=1)
-        value: _Array = (
-            0.5 * off * off / first - 0.5 * np.sum(force * force / gap, axis=1) - low * low / (4.0 * gamma)
-        )
+        value: _Array = 0.5 * off * off / first - 0.5 * np.sum(force * force / gap, axis=1) - low * low / (4.0 * gamma)
     return np.where(np.isfinite(value), value, -np.inf)
 
 

@@ -108,9 +108,7 @@ def equilibrium_branches(
     potentials = [potential_of(each) for each in value.tolist()]
     points, critical = critical_points(branches)
     outcomes = [
-        _outcome(path, each.place, potential_of, _BEYOND * (high - low))
-        for path in branches
-        for each in path.singular
+        _outcome(path, each.place, potential_of, _BEYOND * (high - low)) for path in branches for each in path.singular
     ]
     parts = [(path, part) for path in branches for part in stable_parts(path)]
     kinds = [{each.place: each.kind for each in path.singular} for path, _ in parts]
@@ -161,9 +159,9 @@ def equilibrium_branches(
         ),
         "stable_displacement": (
             ("stable_part", "stable_end"),
-            np.array(
-                [[potential_of(value).model.midspan_shape @ a for value, a in each] for each in ends]
-            ).reshape(-1, 2),
+            np.array([[potential_of(value).model.midspan_shape @ a for value, a in each] for each in ends]).reshape(
+                -1, 2
+            ),
             attributes("m", "displacement of the centre at the ends of a stable part"),
         ),
         "stable_end_kind": (
@@ -205,9 +203,7 @@ def _frequencies(potential: Potential, alpha: NDArray[np.float64], unstable: int
     return np.asarray(np.sqrt(np.maximum(squared, 0.0)) / (2.0 * np.pi))
 
 
-def _outcome(
-    path: EquilibriumPath, at: int, potential_of: Callable[[float], Potential], beyond: float
-) -> str:
+def _outcome(path: EquilibriumPath, at: int, potential_of: Callable[[float], Potential], beyond: float) -> str:
     """The motion without inertia beyond a critical point: "unstable", "pull-in" or "another well"."""
     if path.unstable[at]:
         return "unstable"

@@ -361,15 +361,11 @@ class _Tracer:
                 singular[len(points) - 1] = between[1]
                 if between[1] == "origin":
                     return points, singular, False
-            closes = (
-                np.linalg.norm(new.y - start.y) < 0.75 * step and float(new.tangent @ start.tangent) > 0.9
-            )
+            closes = np.linalg.norm(new.y - start.y) < 0.75 * step and float(new.tangent @ start.tangent) > 0.9
             if len(points) > 8 and closes:
                 return [*points, start], singular, True
             points.append(new)
-            place, before = (
-                self.family.place(self.amplitude(each), self.value(each)) for each in (new.y, here.y)
-            )
+            place, before = (self.family.place(self.amplitude(each), self.value(each)) for each in (new.y, here.y))
             end = self.high if place > self.high and place > before else self.low
             if (place > self.high and place > before) or (place < self.low and place < before):
                 if self.family.ends_at_range:
@@ -468,15 +464,11 @@ class _Tracer:
                     self.add(self.point(y, self.family.along(len(y))), False)
             if self.progress is not None:
                 self.progress(len(starts), len(starts))
-            values = self.family.values(
-                [float(path.value[at]) for path in self.paths for at, _ in path.singular]
-            )
+            values = self.family.values([float(path.value[at]) for path in self.paths for at, _ in path.singular])
         return self.paths
 
 
-def equilibrium_paths(
-    potential: Potential, row: _Array, between: tuple[float, float]
-) -> list[EquilibriumPath]:
+def equilibrium_paths(potential: Potential, row: _Array, between: tuple[float, float]) -> list[EquilibriumPath]:
     """Paths of the equilibria of a potential under a force on *row*, a little beyond two displacements of its point."""
     return _Tracer(_UnderForce(potential, row), *between).run()
 
@@ -497,9 +489,7 @@ def attributes(unit: str, words: str) -> dict[str, str]:
     return {"units": unit, "long_name": words}
 
 
-def critical_points(
-    paths: list[EquilibriumPath],
-) -> tuple[list[tuple[float, _Array, int]], dict[str, Any]]:
+def critical_points(paths: list[EquilibriumPath]) -> tuple[list[tuple[float, _Array, int]], dict[str, Any]]:
     """Value, amplitudes and unstable directions at each singular point, and the variables of their kinds and branches."""
     special = [(number, *each) for number, path in enumerate(paths) for each in path.singular]
     points = [

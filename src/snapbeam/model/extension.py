@@ -57,9 +57,7 @@ def check_pair(kind: type, flag: str, base: type, hooks: Iterable[str]) -> None:
     value: Any = getattr(kind, flag)
     for name in hooks:
         if bool(value) and not overrides(kind, base, name):
-            raise InputError(
-                f"{kind.__name__}.{flag} = {value!r}: needs {name}, which is not defined; define it"
-            )
+            raise InputError(f"{kind.__name__}.{flag} = {value!r}: needs {name}, which is not defined; define it")
         if not value and overrides(kind, base, name):
             raise InputError(
                 f"{kind.__name__}.{name}: is read only with {flag}, which is {value!r}; set {flag} in the class"

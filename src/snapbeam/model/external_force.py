@@ -76,13 +76,7 @@ class HarmonicForce(ForceHistory):
         short="force_frequency_ratio", symbol=r"\Omega",
     )  # fmt: skip
     amplitude: float = quantity(
-        "N",
-        "amplitude of the force",
-        low=0.0,
-        closed="left",
-        scope=RUN,
-        short="force_amplitude",
-        symbol="F_1",
+        "N", "amplitude of the force", low=0.0, closed="left", scope=RUN, short="force_amplitude", symbol="F_1"
     )
     mean: float = quantity("N", "mean of the force", default=0.0, scope=RUN, short="force_mean", symbol="F_0")
     phase: float = quantity(
@@ -107,14 +101,7 @@ class HarmonicForce(ForceHistory):
 
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """A tone about the mean."""
-        return [
-            Tone(
-                columns["amplitude"],
-                columns["frequency_ratio"] * scale.omega,
-                columns["phase"],
-                columns["mean"],
-            )
-        ]
+        return [Tone(columns["amplitude"], columns["frequency_ratio"] * scale.omega, columns["phase"], columns["mean"])]
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Maximum force, N."""
@@ -203,9 +190,7 @@ class RecordedForce(FileKeys, ForceHistory, Sampled):
     name = "recorded_force"
 
     @classmethod
-    def _of_signal(
-        cls, values: _Array, unit: str, rate: float, decided: bool, **fields: Any
-    ) -> RecordedForce:
+    def _of_signal(cls, values: _Array, unit: str, rate: float, decided: bool, **fields: Any) -> RecordedForce:
         require_unit(unit, {"N": "a force"})
         return cls(record=values, sampling_frequency=rate, **fields)
 
@@ -267,12 +252,7 @@ class ExternalForce:
         scope=STRUCTURE,
     )  # fmt: skip
     shape: Any = quantity(
-        "1",
-        "force on each coordinate per unit of the force",
-        default=None,
-        optional=True,
-        kind=object,
-        scope=STRUCTURE,
+        "1", "force on each coordinate per unit of the force", default=None, optional=True, kind=object, scope=STRUCTURE
     )
     label: str = field(default="", repr=False)
 

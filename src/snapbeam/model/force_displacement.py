@@ -123,9 +123,7 @@ def force_displacement(
             location = 0.5
     location = within("location", location, 0.0, 1.0)
     if not (model.nonlinear_stiffness > 0.0 or potential.local_forces):
-        raise InputError(
-            "nonlinear_stiffness = 0: must be greater than 0; a linear structure has a straight line"
-        )
+        raise InputError("nonlinear_stiffness = 0: must be greater than 0; a linear structure has a straight line")
     row = np.asarray(model.shape_at(location), dtype=np.float64)
     if np.abs(row).max() <= 1e-12 * np.abs(model.midspan_shape).max():
         raise InputError(f"location = {location:g}: no mode moves there; use another location or more modes")
@@ -161,16 +159,8 @@ def force_displacement(
     variables: dict[str, Any] = {
         "displacement": ("point", alpha @ row, attributes("m", "displacement at the force's location")),
         "force": ("point", force, attributes("N", "force")),
-        "energy": (
-            "point",
-            potential.energy(alpha),
-            attributes("J", "potential energy without the force"),
-        ),
-        "unstable_directions": (
-            "point",
-            unstable,
-            attributes("1", "unstable directions under the force; 0 is stable"),
-        ),
+        "energy": ("point", potential.energy(alpha), attributes("J", "potential energy without the force")),
+        "unstable_directions": ("point", unstable, attributes("1", "unstable directions under the force; 0 is stable")),
         "unstable_directions_at_fixed_displacement": (
             "point",
             _unstable_at_fixed_displacement(potential, row, alpha),

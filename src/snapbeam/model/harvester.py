@@ -17,16 +17,7 @@ from snapbeam.model.extension import check_defined, check_names
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.diagnostics import Diagnostic
-from snapbeam.util.validation import (
-    InputError,
-    choice,
-    finite,
-    finite_array,
-    instance,
-    positive,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, choice, finite, finite_array, instance, positive, shown, within
 
 _Array = NDArray[np.float64]
 
@@ -66,16 +57,7 @@ class Harvester:
     in the load.  A subclass defines :meth:`row`, :attr:`inertia`, :meth:`loss`, :meth:`share` and :meth:`volts`.
     """
 
-    hooks: ClassVar[tuple[str, ...]] = (
-        "name",
-        "row",
-        "inertia",
-        "unit",
-        "loss",
-        "share",
-        "volts",
-        "diagnostics",
-    )
+    hooks: ClassVar[tuple[str, ...]] = ("name", "row", "inertia", "unit", "loss", "share", "volts", "diagnostics")
     """Names that are read of a harvester of one's own; it has no others, but for those that begin with an underscore."""
     name: ClassVar[str] = ""
     noun: ClassVar[str] = "a harvester"
@@ -158,35 +140,21 @@ class PiezoelectricHarvester(Harvester):
     >>> harvester = sb.PiezoelectricHarvester(moment_per_volt=1e-5, capacitance=60e-9, resistance=1e5)
     """
 
-    moment_per_volt: float = quantity(
-        "N m/V", "moment of the piezoelectric layers per volt", symbol=r"\Theta"
-    )
+    moment_per_volt: float = quantity("N m/V", "moment of the piezoelectric layers per volt", symbol=r"\Theta")
     capacitance: float = quantity("F", "capacitance of the piezoelectric layers", low=0.0, symbol="C")
     resistance: float = quantity("ohm", "load resistance", low=0.0, scope=RUN, symbol="R")
     patch_start: float = quantity(
-        "1",
-        "where the layers begin, over the length",
-        default=0.0,
-        low=0.0,
-        high=1.0,
-        closed="both",
+        "1", "where the layers begin, over the length", default=0.0, low=0.0, high=1.0, closed="both"
     )
     patch_end: float = quantity(
-        "1",
-        "where the layers end, over the length",
-        default=0.25,
-        low=0.0,
-        high=1.0,
-        closed="both",
+        "1", "where the layers end, over the length", default=0.25, low=0.0, high=1.0, closed="both"
     )
     name = "piezo"
 
     def __post_init__(self) -> None:
         check_fields(self)
         if self.patch_start >= self.patch_end:
-            raise InputError(
-                f"patch_start = {self.patch_start:g}: must be less than patch_end = {self.patch_end:g}"
-            )
+            raise InputError(f"patch_start = {self.patch_start:g}: must be less than patch_end = {self.patch_end:g}")
 
     @classmethod
     def from_material(
@@ -234,10 +202,7 @@ class PiezoelectricHarvester(Harvester):
         area = wide * (last - first) * instance("beam", beam, Beam, "a Beam").length
         arm = 0.5 * (beam.thickness + thick)
         return cls(
-            moment_per_volt=(2.0 if two == 2.0 else 1.0)
-            * finite("stress_constant", stress_constant)
-            * wide
-            * arm,
+            moment_per_volt=(2.0 if two == 2.0 else 1.0) * finite("stress_constant", stress_constant) * wide * arm,
             capacitance=two * positive("permittivity", permittivity, "F/m") * area / thick,
             resistance=resistance,
             patch_start=patch_start,

@@ -48,9 +48,7 @@ def projected(modes: Modes, profile: _Array, symmetric: bool = False) -> _Array:
     spline = CubicSpline(at * modes.length, heights)
     panels = 2 * (modes.count + 1)
     nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
-    edges = (
-        np.unique(np.concatenate((np.linspace(0.0, 1.0, panels + 1), np.clip(at, 0.0, 1.0)))) * modes.length
-    )
+    edges = np.unique(np.concatenate((np.linspace(0.0, 1.0, panels + 1), np.clip(at, 0.0, 1.0)))) * modes.length
     half = 0.5 * np.diff(edges)
     x = np.clip((edges[:-1, None] + half[:, None] * (1.0 + nodes)).ravel(), 0.0, modes.length)
     weight = (half[:, None] * weights).ravel()
@@ -118,12 +116,7 @@ class Imperfection:
         plausible=(0.0, 1.0, "mm"),
     )  # fmt: skip
     shape: str = quantity(
-        "1",
-        "shape of the initial deflection",
-        default="mode",
-        kind=str,
-        choices=FORMS,
-        short="imperfection_shape",
+        "1", "shape of the initial deflection", default="mode", kind=str, choices=FORMS, short="imperfection_shape"
     )
     antisymmetric_amplitude: float = quantity(
         "m", "maximum height of the antisymmetric part of the initial shape", default=0.0,
@@ -140,9 +133,7 @@ class Imperfection:
         "1", "location of the constant force over the length", default=0.5, low=0.0, high=1.0,
         short="imperfection_point_location",
     )  # fmt: skip
-    uniform_load: float = quantity(
-        "N/m", "constant force per length", default=0.0, short="imperfection_uniform_load"
-    )
+    uniform_load: float = quantity("N/m", "constant force per length", default=0.0, short="imperfection_uniform_load")
     gravity: float = quantity(
         "m/s^2", "gravity towards the lower well", default=0.0, symbol="g", short="imperfection_gravity"
     )
@@ -156,13 +147,7 @@ class Imperfection:
     def is_none(self) -> bool:
         """True if the beam is perfect."""
         profile = self.profile is not None and bool(np.any(self.profile[1] != self.profile[1, 0]))
-        loads = (
-            self.midspan_amplitude,
-            self.antisymmetric_amplitude,
-            self.point_load,
-            self.uniform_load,
-            self.gravity,
-        )
+        loads = (self.midspan_amplitude, self.antisymmetric_amplitude, self.point_load, self.uniform_load, self.gravity)
         return not profile and not any(loads)
 
     @property
@@ -185,9 +170,7 @@ class Imperfection:
             found[0] += self.midspan_amplitude / float(modes.shape(0.5 * modes.length)[0])
         elif self.midspan_amplitude != 0.0:
             at = np.linspace(0.0, 1.0, _SINE_POINTS)
-            found += projected(
-                modes, np.stack((at, self.midspan_amplitude * np.sin(np.pi * at))), symmetric=True
-            )
+            found += projected(modes, np.stack((at, self.midspan_amplitude * np.sin(np.pi * at))), symmetric=True)
         if self.antisymmetric_amplitude != 0.0:
             if modes.count < 2:
                 raise InputError(
@@ -218,9 +201,7 @@ _SEARCH = 4001
 def _profile(value: Any) -> _Array:
     given = finite_array("profile", value)
     if given.ndim != 2 or given.shape[0] != 2 or given.shape[1] < 4:
-        raise InputError(
-            f"profile of shape {given.shape}: must be (2, points), places and heights, 4 points or more"
-        )
+        raise InputError(f"profile of shape {given.shape}: must be (2, points), places and heights, 4 points or more")
     at = given[0]
     if not (np.diff(at) > 0.0).all() or abs(at[0]) > _ENDS or abs(at[-1] - 1.0) > _ENDS:
         raise InputError(

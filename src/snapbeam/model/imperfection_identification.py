@@ -61,27 +61,18 @@ def identify_imperfection(
     """
     instance("beam", beam, Beam, "a Beam")
     wanted = np.array(
-        [
-            positive("lower_frequency", lower_frequency, "Hz"),
-            positive("upper_frequency", upper_frequency, "Hz"),
-        ]
+        [positive("lower_frequency", lower_frequency, "Hz"), positive("upper_frequency", upper_frequency, "Hz")]
     )
     choice("kind", kind, FITTED)
     modes = integer("modes", modes, 1, MAX_MODES)
-    base = (
-        Imperfection()
-        if imperfection is None
-        else instance("imperfection", imperfection, Imperfection, "one")
-    )
+    base = Imperfection() if imperfection is None else instance("imperfection", imperfection, Imperfection, "one")
     level = beam.buckling_level if beam.is_buckled else beam.thickness
     sizes = np.array([level, level if kind == "midspan_amplitude" else _load_size(beam, kind)])
 
     def model_at(at: Any) -> ReducedModel:
         own: dict[str, Any] = {kind: float(at[1] * sizes[1])}
         return ReducedModel.from_beam(
-            beam.replace(buckling_level=float(at[0] * sizes[0])),
-            modes,
-            imperfection=dataclasses.replace(base, **own),
+            beam.replace(buckling_level=float(at[0] * sizes[0])), modes, imperfection=dataclasses.replace(base, **own)
         )
 
     def residual(at: Any) -> Any:

@@ -10,7 +10,7 @@ from snapbeam.model.quantity import check_fields, quantities, quantity
 from snapbeam.util.validation import InputError
 
 ACCURACIES = ("standard", "reference")
-ENGINES = ("auto", "native", "python")
+ENGINES = ("auto", "native", "python", "cuda")
 CYCLES = 200
 """Default number of cycles of a run."""
 
@@ -31,9 +31,10 @@ class Integration:
     tolerance : float, optional
         Requested maximum error of the displacement of the contact point and of mid-span, over b, from 1e-10 to
         0.1, up to the predictability horizon. Excludes *step* and *accuracy*.
-    engine : {"auto", "native", "python"}
+    engine : {"auto", "native", "python", "cuda"}
         Solver; ``"auto"`` is the native core, ``"native"``.  ``"python"`` is the specification in Python, for laws of one's own
         in plain Python: thousands of times slower, it chooses its steps itself, and takes no *step*, *tolerance* or *early_termination*.
+        ``"cuda"`` is the core on a GPU of NVIDIA, for maps of ten thousand runs and more (extra ``cuda``); single runs stay on the CPU.
     early_termination : bool
         End a run once its response class is certain: the class is the same, statistics other than it stop there.
     threads : int, optional
@@ -62,9 +63,7 @@ class Integration:
     1000
     """
 
-    cycles: int | None = quantity(
-        "1", "cycles of excitation", default=None, kind=int, low=1, high=10**7, optional=True
-    )
+    cycles: int | None = quantity("1", "cycles of excitation", default=None, kind=int, low=1, high=10**7, optional=True)
     step: float | None = quantity("s", "step in free flight", default=None, low=0.0, optional=True)
     accuracy: str = quantity("1", "accuracy level", default="standard", kind=str, choices=ACCURACIES)
     tolerance: float | None = quantity(
@@ -104,9 +103,7 @@ class Integration:
         known = quantities(Integration)
         for name in changes:
             if name not in known:
-                raise InputError(
-                    f"{name}: is not a parameter of an integration; must be one of {', '.join(known)}"
-                )
+                raise InputError(f"{name}: is not a parameter of an integration; must be one of {', '.join(known)}")
         return dataclasses.replace(self, **changes)
 
     @property

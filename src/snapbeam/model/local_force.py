@@ -292,9 +292,7 @@ class LocalSpring(LocalForce):
     """
 
     stiffness: float = quantity("N/m", "stiffness of the local spring", low=0.0, closed="left", symbol="k")
-    cubic_stiffness: float = quantity(
-        "N/m^3", "cubic stiffness of the local spring", default=0.0, symbol="k_3"
-    )
+    cubic_stiffness: float = quantity("N/m^3", "cubic stiffness of the local spring", default=0.0, symbol="k_3")
     name = "local_spring"
 
     @staticmethod
@@ -369,9 +367,7 @@ class ElectrostaticForce(_TowardsGap):
     def force(law: Any, displacement: float) -> float:
         """eps_0 A V^2/(2 (g - u)^2), towards the electrode."""
         away = law.gap - displacement
-        return math.copysign(
-            0.5 * _PERMITTIVITY * law.area * law.voltage * law.voltage / (away * away), law.gap
-        )
+        return math.copysign(0.5 * _PERMITTIVITY * law.area * law.voltage * law.voltage / (away * away), law.gap)
 
     @staticmethod
     def energy(law: Any, displacement: float) -> float:

@@ -16,7 +16,7 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions
 from snapbeam.model.external_force import FORCES, ExternalForce
 from snapbeam.model.imperfection import Imperfection
-from snapbeam.model.parameters import SECTIONS, kinds_of, row_of
+from snapbeam.model.parameters import SECTIONS, kind_of, kinds_of, row_of
 from snapbeam.model.quantity import NUMBERED, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
@@ -109,9 +109,7 @@ def _described(part: Any) -> dict[str, Any]:
 
 def _fields(part: Any) -> dict[str, Any]:
     found = {item.name: getattr(part, item.name) for item in dataclasses.fields(part)}
-    return {
-        name: value for name, value in found.items() if value is not None and (name, value) != ("label", "")
-    }
+    return {name: value for name, value in found.items() if value is not None and (name, value) != ("label", "")}
 
 
 def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
@@ -136,9 +134,7 @@ def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
     for name, kind in _MOVED.items():
         if name in sections:
             parts[name] = _moved(kind, "motion", sections[name], name)
-    parts["forces"] = tuple(
-        _force(section, values) for section, values in _numbered_sections(sections, "force")
-    )
+    parts["forces"] = tuple(_force(section, values) for section, values in _numbered_sections(sections, "force"))
     parts["harvesters"] = tuple(
         _chosen(values, section) for section, values in _numbered_sections(sections, "harvester")
     )
@@ -175,9 +171,7 @@ def _numbered_sections(sections: Mapping[str, Any], *kinds: str) -> list[tuple[s
     """The sections of the first of some kinds, in order; of the others there may be none."""
     numbers = sorted({numbered(name)[1] for name in sections if numbered(name)[0] in kinds})
     if numbers != list(range(1, 1 + len(numbers))):
-        raise InputError(
-            f"[{section_of(kinds[0], numbers[-1])}]: there is none before it; number them 1, 2, 3, ..."
-        )
+        raise InputError(f"[{section_of(kinds[0], numbers[-1])}]: there is none before it; number them 1, 2, 3, ...")
     return [(name := section_of(kinds[0], number), sections.get(name, {})) for number in numbers]
 
 
@@ -235,9 +229,7 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
             Beam(**values, boundary=BoundaryConditions(**held)), **own, imperfection=Imperfection(**uneven)
         )
     if "boundary" in sections:
-        raise InputError(
-            "[boundary]: belong to a beam; a structure given by matrices has them in its matrices"
-        )
+        raise InputError("[boundary]: belong to a beam; a structure given by matrices has them in its matrices")
     if "imperfection" in sections:
         raise InputError(
             "[imperfection]: belongs to a beam; give the transverse_force of a structure given by matrices"
@@ -255,17 +247,15 @@ def _chosen(values: Mapping[str, Any], section: str) -> Any:
         values = read_file(section, values)
     own, known = dict(values), kinds_of(numbered(section)[0])
     name = own.pop("type", None)
-    if not isinstance(name, str) or name not in known:
+    kind = kind_of(numbered(section)[0], name)
+    if kind is None:
         raise InputError(f"[{section}] type = {shown(name)}: must be one of {', '.join(map(repr, known))}")
-    kind = known[name]
     _only(own, section, [item.name for item in dataclasses.fields(kind)])
     _needed(own, section, kind, f" for type = {shown(name)}")
     return kind(**own)
 
 
-def read_file(
-    section: str, values: Mapping[str, Any], folder: str | os.PathLike[str] = "."
-) -> dict[str, Any]:
+def read_file(section: str, values: Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> dict[str, Any]:
     """The values of a section with the record that its ``file``, relative to *folder*, contains in place of the keys of files.
 
     Raises
@@ -371,9 +361,7 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     for name, value in changes.items():
         section, field = split_name(name)
         if numbered(section)[0] not in (*SECTIONS, *_PARTS):
-            raise InputError(
-                f"{name}: is not a parameter of a system; its sections are {', '.join(SECTIONS)}"
-            )
+            raise InputError(f"{name}: is not a parameter of a system; its sections are {', '.join(SECTIONS)}")
         if field:
             inside.setdefault(section, {})[field] = value
         else:
@@ -453,9 +441,7 @@ def _changed(part: Any, section: str, values: Mapping[str, Any], others: list[st
     known = [*quantities(type(part)), *(others or [])]
     for name in values:
         if name not in known:
-            raise InputError(
-                f"{section}.{name}: is not a parameter of this system; must be one of {', '.join(known)}"
-            )
+            raise InputError(f"{section}.{name}: is not a parameter of this system; must be one of {', '.join(known)}")
     return dataclasses.replace(part, **values)
 
 
@@ -483,9 +469,7 @@ def _with_imperfection(
 ) -> ReducedModel:
     """The model of the same beam with another imperfection; of a perfect one *values* are all that it then has."""
     if model.beam is None:
-        raise InputError(
-            "imperfection: this model was given by matrices, it has no beam; give its transverse_force"
-        )
+        raise InputError("imperfection: this model was given by matrices, it has no beam; give its transverse_force")
     if values:
         changed = _changed(Imperfection() if imperfection is None else imperfection, "imperfection", values)
         imperfection = changed

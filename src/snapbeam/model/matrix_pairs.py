@@ -317,9 +317,7 @@ def _factors(stiffness: Any, mass: Any, at: float) -> Any:
 def _negative(factors: Any) -> int:
     """Number of negative eigenvalues, by Sylvester's law of inertia: pivots are those of the diagonal."""
     if not np.array_equal(factors.perm_r, factors.perm_c):
-        raise InputError(
-            "stiffness: has a singular leading part; reorder the coordinates, or give a dense matrix"
-        )
+        raise InputError("stiffness: has a singular leading part; reorder the coordinates, or give a dense matrix")
     return int((factors.U.diagonal() < 0.0).sum())
 
 

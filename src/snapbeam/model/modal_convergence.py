@@ -152,9 +152,7 @@ def converged_modes(system: System, error: float = AUTO_ERROR) -> int:
     """
     instance("system", system, System, "a System")
     if system.model.beam is None:
-        raise InputError(
-            "modes = 'auto': a structure given by matrices has the modes of its matrices; give none"
-        )
+        raise InputError("modes = 'auto': a structure given by matrices has the modes of its matrices; give none")
     error = _checked_error("error", error)
     modes, here = 2, with_modes(system, 2)
     while modes <= _MAX_MODES:

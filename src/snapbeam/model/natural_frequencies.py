@@ -203,9 +203,7 @@ def _between_springs(beam: Beam, count: int) -> _Array:
     from snapbeam.model.reduced_model import ReducedModel
 
     modes = min(MAX_MODES, max(4 * count, 24))
-    return spring_natural_frequency(
-        beam, count, ReducedModel.from_beam(beam, modes=modes).natural_frequencies
-    )
+    return spring_natural_frequency(beam, count, ReducedModel.from_beam(beam, modes=modes).natural_frequencies)
 
 
 def _wavenumbers(p: float, eta: float) -> tuple[float, float]:

@@ -29,17 +29,13 @@ if TYPE_CHECKING:
 
 Axis = float | NDArray[np.float64]
 
-_FORMS = (
-    "a number, numbers separated by commas, or start:stop:count, such as 0.1:4:64, with :log if geometric"
-)
+_FORMS = "a number, numbers separated by commas, or start:stop:count, such as 0.1:4:64, with :log if geometric"
 
 
 _WHOLE = "a whole number, whole numbers separated by commas, such as 1,32, or start:stop:count"
 
 
-def parse_axis(
-    name: str, value: float | str | Sequence[float], *, whole: bool = False, unit: str = "1"
-) -> Axis:
+def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool = False, unit: str = "1") -> Axis:
     """Return *value* as one number, or as a strictly increasing axis.
 
     Parameters

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
-from snapbeam.model.drive.base import DRIVES
 from snapbeam.model.external_force import FORCES
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, read_file, resolved
@@ -27,6 +26,7 @@ from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physic
 from snapbeam.model.parameters import (
     PHYSICAL,
     Parameter,
+    kind_of,
     kinds_of,
     lookup,
     named_in,
@@ -99,9 +99,7 @@ def contact_of(given: Mapping[str, Any]) -> dict[str, Any]:
         if len(wanted) < len(WANTED):
             raise InputError("[contact] restitution and speed belong together; one is missing")
         if "damping_factor" in values or law != "hunt_crossley":
-            raise InputError(
-                "[contact] restitution and speed make the loss of type = 'hunt_crossley'; give no other"
-            )
+            raise InputError("[contact] restitution and speed make the loss of type = 'hunt_crossley'; give no other")
         values["damping_factor"] = HuntCrossley.from_restitution(
             values["stiffness"], wanted["restitution"], wanted["speed"]
         ).damping_factor
@@ -199,13 +197,7 @@ def _is_of_other_type(row: Parameter, values: Mapping[str, Any]) -> bool:
     return known and bool(row.kinds) and kind not in row.kinds
 
 
-def _checked(
-    section: str,
-    name: str,
-    value: Any,
-    found: dict[str, dict[str, Any]],
-    flat: Mapping[str, Any],
-) -> str:
+def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any]], flat: Mapping[str, Any]) -> str:
     """Enter a value in *found*, or return what is wrong with it."""
     own = found.setdefault(section, {})
     if section == "sweep":
@@ -289,20 +281,11 @@ def _array(name: str, value: Any) -> tuple[str, Any]:
         return f"{name} = {shown(value)}: must be a list of numbers", None
 
 
-def _is_sum(section: str, value: Any) -> bool:
-    """Return whether a type is a sum of drives, such as ``"sine+burst"``, that the section accepts."""
-    if not isinstance(value, str) or "+" not in value or value not in DRIVES:
-        return False
-    return numbered(section)[0] == "drive" or (
-        section == "base_excitation" and DRIVES[value].can_excite_base()
-    )
-
-
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     """Check an entry without a row in the table: law, drive type, materials, physical units."""
     if name == "type":
         known = kinds_of(numbered(section)[0])
-        if not isinstance(value, str) or (value not in known and not _is_sum(section, value)):
+        if kind_of(numbered(section)[0], value) is None:
             return f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}", None
         return "", value
     if name == "label":
@@ -424,10 +407,7 @@ Sections = Mapping[str, Mapping[str, Any]]
 DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
 """Default axes of a map."""
-_AROUND, _STRIKING = (
-    ("base_excitation", "axial_load", "force", "harvester"),
-    ("contact", "drive"),
-)
+_AROUND, _STRIKING = (("base_excitation", "axial_load", "force", "harvester"), ("contact", "drive"))
 _FIRST_MODES = 2
 """Number of modes of the first model from which that of ``modes = "auto"`` follows."""
 _CONVERTED = {"radius", "file", *WANTED, *(field for _, field in map(split_name, PHYSICAL))}
@@ -537,9 +517,7 @@ class Config:
         swept = {*map(ratio_of, axes)}
         if self.model.length_scale is None:  # a beam that does not buckle makes no system
             sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
-            sections |= {
-                name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)
-            }
+            sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
         else:
             sections = {
                 name: {key: value for key, value in values.items() if f"{name}.{key}" not in swept}
@@ -552,9 +530,7 @@ class Config:
         if own["cycles"] is None:
             own["cycles"] = CYCLES
         sections["integration"] = {
-            name: value
-            for name, value in own.items()
-            if value is not None and f"integration.{name}" not in axes
+            name: value for name, value in own.items() if value is not None and f"integration.{name}" not in axes
         }
         if axes:
             whole_number = {name: lookup(name).quantity.kind is int for name in axes}
@@ -594,9 +570,7 @@ class Config:
             )
 
     def _of_paper(self) -> dict[str, dict[str, Any]]:
-        beam = {
-            name: getattr(BEAM, name) for name in ("length", "thickness", "width", "density", "young_modulus")
-        }
+        beam = {name: getattr(BEAM, name) for name in ("length", "thickness", "width", "density", "young_modulus")}
         own = self.section("beam") if self.extends_paper else self._with_axes("beam")
         if not {"buckling_level", "axial_load"} & own.keys():
             beam["buckling_level"] = BEAM.buckling_level
@@ -706,9 +680,7 @@ class Config:
         kinds = {numbered(name)[0] for name in self.given}
         damped = "damping_ratio" in self.section("model") and self._around
         return (
-            not self.extends_paper
-            and not damped
-            and not kinds - {"beam", "model", "boundary", "imperfection", "force"}
+            not self.extends_paper and not damped and not kinds - {"beam", "model", "boundary", "imperfection", "force"}
         )
 
     def _with_number_of_modes(self) -> Config:
@@ -719,9 +691,7 @@ class Config:
 
         def given(modes: int) -> Config:
             return Config(
-                {**self.given, "model": self.section("model") | {"modes": modes}},
-                self.extends_paper,
-                self.as_given,
+                {**self.given, "model": self.section("model") | {"modes": modes}}, self.extends_paper, self.as_given
             )
 
         return given(converged_modes(given(_FIRST_MODES).static_system, error))
@@ -729,11 +699,7 @@ class Config:
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
         start = self.section("initial_state")
-        return (
-            system.replace(**{f"initial_state.{name}": value for name, value in start.items()})
-            if start
-            else system
-        )
+        return system.replace(**{f"initial_state.{name}": value for name, value in start.items()}) if start else system
 
     @property
     def model(self) -> ReducedModel:
@@ -770,8 +736,7 @@ class Config:
     def _parts(self, *forces: str) -> dict[str, Any]:
         self._require("beam")
         own = {
-            name: self._with_axes(name) if self._may_be_axis(name) else self.section(name)
-            for name in ("beam", "model")
+            name: self._with_axes(name) if self._may_be_axis(name) else self.section(name) for name in ("beam", "model")
         }
         sections = {name: self._defaults()[name] | own[name] for name in own}
         sections["model"].setdefault("damping_ratio", DAMPING_RATIO)  # has no effect without motion
@@ -807,10 +772,7 @@ class Config:
                 checked_physical(self.system, name, value, name)
         for name in PHYSICAL:
             section, field = split_name(name)
-            if (
-                field in self.section(section)
-                and axis_that_changes_unit(self.system, name, found) is not None
-            ):
+            if field in self.section(section) and axis_that_changes_unit(self.system, name, found) is not None:
                 found[name] = np.array([self.section(section)[field]])
         return found
 
@@ -833,17 +795,14 @@ def _without_units(sections: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 def _stand_in(name: str, value: Any) -> float:
     """A value that lets the system be made before the physical one is known."""
+    name = name.rstrip("_1234")  # of a term of a sum
     if name.endswith("_ratio"):
         return 2.0 if name in ("high_ratio", "stop_ratio") else 1.0
     return 0.5 if name == "location" else 0.0
 
 
 def config_from_mapping(
-    sections: Mapping[str, Any],
-    source: str = "",
-    *,
-    complete: bool = True,
-    folder: str | os.PathLike[str] = ".",
+    sections: Mapping[str, Any], source: str = "", *, complete: bool = True, folder: str | os.PathLike[str] = "."
 ) -> Config:
     """Check nested parameters, as a TOML file holds them.
 
@@ -911,9 +870,7 @@ def sections_as_given(system: System) -> dict[str, dict[str, Any]]:
             continue
         value = number / unit_of(system, full) if full in PHYSICAL else number
         if value == own[key]:
-            sections[section] = {
-                name if each == key else each: raw if each == key else own[each] for each in own
-            }
+            sections[section] = {name if each == key else each: raw if each == key else own[each] for each in own}
     try:
         written = {name: {k: v for k, v in own.items() if v is not None} for name, own in sections.items()}
         return sections if config_from_mapping(written).system == system else plain
@@ -942,9 +899,7 @@ def _merged(given: Sections, sections: Sections) -> dict[str, dict[str, Any]]:
             for name in own:
                 for same in same_axis(name):
                     target.pop(same, None)
-        for one, other in [
-            pair for both in _RIVALS.get(numbered(section)[0], []) for pair in (both, both[::-1])
-        ]:
+        for one, other in [pair for both in _RIVALS.get(numbered(section)[0], []) for pair in (both, both[::-1])]:
             if one & own.keys() and not other & own.keys():
                 for name in other:
                     target.pop(name, None)
@@ -972,9 +927,7 @@ def same_axis(name: str) -> set[str]:
 def load_config(path: str | os.PathLike[str], *, complete: bool = True) -> Config:
     """Read a parameter file; unless it must be *complete*, options may add what a system needs."""
     file = file_path("config", path)
-    return config_from_mapping(
-        read_parameter_file("config", file), file.name, complete=complete, folder=file.parent
-    )
+    return config_from_mapping(read_parameter_file("config", file), file.name, complete=complete, folder=file.parent)
 
 
 def read_parameter_file(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -27,15 +27,7 @@ from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
 from snapbeam.model.local_force import LOCAL_FORCES
-from snapbeam.model.quantity import (
-    NUMBERED,
-    RUN,
-    ParameterField,
-    numbered,
-    quantities,
-    section_of,
-    split_name,
-)
+from snapbeam.model.quantity import NUMBERED, RUN, ParameterField, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
 from snapbeam.model.state import START_NAME, checked_well
 from snapbeam.model.striker import Striker
@@ -108,9 +100,7 @@ class Parameter:
         if math.isinf(item.low) and math.isinf(item.high):
             return "any"
         left = "[" if item.closed in ("left", "both") or item.kind is int else "("
-        right = (
-            "]" if item.closed in ("right", "both") or (item.kind is int and item.high < math.inf) else ")"
-        )
+        right = "]" if item.closed in ("right", "both") or (item.kind is int and item.high < math.inf) else ")"
         return f"{left}{item.low:g}, {item.high:g}{right}"
 
 
@@ -141,6 +131,15 @@ def _rows() -> Iterable[Parameter]:
 _INITIAL_WELL = ParameterField("1", "well that runs begin in", kind=object, optional=True, parse=checked_well)
 
 
+def kind_of(section: str, name: object) -> Any:
+    """Return the class that the key ``type`` of a section names, a sum of drives such as ``"sine+burst"`` too, or None."""
+    if section == "base_excitation" and isinstance(name, str) and "+" in name:
+        found = DRIVES[name] if name in DRIVES else None
+        return found if found is not None and found.can_excite_base() else None
+    known = kinds_of(section)
+    return known[name] if isinstance(name, str) and name in known else None
+
+
 def kinds_of(section: str) -> Mapping[str, Any]:
     """The classes that a section can describe, by the word that its key ``type`` has; none of a section without it."""
     if section == "base_excitation":
@@ -155,12 +154,7 @@ def kinds_of(section: str) -> Mapping[str, Any]:
     return known.get(section, {})
 
 
-_AROUND = {
-    "base_excitation": "the base",
-    "axial_load": "",
-    "force": "",
-    "harvester": "",
-}
+_AROUND = {"base_excitation": "the base", "axial_load": "", "force": "", "harvester": ""}
 """Sections of base, axial load and forces, with prefixes for dataset names and long names."""
 
 
@@ -274,9 +268,7 @@ def lookup(name: str) -> Parameter:
     if name in ("initial_state.striker_position", "initial_state_striker_position"):
         words = "mid-position of the striker's tip in space"
         return Parameter(
-            "initial_state.striker_position",
-            "initial_state_striker_position",
-            ParameterField("m", words, scope=RUN),
+            "initial_state.striker_position", "initial_state_striker_position", ParameterField("m", words, scope=RUN)
         )
     shorts, table = short_names(), _known()
     if name in shorts:
@@ -293,11 +285,7 @@ def lookup(name: str) -> Parameter:
     if len(tails.get(name, [])) == 1:
         return table[tails[name][0]]
     close = difflib.get_close_matches(name, [*table, *shorts, *PHYSICAL], 3)
-    hint = (
-        f"; did you mean {' or '.join(map(repr, close))}?"
-        if close
-        else f"; see {', '.join(list(table)[:6])}, ..."
-    )
+    hint = f"; did you mean {' or '.join(map(repr, close))}?" if close else f"; see {', '.join(list(table)[:6])}, ..."
     raise InputError(f"{name}: is not a parameter{hint}")
 
 
@@ -336,9 +324,7 @@ _IN_UNITS = {
     "stop_ratio": ("stop_hz", "Hz", "frequency at the end of the sweep"),
     "low_ratio": ("low_hz", "Hz", "lower limit of the band"),
     "high_ratio": ("high_hz", "Hz", "upper limit of the band"),
-    "second_ratio": ("second_hz", "Hz", "second frequency"),
     "velocity_amplitude": ("velocity_m_s", "m/s", "velocity amplitude"),
-    "second_amplitude": ("second_m_s", "m/s", "velocity amplitude of the second sine"),
     "velocity_rms": ("velocity_rms_m_s", "m/s", "root-mean-square velocity"),
     "speed": ("speed_m_s", "m/s", "speed"),
     "displacement_amplitude": ("displacement_um", "um", "displacement amplitude"),
@@ -365,13 +351,14 @@ def _in_units() -> Iterable[tuple[str, Physical]]:
         if field not in _IN_UNITS or section not in _OWNERS or row.quantity.unit != "1":
             continue
         own, unit, words = _IN_UNITS[field]
-        of = (
-            f"excitation {words}" if row.name == "drive.frequency_ratio" else f"{words} of {_OWNERS[section]}"
-        )
+        of = f"excitation {words}" if row.name == "drive.frequency_ratio" else f"{words} of {_OWNERS[section]}"
         for number in range(1, 1 + (_MAX_NUMBER if section in NUMBERED else 1)):
             name = section_of(section, number)
             text = of if number == 1 else f"{of} {number}"
             yield f"{name}.{own}", Physical(f"{name}.{field}", unit, text)
+        if section in ("drive", "base_excitation"):  # the terms of a sum
+            for term in "1234":
+                yield f"{section}.{own}_{term}", Physical(f"{section}.{field}_{term}", unit, f"{of}, of term {term}")
 
 
 PHYSICAL: dict[str, Physical] = dict(_in_units())

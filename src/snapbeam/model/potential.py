@@ -318,7 +318,7 @@ class Potential:
 
     @cached_property
     def _ranges(self) -> _Array:
-        """Least and greatest displacements of the laws, shape (J, 2)."""
+        """Minimum and maximum displacements of the laws, shape (J, 2)."""
         found = [law.displacement_range(law.numbers) for law in self.local_forces]
         return np.array(found, dtype=np.float64).reshape(-1, 2)
 
@@ -352,9 +352,7 @@ class Potential:
         """
         found, n = finite_array("matrix", matrix), self.model.modes
         if found.shape[-2:] != (n, n):
-            raise InputError(
-                f"matrix of shape {found.shape}: must have {n} rows and columns in its last axes"
-            )
+            raise InputError(f"matrix of shape {found.shape}: must have {n} rows and columns in its last axes")
         return self._in_modes(found)
 
     def _in_modes(self, matrix: _Array) -> _Array:
@@ -579,9 +577,7 @@ class Potential:
     @cached_property
     def saddles(self) -> tuple[Saddle, ...]:
         """Equilibria with one unstable direction, by energy, with the wells on their two sides."""
-        return tuple(
-            Saddle(each, self._sides(each)) for each in self.equilibria if each.unstable_directions == 1
-        )
+        return tuple(Saddle(each, self._sides(each)) for each in self.equilibria if each.unstable_directions == 1)
 
     @cached_property
     def dividing_height(self) -> float:

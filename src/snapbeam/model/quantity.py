@@ -120,11 +120,7 @@ def quantity(unit: str, words: str, *, default: Any = dataclasses.MISSING, **mor
 
 def quantities(kind: type) -> dict[str, ParameterField]:
     """The quantities of a dataclass, by the names of their fields."""
-    return {
-        item.name: item.metadata["quantity"]
-        for item in dataclasses.fields(kind)
-        if "quantity" in item.metadata
-    }
+    return {item.name: item.metadata["quantity"] for item in dataclasses.fields(kind) if "quantity" in item.metadata}
 
 
 def check_fields(value: Any) -> None:

@@ -14,26 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import Modes
-from snapbeam.model.buckling_modes import (
-    MAX_MODES,
-    BucklingModes,
-    StructureMatrices,
-    checked_structure,
-    damping_ratios,
-)
+from snapbeam.model.buckling_modes import MAX_MODES, BucklingModes, StructureMatrices, checked_structure, damping_ratios
 from snapbeam.model.equilibria import Equilibrium, Landscape, condensed, landscape_of, tangent_stiffness
 from snapbeam.model.imperfection import Imperfection, perfect_equilibria
 from snapbeam.model.matrix_pairs import eigenpairs
 from snapbeam.model.quantity import ParameterField, quantities
-from snapbeam.util.validation import (
-    InputError,
-    InputTypeError,
-    finite_array,
-    integer,
-    positive,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, InputTypeError, finite_array, integer, positive, shown, within
 
 # ----------------------------------------------------------------------------------------------------
 # Eigenvalues of the diagonal-plus-rank-one problems into which a buckled beam splits.
@@ -68,9 +54,7 @@ def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
     """
     n = diagonal.size
     if not (np.isfinite(diagonal).all() and math.isfinite(c)):
-        raise InputError(
-            "model: its frequencies are beyond what a number holds; are the units of the beam right?"
-        )
+        raise InputError("model: its frequencies are beyond what a number holds; are the units of the beam right?")
     order = np.argsort(diagonal, kind="stable")
     d = diagonal[order]
     weight = c / (1.0 + c * n)
@@ -155,11 +139,7 @@ def linear_modes_of_beam(beam: Beam, count: int) -> LinearModes:
 
 
 def linear_modes_about(
-    alpha: _Array,
-    mass: _Array,
-    tangent: _Array,
-    magnitude: _Array,
-    parity: NDArray[np.int_] | None = None,
+    alpha: _Array, mass: _Array, tangent: _Array, magnitude: _Array, parity: NDArray[np.int_] | None = None
 ) -> LinearModes:
     """Linear modes about the equilibrium alpha of a tangent stiffness; each parity by itself where the tangent does not couple the two.
 
@@ -256,11 +236,7 @@ class Wells:
         if self.transverse_force is None:
             return None
         return landscape_of(
-            self.stiffness,
-            self.nonlinear_stiffness,
-            self.transverse_force,
-            self.midspan_shape,
-            self.elongation_matrix,
+            self.stiffness, self.nonlinear_stiffness, self.transverse_force, self.midspan_shape, self.elongation_matrix
         )
 
     @cached_property
@@ -273,9 +249,7 @@ class Wells:
         own = condensed(self.stiffness, np.zeros(self.well_amplitude.size), self.elongation_matrix)
         return tuple(
             dataclasses.replace(
-                each,
-                amplitude=own.back @ each.amplitude,
-                unstable_directions=each.unstable_directions + own.unstable,
+                each, amplitude=own.back @ each.amplitude, unstable_directions=each.unstable_directions + own.unstable
             )
             for each in perfect_equilibria(own.stiffness, self.nonlinear_stiffness)
         )
@@ -382,9 +356,7 @@ class Wells:
         """
         if self.beam is None or self.imperfection is None or self.is_bistable:
             why = "has two wells" if self.is_bistable else "has no imperfection"
-            raise InputError(
-                f"two_well_limits: must be of a beam with one well by its imperfection; this model {why}"
-            )
+            raise InputError(f"two_well_limits: must be of a beam with one well by its imperfection; this model {why}")
         beam, given = self.beam, self.imperfection
 
         def scaled(factor: float) -> bool:
@@ -756,10 +728,7 @@ class ReducedModel(Wells):
             )
         )
         model = cls(**given)
-        _ = (
-            model._linear,
-            model.modal_damping,
-        )  # refuse an unstable equilibrium here rather than at its first use
+        _ = (model._linear, model.modal_damping)  # refuse an unstable equilibrium here rather than at its first use
         return model
 
     # ------------------------------------------------------------------ shapes
@@ -802,9 +771,7 @@ class ReducedModel(Wells):
         location = within("location", location, 0.0, 1.0)
         compliance = float(np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
         if not compliance > _LEAST_COMPLIANCE:
-            raise InputError(
-                f"location = {shown(location)}: is so near a clamp that the beam does not move there"
-            )
+            raise InputError(f"location = {shown(location)}: is so near a clamp that the beam does not move there")
         return 1.0 / compliance
 
     # ------------------------------------------------------------------ linear modes about a well
@@ -882,9 +849,7 @@ class ReducedModel(Wells):
         with np.errstate(over="ignore", invalid="ignore"):
             matrix = np.array(_symmetric(modes.T @ self.damping @ modes))
         if not np.isfinite(matrix).all():
-            raise InputError(
-                "damping: its rates are beyond what a number holds; are the units of the matrices right?"
-            )
+            raise InputError("damping: its rates are beyond what a number holds; are the units of the matrices right?")
         rounding = _ROUNDINGS * self.modes * _EPSILON
         matrix[np.abs(matrix) <= rounding * (size.T @ np.abs(self.damping) @ size)] = 0.0
         rate = matrix.diagonal()
@@ -968,9 +933,7 @@ def _coupling(parity: NDArray[np.int_]) -> _Array:
     """c_ij of the mass matrix: 2 between symmetric modes, 2/3 between antisymmetric ones."""
     symmetric = (parity > 0).astype(np.float64)
     antisymmetric = 1.0 - symmetric
-    coupling: _Array = 2.0 * np.outer(symmetric, symmetric) + 2.0 / 3.0 * np.outer(
-        antisymmetric, antisymmetric
-    )
+    coupling: _Array = 2.0 * np.outer(symmetric, symmetric) + 2.0 / 3.0 * np.outer(antisymmetric, antisymmetric)
     return coupling
 
 

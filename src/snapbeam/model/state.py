@@ -104,17 +104,13 @@ class State:
         given = given.amplitude if isinstance(given, Equilibrium) else given
         amplitude = _finite_where_known("state amplitude", given, self.statistics)
         if amplitude.ndim == 0:
-            raise InputError(
-                f"state amplitude = {float(amplitude):g}: must be an array of shape (..., modes)"
-            )
+            raise InputError(f"state amplitude = {float(amplitude):g}: must be an array of shape (..., modes)")
         batch = amplitude.shape[:-1]
         velocity = np.zeros_like(amplitude)
         if self.velocity is not None:
             velocity = _finite_where_known("state velocity", self.velocity, self.statistics)
             if velocity.shape != amplitude.shape:
-                raise InputError(
-                    f"state velocity of shape {velocity.shape}: must have shape {amplitude.shape}"
-                )
+                raise InputError(f"state velocity of shape {velocity.shape}: must have shape {amplitude.shape}")
         found = {"amplitude": amplitude, "velocity": velocity}
         found["phase"] = _maybe("state phase", self.phase, batch)
         position = np.nan if self.striker_position is None else self.striker_position
@@ -162,9 +158,7 @@ class State:
             raise InputError(f"state[{index!r}]: this is one state, not a batch")
         passed, tangent = self.statistics, self.tangent
         if passed is not None:
-            passed = {
-                name: values[index] for name, values in passed.items() if np.shape(values) == self.batch
-            }
+            passed = {name: values[index] for name, values in passed.items() if np.shape(values) == self.batch}
         if tangent is not None:
             tangent = tangent[index] if tangent.shape[:-3] == self.batch else None
         modal = self.modal
@@ -172,10 +166,7 @@ class State:
             parts = (modal.q[index], modal.p[index], modal.well_sign[index], modal.offset[index])
             modal = ModalState(*parts, modal.structure)
         return State(
-            **{name: getattr(self, name)[index] for name in FIELDS},
-            tangent=tangent,
-            statistics=passed,
-            modal=modal,
+            **{name: getattr(self, name)[index] for name in FIELDS}, tangent=tangent, statistics=passed, modal=modal
         )
 
     def flat(self) -> State:
@@ -210,9 +201,7 @@ class State:
         if modes == self.modes:
             return self
         if modes < self.modes and (self.amplitude[..., modes:].any() or self.velocity[..., modes:].any()):
-            raise InputError(
-                f"modes = {modes}: a state of {self.modes} modes cannot be cut to fewer without loss"
-            )
+            raise InputError(f"modes = {modes}: a state of {self.modes} modes cannot be cut to fewer without loss")
         kept = min(modes, self.modes)
         amplitude, velocity = np.zeros((*self.batch, modes)), np.zeros((*self.batch, modes))
         amplitude[..., :kept], velocity[..., :kept] = self.amplitude[..., :kept], self.velocity[..., :kept]
@@ -296,9 +285,7 @@ def checked_well(name: str, value: Any) -> str | int:
     number = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
     whole = number and value >= 0
     if not whole and (not isinstance(value, str) or value not in ("lower", "upper")):
-        raise InputError(
-            f"{name} = {shown(value)}: must be 'lower', 'upper' or the index of a well in potential.wells"
-        )
+        raise InputError(f"{name} = {shown(value)}: must be 'lower', 'upper' or the index of a well in potential.wells")
     return int(value) if whole else value
 
 

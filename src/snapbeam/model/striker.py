@@ -203,7 +203,5 @@ class Contact:
         if not isinstance(self.striker, Striker):
             raise InputTypeError(f"striker = {shown(self.striker)}: must be a Striker or a Shaker")
         if not isinstance(self.law, ContactLaw):
-            raise InputTypeError(
-                f"law = {shown(self.law)}: must be a law of contact, such as HertzContact(stiffness)"
-            )
+            raise InputTypeError(f"law = {shown(self.law)}: must be a law of contact, such as HertzContact(stiffness)")
         check_label(self.label)

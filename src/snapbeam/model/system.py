@@ -25,14 +25,7 @@ from snapbeam.model.equilibria import Equilibrium
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.local_force import LocalForce
-from snapbeam.model.mapping import (
-    nested,
-    parts_from_mapping,
-    parts_to_mapping,
-    replaced,
-    resolved,
-    sequence_of,
-)
+from snapbeam.model.mapping import nested, parts_from_mapping, parts_to_mapping, replaced, resolved, sequence_of
 from snapbeam.model.parameter_axes import ratios_of, to_physical
 from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, named_in, ratio_of
 from snapbeam.model.potential import Potential
@@ -240,9 +233,7 @@ class System:
         A stationary striker counts only if neither a base nor an axial load moves.
         """
         around = (self.base_excitation, self.axial_load, *self.external_forces)
-        drives = [
-            (section_of("drive", number), each.striker.drive) for number, each in enumerate(self.contacts, 1)
-        ]
+        drives = [(section_of("drive", number), each.striker.drive) for number, each in enumerate(self.contacts, 1)]
         found: list[tuple[str, Drive]] = [each for each in drives if not isinstance(each[1], FixedStop)]
         if not found and all(each is None for each in around):
             found = drives[:1]
@@ -324,9 +315,7 @@ class System:
         if well is None:
             limits = [law.displacement_range(law.numbers) for law in self.local_forces]
             valid = [
-                f"valid from {a:.4g} to {b:.4g} m or rad"
-                for a, b in limits
-                if math.isfinite(a) or math.isfinite(b)
+                f"valid from {a:.4g} to {b:.4g} m or rad" for a, b in limits if math.isfinite(a) or math.isfinite(b)
             ]
             others = "an initial_well, " if local.wells else ""
             raise InputError(
@@ -477,9 +466,7 @@ class System:
 
         target = check_writable(path, "path", (".toml",))
         with atomic_path(target) as temporary:
-            temporary.write_text(
-                tomli_w.dumps(nested(_without_none(sections_as_given(self)))), encoding="utf-8"
-            )
+            temporary.write_text(tomli_w.dumps(nested(_without_none(sections_as_given(self)))), encoding="utf-8")
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> System:
@@ -495,9 +482,7 @@ class System:
         """The system in a few lines, for a person to read."""
         lines = []
         for section, values in self.to_mapping().items():
-            words = ", ".join(
-                f"{name} = {_brief(value)}" for name, value in values.items() if value is not None
-            )
+            words = ", ".join(f"{name} = {_brief(value)}" for name, value in values.items() if value is not None)
             lines.append(f"{section:8s}  {words}")
         return "\n".join(lines)
 

@@ -3,6 +3,7 @@
 A recipe computes its data by the public interface alone and draws them:
 
 >>> from snapbeam import paper
+>>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
 >>> figure = paper.fig2()  # doctest: +SKIP
 >>> paper.fig6.write("out", size="quick")  # doctest: +SKIP
 
@@ -23,6 +24,7 @@ from snapbeam.model.default_values import (
     STRAIGHT_BEAM,
 )
 from snapbeam.paper.recipe import Recipe, Results, shared_results
+from snapbeam.paper.system import struck_beam
 
 __all__ = [
     "BEAM",
@@ -54,6 +56,7 @@ __all__ = [
     "sensitivity",
     "shared_results",
     "si5",
+    "struck_beam",
     "switch",
     "transients",
     "two_tips",
@@ -75,18 +78,14 @@ si5 = Recipe("si5", "response over location and amplitude as modes are added (an
 
 low_frequency = Recipe("low_frequency", "threshold over the quasi-static one at low frequency", "studies")
 resonance = Recipe("resonance", "the resonance of the intrawell response and the notch of fig6", "studies")
-waveforms = Recipe(
-    "waveforms", "snap-throughs, impacts and modes of runs at random points of fig6", "studies"
-)
+waveforms = Recipe("waveforms", "snap-throughs, impacts and modes of runs at random points of fig6", "studies")
 lifetimes = Recipe("lifetimes", "how long snapping lasts over the plane of fig6 and fig7", "studies")
 transients = Recipe("transients", "what still changes after the cycles of fig7", "studies")
 windows = Recipe("windows", "amplitudes of transient responses near a clamp and near the centre", "studies")
 disturbances = Recipe(
     "disturbances", "start-up transients, starts off the well, impacts without higher modes", "studies"
 )
-harvesting = Recipe(
-    "harvesting", "power of a harvester by impact, and its share at high frequencies", "studies"
-)
+harvesting = Recipe("harvesting", "power of a harvester by impact, and its share at high frequencies", "studies")
 two_tips = Recipe("two_tips", "how high a slow pusher with one tip or two is when the beam snaps", "studies")
 switch = Recipe("switch", "the cheapest burst that switches a beam with a bias", "studies")
 notch = Recipe("notch", "how far each thing left out of the model moves the notch of fig6", "studies")

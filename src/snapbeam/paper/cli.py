@@ -47,8 +47,7 @@ def reproduce(
         bool,
         typer.Option(
             "--stored",
-            help="For claims: use the full-size data of --data if available, otherwise sketches, which each row "
-            "marks.",
+            help="For claims: use the full-size data of --data if available, otherwise sketches, which each row marks.",
         ),
     ] = False,
     measurements: opt.Measurements = None,
@@ -84,9 +83,7 @@ def reproduce(
     for name in names:
         start = time.monotonic()
         given: dict[str, Any] = (
-            {"measurements": measurements}
-            if measurements is not None and name in ("fig6", "fig7", "fig8")
-            else {}
+            {"measurements": measurements} if measurements is not None and name in ("fig6", "fig7", "fig8") else {}
         )
         if measured and name == "fig4":
             given["measured"] = [str(file) for file in measured]
@@ -96,9 +93,7 @@ def reproduce(
         if full:
             out().print(f"{name}: {FIGURES[name].about} ({size}, {took})")
         else:
-            out().print(
-                f"{name}: quick sketch, {_computed(results, name)} ({took}); with --full {FIGURES[name].about}"
-            )
+            out().print(f"{name}: quick sketch, {_computed(results, name)} ({took}); with --full {FIGURES[name].about}")
         for file in files:
             out().print(f"  {file_line(file)}")
     if figure in ("claims", "all"):
@@ -126,9 +121,7 @@ def _computed(results: Any, name: str) -> str:
     return ", ".join(words) or "with a small grid"
 
 
-def _check_measured(
-    figure: str, names: list[str], measurements: Path | None, measured: list[Path] | None
-) -> None:
+def _check_measured(figure: str, names: list[str], measurements: Path | None, measured: list[Path] | None) -> None:
     """Refuse, before anything is computed, measured responses and runs that cannot be shown."""
     from snapbeam.cli.console import read_overlay
     from snapbeam.model.default_values import BEAM

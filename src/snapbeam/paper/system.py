@@ -31,9 +31,28 @@ def paper_model(modes: int, damping_ratio: ArrayLike = DAMPING_RATIO) -> sb.Redu
     return sb.ReducedModel.from_beam(BEAM, modes=modes, damping_ratio=damping_ratio)
 
 
-def paper_run(
-    modes: int, frequency_ratio: float, velocity_amplitude: float, cycles: int, **more: Any
-) -> sb.Run:
+def struck_beam(
+    frequency_ratio: float = 1.2,
+    velocity_amplitude: float = 0.18,
+    *,
+    modes: int = 1,
+    damping_ratio: float = DAMPING_RATIO,
+    location: float = LOCATION,
+) -> sb.System:
+    """Return the paper's beam on its first *modes* buckling modes, struck by the paper's shaker.
+
+    Examples
+    --------
+    >>> from snapbeam import paper
+    >>> system = paper.struck_beam(frequency_ratio=1.4, velocity_amplitude=0.1, modes=8)
+    >>> system.model.modes
+    8
+    """
+    shaker = sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location)
+    return sb.System(paper_model(modes, damping_ratio), contacts=[sb.Contact(CONTACT, shaker.striker())])
+
+
+def paper_run(modes: int, frequency_ratio: float, velocity_amplitude: float, cycles: int, **more: Any) -> sb.Run:
     """Simulate the paper's beam and shaker.
 
     *more* may hold the location, the reference frequency, the sample times, and options of an
@@ -41,14 +60,10 @@ def paper_run(
     """
     location, sample_times = more.pop("location", LOCATION), more.pop("sample_times", None)
     model = replace(paper_model(modes), given_reference_frequency=more.pop("reference_frequency", None))
-    shaker = sb.Shaker(
-        frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location
-    )
+    shaker = sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location)
     integration = sb.Integration(cycles=cycles, **more)
     return sb.simulate(
-        sb.System(model, contacts=[sb.Contact(CONTACT, shaker.striker())]),
-        integration,
-        sample_times=sample_times,
+        sb.System(model, contacts=[sb.Contact(CONTACT, shaker.striker())]), integration, sample_times=sample_times
     )
 
 
@@ -88,13 +103,7 @@ def class_map(results: Results, what: str, model: sb.ReducedModel, **options: An
 
 
 def relative_map(
-    results: Results,
-    what: str,
-    modes: int,
-    frequency_ratio: float,
-    locations: _Array,
-    relative: _Array,
-    cycles: int,
+    results: Results, what: str, modes: int, frequency_ratio: float, locations: _Array, relative: _Array, cycles: int
 ) -> xr.Dataset:
     """Classes over location and V/V_QS1(x_s), with V as a coordinate of two dimensions.
 
@@ -120,20 +129,12 @@ def relative_map(
         ds = ds[list(KEPT)].rename(velocity_amplitude="relative_amplitude")
         ds = ds.assign_coords(
             relative_amplitude=("relative_amplitude", relative, {"units": "1", "long_name": "V/V_QS1"}),
-            velocity_amplitude=(
-                "relative_amplitude",
-                amplitude,
-                {"units": "1", "long_name": "velocity amplitude V"},
-            ),
+            velocity_amplitude=("relative_amplitude", amplitude, {"units": "1", "long_name": "velocity amplitude V"}),
         )
         columns.append(ds)
         results.progress(what)(at + 1, len(locations))
     joined = xr.concat(
-        columns,
-        dim="location",
-        coords=["velocity_amplitude"],
-        compat="equals",
-        combine_attrs="drop_conflicts",
+        columns, dim="location", coords=["velocity_amplitude"], compat="equals", combine_attrs="drop_conflicts"
     )
     joined.attrs.pop("location", None)
     # a column is a map of its own, with its own time and parameters

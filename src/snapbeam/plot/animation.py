@@ -116,11 +116,7 @@ def animate_run(
 
 
 def write_frames(
-    frames: Iterable[Figure],
-    path: str | os.PathLike[str],
-    *,
-    fps: float = 25.0,
-    dots_per_inch: float = _DOTS_PER_INCH,
+    frames: Iterable[Figure], path: str | os.PathLike[str], *, fps: float = 25.0, dots_per_inch: float = _DOTS_PER_INCH
 ) -> Path:
     """Write figures of one size, one after the other, as the frames of an MP4 (H.264) or a GIF."""
     target = check_writable(path, "animate", ANIMATION_SUFFIXES)
@@ -185,17 +181,10 @@ def write_mp4(pictures: Iterable[NDArray[np.uint8]], path: Path, rate: float) ->
 def _write_gif(pictures: Iterator[NDArray[np.uint8]], path: Path, rate: float) -> None:
     from PIL import Image
 
-    images = [
-        Image.fromarray(picture).quantize(_GIF_COLORS, dither=Image.Dither.NONE) for picture in pictures
-    ]
+    images = [Image.fromarray(picture).quantize(_GIF_COLORS, dither=Image.Dither.NONE) for picture in pictures]
     if not images:
         raise InputError("frames: must hold at least one figure")
-    look: dict[str, Any] = {
-        "duration": 1000.0 / rate,
-        "loop": 0,
-        "optimize": True,
-        "comment": MADE_BY.encode(),
-    }
+    look: dict[str, Any] = {"duration": 1000.0 / rate, "loop": 0, "optimize": True, "comment": MADE_BY.encode()}
     images[0].save(path, save_all=True, append_images=images[1:], **look)
 
 
@@ -206,9 +195,7 @@ def _span(dataset: xr.Dataset, window: tuple[float, float] | None) -> tuple[floa
     return float(time[0]), float(time[-1])
 
 
-def _hardest_impact(
-    dataset: xr.Dataset, time: _Array, start: float, stop: float
-) -> tuple[float, float] | None:
+def _hardest_impact(dataset: xr.Dataset, time: _Array, start: float, stop: float) -> tuple[float, float] | None:
     """From half its length before the impact with the maximum force to half its length after."""
     if "contact_force" not in dataset:
         return None

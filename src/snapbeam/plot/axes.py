@@ -31,9 +31,7 @@ _LONGEST = 44
 """Characters of a line along an axis of a picture of one column."""
 _SMALL, _LARGE = 0.01, 1e4
 """Between these the maximum number along an axis of a unit without prefixes is shown as it is."""
-_WITH_PREFIX = frozenset(
-    ("m", "m/s", "s", "N", "N/m", "N m", "Pa", "Hz", "ohm", "F", "H", "V", "A", "W", "J")
-)
+_WITH_PREFIX = frozenset(("m", "m/s", "s", "N", "N/m", "N m", "Pa", "Hz", "ohm", "F", "H", "V", "A", "W", "J"))
 """Units that take a prefix of the SI, from 1 and up to 10,000 of which none is needed."""
 _PLAIN = {"um": "µm"}
 """Units of parameters as figures write them."""

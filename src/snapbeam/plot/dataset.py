@@ -54,9 +54,7 @@ _Starts = Callable[["xr.Dataset", "tuple[float, float] | None"], "Start | None"]
 
 def _of_state(dataset: xr.Dataset, state: xr.DataArray, parameters: dict[str, float]) -> Start:
     names = [str(name) for name in dataset["coordinate"].values]
-    return Start(
-        parameters, dict(zip(names, state.values.tolist(), strict=True)), int(dataset.attrs["period"])
-    )
+    return Start(parameters, dict(zip(names, state.values.tolist(), strict=True)), int(dataset.attrs["period"]))
 
 
 def _orbit_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start:
@@ -98,9 +96,7 @@ def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
         if item.dtype.kind in "biuf" and set(item.dims) == over and name != "response_class"
     ]
     others.sort(key="status".__eq__)  # what the runs did comes first, how they ended last
-    return {"response_class": plot_response_map} | {
-        name: partial(plot_statistic, name=name) for name in others
-    }
+    return {"response_class": plot_response_map} | {name: partial(plot_statistic, name=name) for name in others}
 
 
 def _swept(dataset: xr.Dataset) -> dict[str, _Draws]:
@@ -110,9 +106,7 @@ def _swept(dataset: xr.Dataset) -> dict[str, _Draws]:
 
 def _lifetimes(dataset: xr.Dataset) -> dict[str, _Draws]:
     figures: dict[str, _Draws] = {"lifetime": dynamics.plot_lifetimes} if dataset["lifetime"].ndim else {}
-    return figures | (
-        {"survival": dynamics.plot_survival} if dataset["lifetime"].size <= dynamics.MAX_CURVES else {}
-    )
+    return figures | ({"survival": dynamics.plot_survival} if dataset["lifetime"].size <= dynamics.MAX_CURVES else {})
 
 
 def _section(dataset: xr.Dataset) -> dict[str, _Draws]:
@@ -193,9 +187,7 @@ _KINDS = (
 
 def _kind_of(dataset: xr.Dataset) -> _Kind:
     for kind in _KINDS:
-        if kind.variables <= set(map(str, dataset.variables)) and kind.dimensions <= set(
-            map(str, dataset.dims)
-        ):
+        if kind.variables <= set(map(str, dataset.variables)) and kind.dimensions <= set(map(str, dataset.dims)):
             return kind
     known = ", ".join(map(str, dataset.data_vars)) or "none"
     raise InputError(
@@ -222,9 +214,7 @@ def start_of(dataset: xr.Dataset) -> _Starts | None:
 
 
 @checked
-def plot_dataset(
-    dataset: xr.Dataset, variable: str | None = None, ax: Axes | None = None, **options: Any
-) -> Axes:
+def plot_dataset(dataset: xr.Dataset, variable: str | None = None, ax: Axes | None = None, **options: Any) -> Axes:
     """Draw a result of any kind; ``dataset.snapbeam.plot`` calls this function.
 
     Parameters
@@ -242,9 +232,7 @@ def plot_dataset(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> run = sb.simulate(system, sb.Integration(cycles=10))
     >>> ax = sb.plot.plot_dataset(run.dataset, "phase_portrait")
     >>> ax = run.dataset.snapbeam.plot()

@@ -66,9 +66,7 @@ def plot_diagram(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> diagram = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", [0.02, 0.03, 0.04])
     >>> ax = sb.plot.plot_diagram(diagram)
     """
@@ -76,9 +74,7 @@ def plot_diagram(
     if dataset is None and not branches:
         raise InputError("dataset: give a diagram or at least one branch")
     if branches and variable != "midspan_displacement":
-        raise InputError(
-            f"variable = {variable!r}: branches have midspan_displacement alone; draw one or the other"
-        )
+        raise InputError(f"variable = {variable!r}: branches have midspan_displacement alone; draw one or the other")
     first = dataset if dataset is not None else branches[0]
     along = str(getattr(first, "attrs", {}).get("parameter", ""))
     for name, each in [("dataset", dataset), *(("branches", branch) for branch in branches)]:
@@ -152,16 +148,9 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     x, stable = branch[along].values, branch["stable"].values
     returns = branch["midspan_returns"].transpose("return", "orbit").values
     after = branch["special_point_index"].values.astype(int) + 1
-    near = (
-        np.array([returns[:, at - 1 : at + 1].mean(axis=1) for at in after])
-        .reshape(after.size, len(returns))
-        .T
-    )
+    near = np.array([returns[:, at - 1 : at + 1].mean(axis=1) for at in after]).reshape(after.size, len(returns)).T
     # the curve passes through its special points
-    x, returns = (
-        np.insert(x, after, branch["special_point_value"].values),
-        np.insert(returns, after, near, axis=1),
-    )
+    x, returns = (np.insert(x, after, branch["special_point_value"].values), np.insert(returns, after, near, axis=1))
     stable = np.insert(stable, after, stable[after - 1])
     # up to the stable orbits beside them, so that no gap is left
     beside = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
@@ -186,11 +175,7 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
 
 @checked
 def plot_lifetimes(
-    dataset: xr.Dataset,
-    ax: Axes | None = None,
-    *,
-    limits: tuple[float, float] | None = None,
-    legend: bool = True,
+    dataset: xr.Dataset, ax: Axes | None = None, *, limits: tuple[float, float] | None = None, legend: bool = True
 ) -> Axes:
     """Draw the lifetime of snapping: along one parameter with its interval, or over two in colours.
 
@@ -201,9 +186,7 @@ def plot_lifetimes(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> axes = {"drive.velocity_amplitude": [0.1, 0.2]}
     >>> settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
     >>> lifetimes = sb.dynamics.lifetime_map(
@@ -250,21 +233,10 @@ def _lifetime_line(dataset: xr.Dataset, ax: Axes, x: Any, legend: bool) -> None:
     ax.set(yscale="log", ylim=(0.5 * float(ends.min()) if ends.size else 0.1, top))
     ax.set_ylabel("Lifetime of snapping (cycles)")
     none, going = np.isnan(value), dataset["runs_snapping"].values > 0
-    for which, height, mark, words in (
-        (none & ~going, 0.03, "v", _NONE),
-        (none & going, 0.97, "^", _ENDLESS),
-    ):
+    for which, height, mark, words in ((none & ~going, 0.03, "v", _NONE), (none & going, 0.97, "^", _ENDLESS)):
         if which.any():
             at = np.full(int(which.sum()), height)
-            ax.plot(
-                x[which],
-                at,
-                mark,
-                color="0.4",
-                markersize=3.5,
-                transform=ax.get_xaxis_transform(),
-                label=words,
-            )
+            ax.plot(x[which], at, mark, color="0.4", markersize=3.5, transform=ax.get_xaxis_transform(), label=words)
     if legend:
         legend_below(ax)
 
@@ -301,9 +273,7 @@ def _lifetime_cells(
 
 
 @checked
-def plot_survival(
-    dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequence[str] | None = None
-) -> Axes:
+def plot_survival(dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequence[str] | None = None) -> Axes:
     """Draw the fraction of runs that still snap over cycles, and the fitted exponential, for up to five points.
 
     The curve ends ``settling_cycles`` before the end of the runs.  A ring there marks the fraction of right-censored
@@ -313,9 +283,7 @@ def plot_survival(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> axes = {"drive.velocity_amplitude": [0.1, 0.2]}
     >>> settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
     >>> lifetimes = sb.dynamics.lifetime_map(
@@ -332,9 +300,7 @@ def plot_survival(
     tau, delay = (np.atleast_1d(runs[name].values).ravel() for name in ("lifetime", "delay"))
     with frame(ax, dataset) as ax:
         seen = float(dataset.attrs["cycles"]) - float(dataset.attrs["settling_cycles"])
-        settled = runs["final_well_proven"].values.astype(bool) | (
-            runs["status"].values == int(RunStatus.EARLY_STOP)
-        )
+        settled = runs["final_well_proven"].values.astype(bool) | (runs["status"].values == int(RunStatus.EARLY_STOP))
         settled = np.atleast_2d(settled).reshape(rows.shape)
         good = rows.shape[1] - np.atleast_1d(runs["runs_failed"].values).ravel()
         open_ends = False
@@ -356,9 +322,7 @@ def plot_survival(
             if np.isfinite(tau[i]) and np.isfinite(delay[i]):
                 begun = float((row > delay[i]).sum() / good[i])
                 t = np.linspace(delay[i], times[-1], 200)
-                ax.plot(
-                    t, begun * np.exp(-(t - delay[i]) / tau[i]), color=color, dashes=(4, 2), linewidth=0.7
-                )
+                ax.plot(t, begun * np.exp(-(t - delay[i]) / tau[i]), color=color, dashes=(4, 2), linewidth=0.7)
         ax.set(xlabel="Cycles", ylabel="Fraction of runs still snapping", yscale="log")
         ax.set_ylim(0.6 / rows.shape[1], 1.3)
         ax.set_xlim(left=0.0)
@@ -405,9 +369,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> ax = sb.plot.plot_exponents(sb.dynamics.lyapunov_spectrum(system, periods=40, transient=20))
     """
     contains(dataset, "exponents", "exponent")
@@ -428,9 +390,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     with frame(ax, dataset) as ax:
         if "running" in dataset:
             _running(factor * dataset["running"], ax)
-            ax.set(
-                xlabel="Periods of the excitation", ylabel=f"Lyapunov exponent so far ({unit})", xscale="log"
-            )
+            ax.set(xlabel="Periods of the excitation", ylabel=f"Lyapunov exponent so far ({unit})", xscale="log")
         elif len(dims) == 1:
             _exponent_line(dataset, ax, dims[0], value.values, error.values)
             ax.set_ylabel(f"Largest Lyapunov exponent\n({unit})")
@@ -463,13 +423,7 @@ def _exponent_line(dataset: xr.Dataset, ax: Axes, name: str, value: Any, error: 
     x, _ = positions(dataset, name)
     ax.axhline(0.0, color="0.6", linewidth=0.5)
     ax.fill_between(
-        x,
-        value - 2 * error,
-        value + 2 * error,
-        color="0.6",
-        alpha=0.35,
-        linewidth=0.0,
-        label="two standard errors",
+        x, value - 2 * error, value + 2 * error, color="0.6", alpha=0.35, linewidth=0.0, label="two standard errors"
     )
     ax.plot(x, value, color="0.45", linewidth=0.6)
     settled, chaotic = value + 2 * error < 0.0, value - 2 * error > 0.0
@@ -517,9 +471,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=200)
     >>> ax = sb.plot.plot_multipliers(orbit.to_dataset())
     """
@@ -537,9 +489,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
                 (outside, "^", _RED, "outside: grows"),
             ):
                 if which.any():
-                    ax.plot(
-                        values[which].real, values[which].imag, mark, color=color, markersize=3.5, label=words
-                    )
+                    ax.plot(values[which].real, values[which].imag, mark, color=color, markersize=3.5, label=words)
             ax.set_aspect("equal", adjustable="datalim")
             ax.set(xlabel="Floquet multiplier, real part", ylabel="Floquet multiplier, imaginary part")
             legend_below(ax)
@@ -548,10 +498,7 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 @checked
 def plot_backbone(
-    datasets: xr.Dataset | Sequence[xr.Dataset],
-    ax: Axes | None = None,
-    *,
-    labels: Sequence[str] | None = None,
+    datasets: xr.Dataset | Sequence[xr.Dataset], ax: Axes | None = None, *, labels: Sequence[str] | None = None
 ) -> Axes:
     """Draw backbone curves: the amplitude at mid-span over the frequency; unstable motions are dashed.
 
@@ -628,10 +575,7 @@ _CURVE_MARKS = {
 
 @checked
 def plot_bifurcation_curve(
-    datasets: xr.Dataset | Sequence[xr.Dataset],
-    ax: Axes | None = None,
-    *,
-    labels: Sequence[str] | None = None,
+    datasets: xr.Dataset | Sequence[xr.Dataset], ax: Axes | None = None, *, labels: Sequence[str] | None = None
 ) -> Axes:
     """Draw bifurcation curves over their two parameters, on a response map too.
 
@@ -651,9 +595,7 @@ def plot_bifurcation_curve(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
     >>> names, bounds = ("frequency_ratio", "velocity_amplitude"), ((1.5, 1.7), (0.02, 0.1))
@@ -663,9 +605,7 @@ def plot_bifurcation_curve(
     from snapbeam.util.datasets import xr
 
     curves: list[xr.Dataset] = []
-    for each in (
-        [datasets] if isinstance(datasets, xr.Dataset) else datasets
-    ):  # one by one: there may be very many
+    for each in [datasets] if isinstance(datasets, xr.Dataset) else datasets:  # one by one: there may be very many
         curves.append(instance("datasets", each, xr.Dataset, "a dataset, or several"))
     if not curves:
         raise InputError("datasets = []: must hold at least one bifurcation curve")
@@ -689,9 +629,7 @@ def plot_bifurcation_curve(
             ax.plot(x, y, _CURVE_LINES[kind], color=color, label=label, linewidth=1.0)
             for at, words in enumerate(curve["special_point_kind"].values):
                 place = [float(curve[f"special_point_{name}"][at]) for name in names]
-                ax.plot(
-                    *place, _CURVE_MARKS.get(str(words), "o"), color=color, markersize=4.0, label=str(words)
-                )
+                ax.plot(*place, _CURVE_MARKS.get(str(words), "o"), color=color, markersize=4.0, label=str(words))
         if new:
             dress(ax.xaxis, curves[0], names[0])
             dress(ax.yaxis, curves[0], names[1])
@@ -714,9 +652,7 @@ def _multipliers_along(dataset: xr.Dataset, ax: Axes, sizes: Any) -> None:
         label = f"multiplier {number + 1}"
         ax.plot(dataset[along].values, sizes[:, number], color=color_of(number, shown), label=label)
     ax.axhline(1.0, color=_RED, linewidth=0.8, dashes=(4, 2), label="limit of stability")
-    for value, kind in zip(
-        dataset["special_point_value"].values, dataset["special_point_kind"].values, strict=True
-    ):
+    for value, kind in zip(dataset["special_point_value"].values, dataset["special_point_kind"].values, strict=True):
         ax.axvline(float(value), color="0.6", linewidth=0.5)
         ax.annotate(
             str(kind), (float(value), 1.0), (2.0, -3.0), xycoords=("data", "axes fraction"),
@@ -744,9 +680,7 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> attractors = sb.dynamics.find_attractors(system, 12)
     >>> ax = sb.plot.plot_attractors(attractors.to_dataset())
     """
@@ -781,9 +715,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> ax = sb.plot.plot_section(sb.dynamics.poincare_section(system, "impact", 20, transient=20))
     """
     y = x.replace("displacement", "velocity")
@@ -791,12 +723,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     with frame(ax, dataset) as ax:
         # few points are large, and many do not run into one another
         size = float(np.clip(20.0 / np.sqrt(dataset[x].size), 0.8, 3.0))
-        look: dict[str, Any] = {
-            "color": _BLUE,
-            "markersize": size,
-            "markeredgewidth": 0.0,
-            "rasterized": True,
-        }
+        look: dict[str, Any] = {"color": _BLUE, "markersize": size, "markeredgewidth": 0.0, "rasterized": True}
         ax.plot(dataset[x].values, dataset[y].values, "o", **look)
         # a point that repeats is not magnified to its rounding errors
         for limits, name in (("xlim", x), ("ylim", y)):
@@ -820,9 +747,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> grid = {"amplitude[1]": [-1.2, 0.0, 1.2], "velocity[1]": [-0.5, 0.5]}
     >>> ax = sb.plot.plot_basins(sb.dynamics.basins_of_attraction(found, grid))
@@ -841,9 +766,7 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         norm = BoundaryNorm(np.arange(-1.5, count), count + 1)
         ax.pcolormesh(*edges, labels.T, cmap=ListedColormap(colors), norm=norm, rasterized=True)
         for points in dataset["attractor_points"].values:
-            ax.plot(
-                *points.T, "o", color="black", markerfacecolor="white", markersize=3.0, markeredgewidth=0.8
-            )
+            ax.plot(*points.T, "o", color="black", markerfacecolor="white", markersize=3.0, markeredgewidth=0.8)
         for axis, name in ((ax.xaxis, names[0]), (ax.yaxis, names[1])):
             axis.set_label_text(_coordinate(name))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
@@ -881,9 +804,7 @@ def plot_manifold(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05)
-    >>> shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> ax = sb.plot.plot_manifold(sb.dynamics.invariant_manifold(saddle, max_arclength=1.0))
     """
@@ -911,19 +832,10 @@ def plot_tangency(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     crosses, value = dataset["crosses"].values, dataset["value"].values
     with frame(ax, dataset, height=48.0) as ax:
         for state, color, label in ((False, cm.batlow(0.15), "apart"), (True, _RED, "crossing")):
-            ax.plot(
-                value[crosses == state],
-                crosses[crosses == state],
-                "o",
-                color=color,
-                markersize=3.0,
-                label=label,
-            )
+            ax.plot(value[crosses == state], crosses[crosses == state], "o", color=color, markersize=3.0, label=label)
         bracket = dataset["bracket"].values
         if np.isfinite(bracket).all():
-            ax.axvspan(
-                bracket.min(), bracket.max(), color="0.8", linewidth=0.0, label="bracket of the tangency"
-            )
+            ax.axvspan(bracket.min(), bracket.max(), color="0.8", linewidth=0.0, label="bracket of the tangency")
         # the long name of the values is that of the parameter
         ax.set_xlabel(str(dataset["value"].attrs["long_name"]))
         ax.set(ylabel="Manifolds", yticks=[0, 1], yticklabels=["apart", "crossing"], ylim=(-0.5, 1.5))
@@ -938,14 +850,7 @@ def plot_homoclinic(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     names, new = [str(name) for name in dataset["coordinate"].values], ax is None
     with frame(ax, dataset) as ax:
         label = f"homoclinic points, {dataset.sizes['point']}"
-        ax.plot(
-            *dataset["state"].values.T,
-            "o",
-            color=_BLACK,
-            markerfacecolor="white",
-            markersize=4.0,
-            label=label,
-        )
+        ax.plot(*dataset["state"].values.T, "o", color=_BLACK, markerfacecolor="white", markersize=4.0, label=label)
         if new:
             ax.set(xlabel=_coordinate(names[0]), ylabel=_coordinate(names[1]))
         ax.legend(loc="best")
@@ -968,9 +873,7 @@ def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         ax.plot(period, values, "o-", label="state between the two outcomes", **look)
         kind = f"unstable orbit of period {points.size}, {out} multiplier{'s' if out != 1 else ''} above 1"
         for i, point in enumerate(points):
-            ax.axhline(
-                point, color=_RED, linewidth=0.9, dashes=(4, 2), label=kind if i == 0 else None, zorder=3
-            )
+            ax.axhline(point, color=_RED, linewidth=0.9, dashes=(4, 2), label=kind if i == 0 else None, zorder=3)
         ax.margins(y=0.12)
         legend_below(ax)
         ax.set(xlabel="Period of the drive", ylabel=_coordinate(name))
@@ -1007,13 +910,7 @@ def _well_of(name: str, amplitudes: np.ndarray) -> str:
     known = amplitudes[np.isfinite(amplitudes)]
     if name != "amplitude[1]" or not known.size:
         return ""
-    return (
-        " in the upper well"
-        if known.min() > 0.0
-        else " in the lower well"
-        if known.max() < 0.0
-        else ", interwell"
-    )
+    return " in the upper well" if known.min() > 0.0 else " in the lower well" if known.max() < 0.0 else ", interwell"
 
 
 def _coordinate(name: str) -> str:

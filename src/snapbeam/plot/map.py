@@ -87,9 +87,7 @@ def plot_response_map(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> axes = {"drive.frequency_ratio": [0.7, 0.8], "drive.velocity_amplitude": [0.1, 0.2]}
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_response_map(dataset)
@@ -246,10 +244,7 @@ def draw_quasi_static_line(
         line = x, quasi_static_threshold(_given(fixed, "location"), x)
     line = wide * line[0], high * line[1]
     ax.plot(*line, color="white", linewidth=1.8)
-    inside = [
-        (min(lim) < at) & (at < max(lim))
-        for at, lim in zip(line, (ax.get_xlim(), ax.get_ylim()), strict=True)
-    ]
+    inside = [(min(lim) < at) & (at < max(lim)) for at, lim in zip(line, (ax.get_xlim(), ax.get_ylim()), strict=True)]
     where = "" if np.logical_and(*inside).any() else ": outside the map"
     label = rf"quasi-static, $V_\mathrm{{QS1}}${where}"
     return ax.plot(*line, color="black", linewidth=0.9, dashes=(4, 2), label=label)[0]
@@ -296,9 +291,7 @@ def draw_measurements(
     ends = zip(where, (ax.get_xlim(), ax.get_ylim()), strict=True)
     outside = np.any([(at < low) | (at > high) for at, (low, high) in ends], axis=0)
     if outside.any():
-        warnings.warn(
-            f"{int(outside.sum())} of {len(measurements)} measured points lie outside the map", stacklevel=3
-        )
+        warnings.warn(f"{int(outside.sum())} of {len(measurements)} measured points lie outside the map", stacklevel=3)
     ax.scatter(*where, s=26, c="white", linewidths=0.0, zorder=3)
     ax.scatter(*where, s=14, c=colors, edgecolors="black", linewidths=0.6, zorder=4)
     return Line2D(
@@ -316,9 +309,7 @@ _DECADES = 300.0
 
 
 @checked
-def plot_statistic(
-    dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None
-) -> Axes:
+def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None) -> Axes:
     """Draw a statistic of a map: colours over two axes, a curve over one, coloured dots of a list of points.
 
     Cells of runs that failed, or that have none of it, are grey.
@@ -338,9 +329,7 @@ def plot_statistic(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> axes = {"drive.frequency_ratio": [0.7, 0.8], "drive.velocity_amplitude": [0.1, 0.2]}
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_statistic(dataset, "peak_force")
@@ -370,9 +359,7 @@ def plot_statistic(
                 _swept(ax, dataset, data, dims[1])
             else:
                 points, _ = positions(dataset, dims[0])
-                ax.plot(
-                    points, data.values, ".-", color=BEAM_COLOR, markersize=1.5 * marker_size(points.size)
-                )
+                ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=1.5 * marker_size(points.size))
             dress(ax.xaxis, dataset, dims[-1])
             ax.set_ylabel(label)
             ax.set_yscale("log" if log else "linear")
@@ -491,9 +478,7 @@ def plot_points(
     >>> import snapbeam as sb
     >>> import xarray as xr
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> points = xr.Dataset(
     ...     {
     ...         "drive.frequency_ratio": ("point", [0.7, 0.75, 0.8]),
@@ -545,11 +530,7 @@ def _over(
         values = np.unique(dataset[name].values) if name in dataset.coords else np.empty(0)
         fixed[name] = float(values[0]) if values.size == 1 else None
     handles: list[Any] = [draw_quasi_static_line(ax, dataset, *along, fixed)] if line else []
-    return (
-        handles
-        if measurements is None
-        else [*handles, draw_measurements(ax, measurements, dataset, *along, fixed)]
-    )
+    return handles if measurements is None else [*handles, draw_measurements(ax, measurements, dataset, *along, fixed)]
 
 
 def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple[str, str]:
@@ -561,9 +542,7 @@ def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple
     ]
     for what, given in (("across", across), ("upward", upward)):
         if given is not None and given not in names:
-            raise InputError(
-                f"{what} = {shown(given)}: the points are given by {', '.join(names) or 'nothing'}"
-            )
+            raise InputError(f"{what} = {shown(given)}: the points are given by {', '.join(names) or 'nothing'}")
     ratios = {name: ratio_along(dataset, name)[0] for name in names}
     known = {ratio for name, ratio in ratios.items() if ratio != name}  # in the unit in which they were given
     names = [name for name in names if name not in known]
@@ -575,9 +554,7 @@ def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple
     if across is None:
         across = next((name for name in free if name != upward), None)
     if across is None or upward is None or across == upward:
-        raise InputError(
-            f"points are drawn over two parameters; these are given by {', '.join(names) or 'none'}"
-        )
+        raise InputError(f"points are drawn over two parameters; these are given by {', '.join(names) or 'none'}")
     return across, upward
 
 
@@ -598,9 +575,7 @@ def _place(axis: Axis, dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
     return places
 
 
-def _statistic(
-    ax: Axes, dataset: xr.Dataset, name: str, at: list[NDArray[np.float64]], look: dict[str, Any]
-) -> None:
+def _statistic(ax: Axes, dataset: xr.Dataset, name: str, at: list[NDArray[np.float64]], look: dict[str, Any]) -> None:
     """Dots in colours by their value; those without one are hollow."""
     values, label = scaled_values(dataset, name)
     good = np.isfinite(values)

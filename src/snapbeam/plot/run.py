@@ -81,9 +81,7 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_modal_amplitudes(run, modes=2)
     """
@@ -106,9 +104,7 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
 def _well_amplitude(dataset: xr.Dataset) -> float | None:
     """Amplitude of the first mode in a well: b = 2 sqrt(2 L)/(2 pi) alpha_1, from the attributes."""
     if {"beam_length", "beam_buckling_level"} <= set(dataset.attrs):
-        return float(
-            np.pi * dataset.attrs["beam_buckling_level"] / np.sqrt(2.0 * dataset.attrs["beam_length"])
-        )
+        return float(np.pi * dataset.attrs["beam_buckling_level"] / np.sqrt(2.0 * dataset.attrs["beam_length"]))
     return None
 
 
@@ -127,9 +123,7 @@ def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_energies(run)
     """
@@ -148,11 +142,7 @@ def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
 
 @checked
 def plot_spectrum(
-    run: Run | xr.Dataset,
-    ax: Axes | None = None,
-    *,
-    variable: str | None = None,
-    window: Any = None,
+    run: Run | xr.Dataset, ax: Axes | None = None, *, variable: str | None = None, window: Any = None
 ) -> Axes:
     """Draw the amplitude spectrum of a run, from evenly spaced samples under a Hann window, or an estimated density.
 
@@ -175,9 +165,7 @@ def plot_spectrum(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_spectrum(run)
     >>> motion = sb.RecordedAcceleration.from_psd("NAVMAT P-9492", duration_s=2.0)
@@ -204,16 +192,12 @@ def plot_spectrum(
 _FREQUENCY = {"cycle": r"Frequency $f\,/\,f_\mathrm{excitation}$", "time": "Frequency (Hz)"}
 
 
-def _even_samples(
-    run: Run | xr.Dataset, variable: str | None, window: Any
-) -> tuple[xr.Dataset, str, str, Any, Any]:
+def _even_samples(run: Run | xr.Dataset, variable: str | None, window: Any) -> tuple[xr.Dataset, str, str, Any, Any]:
     """The dataset of a run, the variable that is drawn, the one it is drawn over, and even samples of both."""
     dataset = dataset_of(run)
     if variable is None:
         variable = "midspan_displacement" if "midspan_displacement" in dataset else "displacement_at_striker"
-    choice(
-        "variable", variable, tuple(str(key) for key in dataset.data_vars if dataset[key].dims == ("time",))
-    )
+    choice("variable", variable, tuple(str(key) for key in dataset.data_vars if dataset[key].dims == ("time",)))
     name, _ = across(dataset)
     x, y = dataset[name].values, dataset[variable].values
     if window is not None:
@@ -274,9 +258,7 @@ def plot_spectrogram(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_spectrogram(run, segment=4.0)
     """
@@ -350,19 +332,11 @@ def plot_frequency_response(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
         for each, name in zip(axes, ("magnitude", "phase"), strict=False):
             values, error = dataset[name].values, 2.0 * dataset[f"{name}_se"].values
             low = np.maximum(values - error, 1e-3 * values) if name == "magnitude" else values - error
-            each.fill_between(
-                f, low, values + error, where=coherent, color=BEAM_COLOR, alpha=0.25, linewidth=0.0
-            )
-            style = (
-                {"linewidth": 0.8}
-                if name == "magnitude"
-                else {"linestyle": "", "marker": ".", "markersize": 1.5}
-            )
+            each.fill_between(f, low, values + error, where=coherent, color=BEAM_COLOR, alpha=0.25, linewidth=0.0)
+            style = {"linewidth": 0.8} if name == "magnitude" else {"linestyle": "", "marker": ".", "markersize": 1.5}
             each.plot(f, values, color="0.75", **style)
             each.plot(f, np.where(coherent, values, np.nan), color=BEAM_COLOR, **style)
-        axes[0].set(
-            yscale="log", ylabel=f"Magnitude ({dataset['magnitude'].attrs['units']})", xlim=(f[0], f[-1])
-        )
+        axes[0].set(yscale="log", ylabel=f"Magnitude ({dataset['magnitude'].attrs['units']})", xlim=(f[0], f[-1]))
         if axes.size > 1:
             axes[1].set(ylabel="Phase (rad)", ylim=(-3.3, 3.3))
             axes[2].plot(f, dataset["coherence"].values, color=BEAM_COLOR, linewidth=0.8)
@@ -397,9 +371,7 @@ def plot_perturbation(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     name, label = across(dataset)
     with frame(ax, dataset) as ax:
         ax.plot(
-            dataset[name].values,
-            np.where(dataset["separation"] > 0.0, dataset["separation"], np.nan),
-            color=BEAM_COLOR,
+            dataset[name].values, np.where(dataset["separation"] > 0.0, dataset["separation"], np.nan), color=BEAM_COLOR
         )
         ax.set(yscale="log", xlabel=label)
         ax.set_ylabel(scale_text(dataset.attrs, "Maximum change of the displacement\n$w/b$"))
@@ -446,9 +418,7 @@ def plot_phase_portrait(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_phase_portrait(run)
     """
@@ -467,9 +437,7 @@ def plot_phase_portrait(
                 label="whole cycles",
             )  # fmt: skip
             _legend(ax, 1)
-        ax.set(
-            xlabel=scale_text(dataset.attrs, "Displacement $w/b$"), ylabel=r"Velocity $\dot w\,/\,b\omega_1$"
-        )
+        ax.set(xlabel=scale_text(dataset.attrs, "Displacement $w/b$"), ylabel=r"Velocity $\dot w\,/\,b\omega_1$")
     return ax
 
 
@@ -497,9 +465,7 @@ _MANY = 20_000  # samples above which a curve is stored as pixels in a vector fi
 
 
 @checked
-def plot_run(
-    run: Run | xr.Dataset, window: tuple[float, float] | None = None, ax: Axes | None = None
-) -> Axes:
+def plot_run(run: Run | xr.Dataset, window: tuple[float, float] | None = None, ax: Axes | None = None) -> Axes:
     """Draw the displacements, the penetration and the contact force of a run, and its hardest impact closer.
 
     Left, over cycles of excitation: the whole run or a window.  More than 100 cycles are drawn by the range,
@@ -525,9 +491,7 @@ def plot_run(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_run(run, window=(10.0, 15.0))
     """
@@ -545,9 +509,7 @@ def plot_run(
             x = part[axis_name].values
             _displacements(ax, part, x)
             ax.set(
-                xlabel=label,
-                ylabel=scale_text(dataset.attrs, "Displacement $w/b$"),
-                xlim=(_from(x[0], x[-1]), x[-1]),
+                xlabel=label, ylabel=scale_text(dataset.attrs, "Displacement $w/b$"), xlim=(_from(x[0], x[-1]), x[-1])
             )
             _legend(ax, 3, 0.15)
         return ax
@@ -640,9 +602,7 @@ def cut(dataset: xr.Dataset, across: str, window: tuple[float, float] | None) ->
     inside = (dataset[across].values >= first) & (dataset[across].values <= last)
     if inside.sum() < 2:
         end = float(dataset[across].values[-1])
-        raise InputError(
-            f"window = ({first:g}, {last:g}): must hold at least two samples of a run of {end:g} cycles"
-        )
+        raise InputError(f"window = ({first:g}, {last:g}): must hold at least two samples of a run of {end:g} cycles")
     return dataset.isel(time=_range(inside))
 
 
@@ -719,12 +679,8 @@ def _smooth(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return x, y
     h, secant = np.diff(x), np.diff(y) / np.diff(x)
     before, after, weight = secant[:-1], secant[1:], (h[:-1] + 2.0 * h[1:]) / (3.0 * (h[:-1] + h[1:]))
-    turns = (
-        before * after <= 0.0
-    )  # else a harmonic mean; scipy.interpolate takes a third of a second to import
-    inner = np.where(
-        turns, 0.0, before * after / np.where(turns, 1.0, weight * after + (1.0 - weight) * before)
-    )
+    turns = before * after <= 0.0  # else a harmonic mean; scipy.interpolate takes a third of a second to import
+    inner = np.where(turns, 0.0, before * after / np.where(turns, 1.0, weight * after + (1.0 - weight) * before))
     slope = np.concatenate(([_slope_at_end(h, secant)], inner, [_slope_at_end(h[::-1], secant[::-1])]))
     dense = np.union1d(x, np.linspace(x[0], x[-1], 600))
     i = np.clip(np.searchsorted(x, dense, side="right") - 1, 0, h.size - 1)

@@ -19,14 +19,7 @@ from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import numbered
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
-from snapbeam.plot.style import (
-    BEAM_COLOR,
-    CENTER_COLOR,
-    SERIES_COLORS,
-    SHAKER_COLOR,
-    figure_style,
-    new_figure,
-)
+from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SERIES_COLORS, SHAKER_COLOR, figure_style, new_figure
 from snapbeam.solver.excitation import motion_of
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.validation import InputError, checked, instance
@@ -121,9 +114,7 @@ def _coil(ax: Axes, coil: ElectromagneticHarvester, x: _Array, w: _Array, sign: 
     there = float(np.interp(at, x, w))
     edge = there + 0.03 * sign
     corner = (at - 0.09, min(edge, edge + 0.34 * sign))
-    ax.add_patch(
-        Rectangle(corner, 0.18, 0.34, facecolor="0.55", edgecolor=BEAM_COLOR, linewidth=0.5, zorder=4)
-    )
+    ax.add_patch(Rectangle(corner, 0.18, 0.34, facecolor="0.55", edgecolor=BEAM_COLOR, linewidth=0.5, zorder=4))
     for side in (-1.0, 1.0):
         for turn in range(4):
             y = there + sign * (0.22 + 0.1 * turn)
@@ -189,9 +180,7 @@ def plot_system(system: System, title: str = "") -> Figure:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> figure = sb.plot.plot_system(system, title="Beam of the paper")
     """
     instance("system", system, System, "a System")
@@ -203,10 +192,7 @@ def plot_system(system: System, title: str = "") -> Figure:
         striker = system.striker
         widths = [2.6, 1.0] if striker is not None or system.primary_excitation is not None else [1.0]
         # each part is laid out alone, so that the labels of the motion leave the beam its height
-        axes = [
-            part.subplots()
-            for part in figure.subfigures(1, len(widths), squeeze=False, width_ratios=widths)[0]
-        ]
+        axes = [part.subplots() for part in figure.subfigures(1, len(widths), squeeze=False, width_ratios=widths)[0]]
         _draw_beam(axes[0], system)
         for number, each in enumerate(system.contacts, 1 if system.contacts[1:] else 0):
             _draw_striker(axes[0], system, each.striker, each.law, number)

@@ -272,9 +272,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> sb.plot.save_figure(run.plot(), "run.pdf").name
     'run.pdf'
@@ -285,21 +283,16 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
         assert whole is not None
         figure = whole
     kind = target.suffix.lower().lstrip(".")
-    stamp = {
-        "pdf": {"Creator": MADE_BY, "CreationDate": None},
-        "svg": {"Creator": MADE_BY, "Date": None},
-    }.get(kind, {"Description": MADE_BY})
+    stamp = {"pdf": {"Creator": MADE_BY, "CreationDate": None}, "svg": {"Creator": MADE_BY, "Date": None}}.get(
+        kind, {"Description": MADE_BY}
+    )
     whole_file = io.BytesIO()  # Matplotlib's PDF writer fails in other ways when the disk is full
     try:
         with figure_style():
             figure.savefig(whole_file, format=kind, metadata=stamp)
     except InputError:
         raise
-    except (
-        ArithmeticError,
-        TypeError,
-        ValueError,
-    ) as error:  # of ticks beyond the range of numbers, in many words
+    except (ArithmeticError, TypeError, ValueError) as error:  # of ticks beyond the range of numbers, in many words
         raise InputError(
             f"plot = {str(path)!r}: Matplotlib cannot draw the figure, whose numbers may be too large, too small or too "
             f"close to each other ({str(error).splitlines()[0] if str(error) else type(error).__name__})"
@@ -315,9 +308,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
 
 def beam_text(attrs: Any) -> str:
     """Short description of the beam from the attributes of a file; empty without one."""
-    attrs = {
-        name.removeprefix("fixed_"): value for name, value in attrs.items()
-    }  # those of designs are fixed
+    attrs = {name.removeprefix("fixed_"): value for name, value in attrs.items()}  # those of designs are fixed
     if not {"beam_length", "beam_thickness"} <= set(attrs):
         return ""
     words = [f"beam {prefixed(attrs['beam_length'], 'm')} × {prefixed(attrs['beam_thickness'], 'm')}"]
@@ -354,16 +345,10 @@ def caption(dataset: xr.Dataset, lines: int = 1, axes: Collection[str] = ()) -> 
     for name, each in PHYSICAL.items():
         row, ratio = lookup(name), lookup(each.parameter).short
         named = ratio in ("frequency_ratio", "velocity_amplitude") or name.startswith("base_excitation")
-        if (
-            row.short in dataset.coords
-            and not named
-            and (value := fixed_value(dataset, row.short, axes)) is not None
-        ):
+        if row.short in dataset.coords and not named and (value := fixed_value(dataset, row.short, axes)) is not None:
             unit = row.quantity.unit
             how.append(
-                f"{value:.4g} {'µm' if unit == 'um' else unit}"
-                if unit in ("um", "g")
-                else prefixed(value, unit, 4)
+                f"{value:.4g} {'µm' if unit == 'um' else unit}" if unit in ("um", "g") else prefixed(value, unit, 4)
             )
     how += base_and_load(dataset, axes)
     if "initial_well" in attrs and attrs["initial_well"] != "only":
@@ -476,15 +461,11 @@ def legend_below(ax: Axes, handles: Sequence[Artist] | None = None) -> None:
     alone = len(places) == 1 and figure.get_layout_engine() is not None
     room = figure.bbox.width if alone else 1.15 * ax.get_window_extent().width
     count = len(entries)
-    for columns in (
-        each for each in (3, 2, 1) if each in {-(-count // rows) for rows in range(1, count + 1)}
-    ):
+    for columns in (each for each in (3, 2, 1) if each in {-(-count // rows) for rows in range(1, count + 1)}):
         if alone:
             legend = figure.legend(handles=entries, loc="outside lower center", ncols=columns)
         else:
-            legend = ax.legend(
-                handles=entries, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns
-            )
+            legend = ax.legend(handles=entries, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns)
         if columns == 1 or legend.get_window_extent().width <= room:
             break
         legend.remove()
@@ -521,6 +502,4 @@ def draw_diagnostics(figure: Figure, diagnostics: Iterable[Diagnostic], most: in
     if engine is not None:
         engine.set(rect=(0.0, share, 1.0, 1.0 - share))  # type: ignore[call-arg]
     for k, (text, color) in enumerate(lines):
-        figure.text(
-            1.5 / width, share - (k + 0.9) * _LINE / height, text, color=color, fontsize=5.5, va="baseline"
-        )
+        figure.text(1.5 / width, share - (k + 0.9) * _LINE / height, text, color=color, fontsize=5.5, va="baseline")

@@ -55,9 +55,7 @@ def plot_threshold(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> dataset = sb.threshold(
     ...     system, "drive.velocity_amplitude", [0.02, 0.08, 0.14, 0.2],
     ...     {"drive.frequency_ratio": [1.0, 1.2]}, sb.Integration(cycles=20),
@@ -74,17 +72,13 @@ def plot_threshold(
                 ax.axvline(float(dataset[name]), color="black", linewidth=0.8, linestyle="--")
         return ax
     if len(dims) > 2:
-        raise InputError(
-            f"threshold over {dims}: is drawn along one axis, a curve for each point of another one"
-        )
+        raise InputError(f"threshold over {dims}: is drawn along one axis, a curve for each point of another one")
     along = dims[-1] if len(dims) == 1 or dims[-1] != "modes" else dims[0]
     others = [name for name in dims if name != along]
     raised = str(dataset.attrs.get("parameter", "velocity_amplitude"))
     x, _ = positions(dataset, along)
     edges = edges_of(dataset, along)
-    curves = (
-        [dataset.isel({others[0]: at}) for at in range(dataset.sizes[others[0]])] if others else [dataset]
-    )
+    curves = [dataset.isel({others[0]: at}) for at in range(dataset.sizes[others[0]])] if others else [dataset]
     curves = [curve.squeeze() for curve in curves]
     if len(curves) > len(_STYLES):
         raise InputError(f"dataset: has {len(curves)} curves; at most {len(_STYLES)} can be told apart")
@@ -181,4 +175,6 @@ def _label(dataset: xr.Dataset, curve: xr.Dataset, others: list[str], raised: st
         text = tick_text(dataset, others[0], value, 4).partition(" in ")[0]
         return f"{symbol} = {text}" if symbol else text
     one = wells_of(dataset.attrs) == 1
-    return f"lowest {symbol_of(dataset, raised) or 'value'} {'with snap-through' if one else 'of an interwell response'}"
+    return (
+        f"lowest {symbol_of(dataset, raised) or 'value'} {'with snap-through' if one else 'of an interwell response'}"
+    )

@@ -70,9 +70,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
         raise InputError(f"no designs among {list(map(str, dataset.variables))}")
     names = [str(name) for name in dataset.data_vars]
     objectives = [name[len(_OBJECTIVE) :] for name in names if name.startswith(_OBJECTIVE)]
-    variables = [
-        name[6:] for name in names if name.startswith("tried_") and "parameter" in dataset[name].attrs
-    ]
+    variables = [name[6:] for name in names if name.startswith("tried_") and "parameter" in dataset[name].attrs]
     # an objective that is the only variable is drawn over the distance to its constraint
     known = [*variables, *(name[6:] for name in names if name.startswith("tried_distance_"))]
     if over is not None and over not in known:
@@ -83,14 +81,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     with frame(ax, dataset, height=84.0) as ax:
         x, y = dataset[f"tried_{across}"].values, dataset[f"tried_{up}"].values
         kept = (dataset["violation"].values == 0.0) & np.isfinite(y)
-        ax.scatter(
-            x[kept],
-            y[kept],
-            s=4,
-            color=_TRIED,
-            linewidths=0.0,
-            label="candidates that satisfy the constraints",
-        )
+        ax.scatter(x[kept], y[kept], s=4, color=_TRIED, linewidths=0.0, label="candidates that satisfy the constraints")
         for code, (word, marker, color) in enumerate(_STATES):
             own = dataset["constraints_satisfied"].values == code
             if own.any():
@@ -229,9 +220,7 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
     wide = np.argwhere(~data["reached"].transpose(dims[1], dims[0]).values)
     if wide.size:
         look: dict[str, Any] = {"marker": "x", "s": 8, "color": "0.35", "linewidths": 0.6}
-        handles.append(
-            ax.scatter(x[wide[:, 1]], y[wide[:, 0]], label="interval wider than requested", **look)
-        )
+        handles.append(ax.scatter(x[wide[:, 1]], y[wide[:, 0]], label="interval wider than requested", **look))
     dress(ax.xaxis, data, dims[0])
     dress(ax.yaxis, data, dims[1])
     for at, axis in ((0, ax.set_xlim), (1, ax.set_ylim)):
@@ -243,13 +232,7 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
 # Quantile thresholds over one parameter: lines with their intervals as bands.
 
 
-_STYLES = (
-    ("#4C97C8", ":"),
-    ("#B03A27", "-"),
-    ("#16245E", "--"),
-    ("#6E8B2F", "-."),
-    ("#000000", (0, (1, 1, 5, 1))),
-)
+_STYLES = (("#4C97C8", ":"), ("#B03A27", "-"), ("#16245E", "--"), ("#6E8B2F", "-."), ("#000000", (0, (1, 1, 5, 1))))
 
 
 @checked
@@ -272,16 +255,12 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     if len(dims) != 1 or "point" in dims:
         raise InputError(f"thresholds over {dims}: are drawn over one parameter")
     if data.sizes["quantile"] > len(_STYLES):
-        raise InputError(
-            f"dataset: has {data.sizes['quantile']} lines; at most {len(_STYLES)} can be told apart"
-        )
+        raise InputError(f"dataset: has {data.sizes['quantile']} lines; at most {len(_STYLES)} can be told apart")
     along, raised = dims[0], str(data.attrs["parameter"])
     if quasi_static and (objection := quasi_static_objection(data.attrs)) is not None:
         raise InputError(f"quasi_static with {objection}; leave quasi_static out")
     ratio, wide = ratio_along(data, along)
-    if quasi_static and (
-        ratio not in ("location", "frequency_ratio") or ratio_name(raised) != "velocity_amplitude"
-    ):
+    if quasi_static and (ratio not in ("location", "frequency_ratio") or ratio_name(raised) != "velocity_amplitude"):
         raise InputError(
             f"quasi_static of {raised} over {ratio}: is known of velocity_amplitude over location and frequency_ratio"
         )
@@ -299,9 +278,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
             if raised != "velocity_amplitude":  # in m/s
                 omega = 2.0 * np.pi * float(data.attrs["reference_frequency"])
                 line = PHYSICAL["drive.velocity_m_s"].unit_of(float(data.attrs["length_scale"]), omega) * line
-            ax.plot(
-                x, line, color="black", linewidth=0.8, dashes=(4, 2), label=r"quasi-static, $V_\mathrm{QS1}$"
-            )
+            ax.plot(x, line, color="black", linewidth=0.8, dashes=(4, 2), label=r"quasi-static, $V_\mathrm{QS1}$")
         falls = ~data["is_monotonic"].values
         if falls.any():
             middle = data["threshold"].sel(quantile=0.5, method="nearest").values
@@ -403,10 +380,7 @@ def plot_gradient(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     contains(dataset, "gradient", "elasticity", "relative_error")
     data = dataset.isel(parameter=np.argsort(np.abs(dataset["elasticity"].values), kind="stable"))
     with frame(ax, dataset, height=24.0 + 9.0 * data.sizes["parameter"]) as ax:
-        value, place = (
-            data["elasticity"].values,
-            _rows(ax, [_name(data, i) for i in range(data.sizes["parameter"])]),
-        )
+        value, place = (data["elasticity"].values, _rows(ax, [_name(data, i) for i in range(data.sizes["parameter"])]))
         error = np.nan_to_num(np.abs(value) * data["relative_error"].values)
         ax.barh(place, value, xerr=error, height=0.62, color=_BLUE, error_kw=_BARS)
         ax.axvline(0.0, color="black", linewidth=0.6)
@@ -456,14 +430,9 @@ def plot_scores(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
                     markeredgecolor="black", markeredgewidth=0.5, label=f"measured: {kind.label}", **_BARS,
                 )  # fmt: skip
         extend_title(
-            ax,
-            f"{data.attrs['agree']} of {order.size} most likely, {data.attrs['agree_expected']:.3g} expected",
+            ax, f"{data.attrs['agree']} of {order.size} most likely, {data.attrs['agree_expected']:.3g} expected"
         )
-        ax.set(
-            xlabel="Measurement, by probability",
-            ylabel="Probability of the measured class",
-            ylim=(-0.02, 1.02),
-        )
+        ax.set(xlabel="Measurement, by probability", ylabel="Probability of the measured class", ylim=(-0.02, 1.02))
         legend_below(ax)
     return ax
 

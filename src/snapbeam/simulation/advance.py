@@ -86,10 +86,7 @@ def advance(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> state = sb.advance(system, periods=20)
     >>> state = sb.advance(system, state, periods=1)
     >>> state.amplitude.shape
@@ -109,13 +106,9 @@ def advance(
         require_motion(system)
         state = system.start_state
     if state.modes != system.model.modes:
-        raise InputError(
-            f"state of {state.modes} modes: must have the {system.model.modes} modes of the model"
-        )
+        raise InputError(f"state of {state.modes} modes: must have the {system.model.modes} modes of the model")
     if tangent is not None and integration.engine == "python":
-        raise InputError(
-            "tangent with engine = 'python': must be left out; engine = 'native' has derivatives"
-        )
+        raise InputError("tangent with engine = 'python': must be left out; engine = 'native' has derivatives")
     if save_every_period and not float(span).is_integer():
         raise InputError(f"periods = {span:g} with save_every_period = True: must be an integer")
     flat = state.flat()
@@ -139,9 +132,7 @@ def advance(
     return _shaped(found, state.batch, save_every_period, kept, vectors)
 
 
-def _tangents(
-    system: System, begun: State, span: float, tangents: _Array, integration: Integration
-) -> _Array:
+def _tangents(system: System, begun: State, span: float, tangents: _Array, integration: Integration) -> _Array:
     """Tangents of shape (runs, k, 2, N) some periods on, period by period: their own steps are finer than those of the motion."""
     modes, how = system.model.linear_modes, integration.replace(early_termination=False)
     while span > 0.0:
@@ -163,9 +154,7 @@ def _checked_tangent(tangent: ArrayLike, flat: State) -> _Array:
     if given.ndim < 3 or given.shape[-2:] != shape:
         raise InputError(f"tangent of shape {given.shape}: must have the shape (..., k, 2, {flat.modes})")
     try:
-        return np.array(
-            np.broadcast_to(given.reshape(-1, *given.shape[-3:]), (flat.batch[0], *given.shape[-3:]))
-        )
+        return np.array(np.broadcast_to(given.reshape(-1, *given.shape[-3:]), (flat.batch[0], *given.shape[-3:])))
     except ValueError:
         raise InputError(
             f"tangent of shape {given.shape}: must have the batch {flat.batch} of the states before (k, 2, N)"
@@ -191,11 +180,7 @@ def _states(ensemble: Ensemble, ends: OutputStates, every: bool) -> list[State]:
 
 
 def _shaped(
-    found: list[State],
-    batch: tuple[int, ...],
-    every: bool,
-    passed: dict[str, Any],
-    tangent: _Array | None,
+    found: list[State], batch: tuple[int, ...], every: bool, passed: dict[str, Any], tangent: _Array | None
 ) -> State:
     """Return states as one batch of the requested shape."""
     shape = (len(found), *batch) if every else batch

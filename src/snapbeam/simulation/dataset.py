@@ -95,11 +95,7 @@ _COORDINATES = ("time", "cycle", "mode", "striker", "force", "harvester")
 
 
 def trajectory_dataset(
-    time: ArrayLike,
-    cycle: ArrayLike | None = None,
-    *,
-    attrs: Mapping[str, Any] | None = None,
-    **variables: ArrayLike,
+    time: ArrayLike, cycle: ArrayLike | None = None, *, attrs: Mapping[str, Any] | None = None, **variables: ArrayLike
 ) -> xr.Dataset:
     """Return a run as a labelled dataset.
 
@@ -142,9 +138,7 @@ def trajectory_dataset(
     length = len(coords["time"][1])
     for name, (dims, values, _) in (*coords.items(), *data.items()):
         if values.ndim != len(dims) or (dims[0] == "time" and values.shape[0] != length):
-            raise InputError(
-                f"{name} of shape {values.shape}: must have dimensions {dims}, with time of {length}"
-            )
+            raise InputError(f"{name} of shape {values.shape}: must have dimensions {dims}, with time of {length}")
     series, axes = ({name: variable(name, *each) for name, each in part.items()} for part in (data, coords))
     dataset = xr.Dataset(series, axes, dict(attrs or {}))
     check_trajectory(dataset, require=())
@@ -156,9 +150,7 @@ def _labelled(name: str, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarra
     return quantity.dims, values, {"units": quantity.unit, "long_name": quantity.long_name}
 
 
-def check_trajectory(
-    dataset: xr.Dataset, require: Iterable[str] = ("displacement_at_striker",)
-) -> xr.Dataset:
+def check_trajectory(dataset: xr.Dataset, require: Iterable[str] = ("displacement_at_striker",)) -> xr.Dataset:
     """Return *dataset* if it follows the schema of a run.
 
     Variables that are not in the schema are not checked, so that an experiment may add its own.
@@ -204,9 +196,7 @@ def check_trajectory(
     steps = np.diff(dataset["time"].values)
     if (steps <= 0.0).any():
         late = int(np.argmax(steps <= 0.0)) + 1
-        raise InputError(
-            f"time[{late}] = {float(dataset['time'][late])!r}: must be later than the one before"
-        )
+        raise InputError(f"time[{late}] = {float(dataset['time'][late])!r}: must be later than the one before")
     return dataset
 
 
@@ -227,9 +217,7 @@ def strikers_of(ensemble: Ensemble, system: System, recorded: Recorded, first: _
         row = others.rows[others.places[0, j]]
         motion = tip_of(ensemble, system, j + 2, recorded.times) + sign * follows
         motion -= recorded.q @ (row - ensemble.structure.row_of_beam(row))  # of a striker with mass its own
-        tip[:, j + 1] = (
-            ensemble.structure.sign * sign * (others.rest[0, j] + others.offset[0, j] + motion) / length
-        )
+        tip[:, j + 1] = ensemble.structure.sign * sign * (others.rest[0, j] + others.offset[0, j] + motion) / length
     return {
         "striker_forces": recorded.contacts[:, :, 1],
         "striker_penetrations": recorded.contacts[:, :, 0] / length,
@@ -290,12 +278,7 @@ def joined(pieces: list[Recorded]) -> Recorded:
 
 
 def run_dataset(
-    ensemble: Ensemble,
-    system: System,
-    recorded: Recorded,
-    times: _Array | None,
-    period: float,
-    attrs: dict[str, Any],
+    ensemble: Ensemble, system: System, recorded: Recorded, times: _Array | None, period: float, attrs: dict[str, Any]
 ) -> xr.Dataset:
     """Return the time series of a run.
 
@@ -308,9 +291,7 @@ def run_dataset(
     own = np.zeros(recorded.q.shape[0])
     if structure.bodies:
         body = structure.modes_of_bodies
-        own = 0.5 * (recorded.p[:, body] ** 2 + (structure.omega[body] * recorded.q[:, body]) ** 2).sum(
-            axis=1
-        )
+        own = 0.5 * (recorded.p[:, body] ** 2 + (structure.omega[body] * recorded.q[:, body]) ** 2).sum(axis=1)
         values[:, _COLUMN["energy"]] -= own
     values[:, _COLUMN["energy"]] -= _stored_in_circuits(ensemble, recorded)
     for i, circuit in enumerate(ensemble.circuits):  # dissipated in the resistance of the coil
@@ -333,16 +314,9 @@ def run_dataset(
             "penetration_normalised": penetration,
             "contact_force": recorded.contacts[:, 0, 1],
         }
-    variables |= {
-        "modal_amplitude": alpha,
-        "modal_velocity": rate,
-        "energy_beam": values[:, _COLUMN["energy"]],
-    }
+    variables |= {"modal_amplitude": alpha, "modal_velocity": rate, "energy_beam": values[:, _COLUMN["energy"]]}
     if struck:
-        variables |= {
-            "energy_contact": values[:, _COLUMN["contact"]],
-            "striker_work": values[:, _COLUMN["work"]],
-        }
+        variables |= {"energy_contact": values[:, _COLUMN["contact"]], "striker_work": values[:, _COLUMN["work"]]}
     if structure.bodies:
         variables["energy_striker"] = own
     variables["energy_dissipated"] = values[:, _COLUMN["dissipated"]]
@@ -414,9 +388,7 @@ def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Arr
     forces = [motion[0] for section, motion in motions.items() if numbered(section)[0] == "force"]
     if forces:
         several = len(forces) > 1
-        found["external_forces" if several else "external_force"] = (
-            np.stack(forces, 1) if several else forces[0]
-        )
+        found["external_forces" if several else "external_force"] = np.stack(forces, 1) if several else forces[0]
         found["force_work"] = values[:, _COLUMN["force_work"]]
     return found
 
@@ -426,10 +398,7 @@ def impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
     from snapbeam.util.datasets import variable, xr
 
     columns = {
-        name: (
-            table[:, i].astype(np.int64) if name == "striker" else table[:, i],
-            {"units": units, "long_name": words},
-        )
+        name: (table[:, i].astype(np.int64) if name == "striker" else table[:, i], {"units": units, "long_name": words})
         for i, (name, units, words) in enumerate(IMPACT_COLUMNS[: table.shape[1]])
     }
     columns["impact"] = (np.arange(1, len(table) + 1), {"units": "1", "long_name": "number of the impact"})

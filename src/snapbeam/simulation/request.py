@@ -39,9 +39,7 @@ def require_motion(system: System, started: bool = False) -> None:
     """Refuse a system without excitation, force and initial state; *started* by a sweep that gives one."""
     parts = (system.contacts, system.moving, system.forces)
     if not started and system.initial_state is None and not any(parts):
-        raise InputError(
-            "contacts = []: without a striker the beam needs an initial_state; give one, or a contact"
-        )
+        raise InputError("contacts = []: without a striker the beam needs an initial_state; give one, or a contact")
 
 
 def cycle_of(system: System) -> float:

@@ -57,10 +57,7 @@ class Run:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> run.summary.response_class.label
     'continuous interwell'
@@ -108,11 +105,7 @@ class Run:
         --------
         >>> import snapbeam as sb
         >>> from snapbeam import paper
-        >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
-        >>> system = sb.System(
-        ...     model,
-        ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-        ... )
+        >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18, modes=2)
         >>> frame = sb.simulate(system, sb.Integration(cycles=2)).to_dataframe()
         >>> "modal_amplitude_2" in frame
         True
@@ -132,9 +125,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         shown = ("zero_crossings", "impacts", "peak_force", "striker_work", "contact_time_fraction")
-        rows = [
-            (STATISTICS[name].long_name, f"{self.summary[name]:.5g}", STATISTICS[name].unit) for name in shown
-        ]
+        rows = [(STATISTICS[name].long_name, f"{self.summary[name]:.5g}", STATISTICS[name].unit) for name in shown]
         rows += [(section, line.strip(), "") for section, _, line in _described(self.system)]
         return html_table(f"Run: {self.summary.response_class.label}, {self.summary.status.advice}", rows)
 

@@ -69,10 +69,7 @@ def load(path: str | os.PathLike[str]) -> Run:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> sb.simulate(system, sb.Integration(cycles=2)).save("run.nc")
     >>> run = sb.load("run.nc")
     >>> run.system == system
@@ -90,14 +87,8 @@ def load(path: str | os.PathLike[str]) -> Run:
     try:
         system = System.from_mapping(_arrays(json.loads(attrs.pop("snapbeam_system"))))
         integration = Integration(**json.loads(attrs.pop("snapbeam_integration")))
-        accuracy = (
-            ErrorEstimate(**json.loads(attrs.pop("snapbeam_accuracy")))
-            if "snapbeam_accuracy" in attrs
-            else None
-        )
-        end = (
-            _state(json.loads(attrs.pop("snapbeam_final_state"))) if "snapbeam_final_state" in attrs else None
-        )
+        accuracy = ErrorEstimate(**json.loads(attrs.pop("snapbeam_accuracy"))) if "snapbeam_accuracy" in attrs else None
+        end = _state(json.loads(attrs.pop("snapbeam_final_state"))) if "snapbeam_final_state" in attrs else None
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"path = {str(path)!r}: its description is damaged ({error})") from None
     dataset = check_trajectory(dataset.drop_attrs(deep=False).assign_attrs(attrs))
@@ -127,8 +118,7 @@ def code_flags(kinds: type[ResponseClass] | type[RunStatus]) -> dict[str, Any]:
     return {
         "flag_values": np.array([int(kind) for kind in kinds], dtype=np.int8),
         "flag_meanings": " ".join(
-            kind.label.replace(" ", "_") if isinstance(kind, ResponseClass) else kind.name.lower()
-            for kind in kinds
+            kind.label.replace(" ", "_") if isinstance(kind, ResponseClass) else kind.name.lower() for kind in kinds
         ),
     }
 
@@ -156,9 +146,7 @@ def _without_nan(value: Any) -> Any:
 
 def _arrays(sections: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     return {
-        section: {
-            name: np.array(value) if isinstance(value, list) else value for name, value in values.items()
-        }
+        section: {name: np.array(value) if isinstance(value, list) else value for name, value in values.items()}
         for section, values in sections.items()
     }
 

@@ -109,12 +109,7 @@ def _short(part: Any) -> dict[str, Any]:
 
 
 def attributes_of(
-    title: str,
-    system: System,
-    integration: Integration,
-    plan: Plan,
-    more: dict[str, Any],
-    points: Any = None,
+    title: str, system: System, integration: Integration, plan: Plan, more: dict[str, Any], points: Any = None
 ) -> dict[str, Any]:
     """Return the attributes of a dataset: title, all parameters, provenance, and the hash of all of it.
 
@@ -206,9 +201,7 @@ def _causes(system: System, integration: Integration) -> str:
     if integration.step is not None:
         return "the step is that of integration.step"
     contact = ", an impact (softer contacts have longer ones)" if system.contacts else ""
-    return (
-        f"the step follows from the highest mode, the strongest damping{contact}; fewer cycles take less time"
-    )
+    return f"the step follows from the highest mode, the strongest damping{contact}; fewer cycles take less time"
 
 
 def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any) -> dict[str, Any]:
@@ -251,7 +244,7 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
     striker = system.striker
     attrs: dict[str, Any] = {
         "cycles": round(lasted, 9),
-        "engine": "native" if integration.engine == "auto" else integration.engine,
+        "engine": "python" if integration.engine == "python" else "native",
     }
     if striker is not None and striker.drive.harmonic:
         attrs |= {
@@ -297,9 +290,7 @@ def _regular_count(system: System, end: float, period: float) -> int:
     fastest = min(period, 1.0 / system.model.reference_frequency)
     count = end / fastest * _SAMPLES_PER_CYCLE
     if count > 1e9:
-        raise InputError(
-            f"a run of {count:.3g} samples is too long to record: give sample_times, or fewer cycles"
-        )
+        raise InputError(f"a run of {count:.3g} samples is too long to record: give sample_times, or fewer cycles")
     return math.ceil(count) + 1
 
 
@@ -332,9 +323,7 @@ def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
     if (np.diff(times) <= 0.0).any():
         raise InputError("sample_times: must be strictly increasing")
     if times[0] < 0.0 or times[-1] > end * (1.0 + 1e-9):
-        raise InputError(
-            f"sample_times from {times[0]:g} to {times[-1]:g} s: must lie within the run, 0 to {end:g} s"
-        )
+        raise InputError(f"sample_times from {times[0]:g} to {times[-1]:g} s: must lie within the run, 0 to {end:g} s")
     return times
 
 
@@ -349,12 +338,7 @@ def end_state(ensemble: Ensemble, recorded: Recorded, summary: RunSummary) -> St
         return None
     last, time = recorded.last, int(recorded.accumulators_of_runs["time"][0])
     states = states_of(
-        ensemble,
-        last.q[None],
-        last.p[None],
-        np.array([last.well_sign]),
-        last.contact_ticks[None],
-        np.array([time]),
+        ensemble, last.q[None], last.p[None], np.array([last.well_sign]), last.contact_ticks[None], np.array([time])
     )
     return states[0]
 
@@ -424,10 +408,7 @@ def simulate(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> run.summary.response_class.label
     'continuous interwell'
@@ -444,9 +425,7 @@ def simulate(
         report(1.0)
     summary = RunSummary.from_statistics(statistics_of(ensemble, recorded.accumulators_of_runs))
     if times is None and summary.status != RunStatus.OK:
-        recorded = reached_by(
-            recorded, float(recorded.accumulators_of_runs["time"][0] * ensemble.runs["tick"][0])
-        )
+        recorded = reached_by(recorded, float(recorded.accumulators_of_runs["time"][0] * ensemble.runs["tick"][0]))
         if recorded.times.size == 0:
             times = np.zeros(1)  # the run failed before its first sample
     tell_imbalance(run, summary, recorded.accumulators_of_runs)

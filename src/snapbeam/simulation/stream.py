@@ -93,10 +93,7 @@ def simulate_to_file(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> summary = sb.simulate_to_file(system, sb.Integration(cycles=2), path="run.nc")
     """
     if not isinstance(system, System):
@@ -123,9 +120,7 @@ def simulate_to_file(
             if full and writer.waiting is not None:
                 break
             writer.take(piece)
-            if (
-                full or stream.trouble is not None
-            ):  # not even the first piece: an error below says where it is
+            if full or stream.trouble is not None:  # not even the first piece: an error below says where it is
                 break
         summary = writer.finish()
     if full and summary.status is RunStatus.INTERRUPTED:
@@ -178,9 +173,7 @@ class _Writer:
         assert last is not None  # an engine yields at least one piece
         summary = RunSummary.from_statistics(statistics_of(run.ensemble, last.accumulators_of_runs))
         if summary.status != RunStatus.OK:
-            last = reached_by(
-                last, float(last.accumulators_of_runs["time"][0] * run.ensemble.runs["tick"][0])
-            )
+            last = reached_by(last, float(last.accumulators_of_runs["time"][0] * run.ensemble.runs["tick"][0]))
         tell_imbalance(run, summary, last.accumulators_of_runs)
         attrs = run_attributes(run, summary, last.accumulators_of_runs)
         self.append(last, np.zeros(1) if self.written + last.times.size == 0 else None)

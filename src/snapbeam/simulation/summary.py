@@ -33,10 +33,7 @@ class RunSummary(Mapping[str, Any]):
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> summary = sb.simulate(system, sb.Integration(cycles=20)).summary
     >>> summary.impacts == summary["impacts"]
     True
@@ -63,22 +60,15 @@ class RunSummary(Mapping[str, Any]):
         mapping("values", values)
         if missing := {"response_class", "status"} - set(values):
             raise InputError(f"values: must contain {', '.join(sorted(missing))}")
-        found = {
-            name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()
-        }
-        found["response_class"], found["status"] = (
-            ResponseClass(found["response_class"]),
-            RunStatus(found["status"]),
-        )
+        found = {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
+        found["response_class"], found["status"] = (ResponseClass(found["response_class"]), RunStatus(found["status"]))
         self._values = found
 
     @classmethod
     def from_statistics(cls, statistics: Mapping[str, NDArray[np.generic]], index: int = 0) -> RunSummary:
         """Summary of one run of the statistics that :func:`snapbeam.solver.statistics.statistics_of` returns."""
         mapping("statistics", statistics)
-        index = integer(
-            "index", index, 0, max(0, min((np.size(each) for each in statistics.values()), default=1) - 1)
-        )
+        index = integer("index", index, 0, max(0, min((np.size(each) for each in statistics.values()), default=1) - 1))
         return cls({name: np.atleast_1d(array)[index] for name, array in statistics.items()})
 
     def __getattr__(self, name: str) -> Any:

@@ -58,10 +58,7 @@ class ErrorEstimate:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.05))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.05)
     >>> run = sb.simulate(system, sb.Integration(cycles=5, tolerance=1e-6))
     >>> run.accuracy.reached, run.accuracy.estimated_error < 1e-6
     (True, True)
@@ -127,10 +124,7 @@ def perturbation_growth(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.05),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> growth = sb.perturbation_growth(system, sb.Integration(cycles=5))
     """
     from snapbeam.util.datasets import xr
@@ -142,9 +136,7 @@ def perturbation_growth(
     plan = plans_of(system, integration, run_columns(system, {}))[0]
     ensemble = make_ensemble(system, integration, plan=plan)
     times = _instants(system, ensemble)
-    separation = _apart(
-        _watch(system, ensemble, times), _watch(system, _perturbed(ensemble, system, size), times)
-    )
+    separation = _apart(_watch(system, ensemble, times), _watch(system, _perturbed(ensemble, system, size), times))
     attrs = {
         "title": "perturbation growth of a run",
         "length_scale": system.scale.length,
@@ -178,10 +170,7 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, ErrorEsti
     limit = integration.tolerance
     assert limit is not None
     whole = integration.replace(tolerance=None, early_termination=False)
-    steps = {
-        level: plans_of(system, whole.replace(accuracy=level), run_columns(system, {}))[0]
-        for level in ACCURACIES
-    }
+    steps = {level: plans_of(system, whole.replace(accuracy=level), run_columns(system, {}))[0] for level in ACCURACIES}
     refinements = _FINE if limit < _CHEAP else (*_ROUGH, *_FINE[1:])
     levels = [steps[level].scaled(length) for level, length in refinements]
     times = _instants(system, make_ensemble(system, whole, plan=steps["standard"]))

@@ -138,9 +138,7 @@ def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
     if system.striker is None:
         return np.full(runs, -np.inf)
     drive, own = system.striker.drive, _own(columns, "drive", runs)
-    if (
-        system.striker.side == "above" and drive.recorded
-    ):  # made in space; other motions are positive as it pushes
+    if system.striker.side == "above" and drive.recorded:  # made in space; other motions are positive as it pushes
         return drive.mirrored_bounds(own, system.scale)
     return drive.bounds(own, system.scale)[0]
 
@@ -312,7 +310,9 @@ def make_ensemble(
     )
     if integration.engine == "python":
         return dataclasses.replace(ensemble, systems=_systems(system, points or {}, runs))
-    return dataclasses.replace(ensemble, channels=channels_of(system, ensemble, columns))
+    return dataclasses.replace(
+        ensemble, channels=channels_of(system, ensemble, columns), on_gpu=integration.engine == "cuda"
+    )
 
 
 def _systems(system: System, points: Mapping[str, _Array], runs: int) -> tuple[System, ...]:
@@ -467,9 +467,7 @@ def _longest_with_local_forces(system: System, accuracy: str) -> float:
     return _TAPPED[accuracy] / max(math.sqrt(squared), decay, 1e-300)
 
 
-def _with_circuits(
-    plans: list[Plan], system: System, columns: Mapping[str, _Array], accuracy: str
-) -> list[Plan]:
+def _with_circuits(plans: list[Plan], system: System, columns: Mapping[str, _Array], accuracy: str) -> list[Plan]:
     """Steps that resolve circuits.
 
     The stiffness t.t of circuits with inertia, and the damping rate t.t of those without, are in the kicks.  The decay lam h of a
@@ -483,16 +481,12 @@ def _with_circuits(
         if harvester.inertia > 0.0:
             squared += float(row @ row) / harvester.inertia
             resolved = circuit.rate * step <= _FOLLOWS
-            longest = np.where(
-                resolved, np.minimum(longest, _DECAY / np.maximum(circuit.rate, 1e-300)), longest
-            )
+            longest = np.where(resolved, np.minimum(longest, _DECAY / np.maximum(circuit.rate, 1e-300)), longest)
         else:
             decay += float(row @ row) * circuit.rate
     exchange = np.maximum(np.maximum(math.sqrt(squared), decay), 1e-300)
     longest = np.minimum(longest, 2.0 * _TAPPED[accuracy] / exchange)
-    return [
-        each._replace(step=min(each.step, own)) for each, own in zip(plans, longest.tolist(), strict=True)
-    ]
+    return [each._replace(step=min(each.step, own)) for each, own in zip(plans, longest.tolist(), strict=True)]
 
 
 def _struck(system: System) -> ReducedModel:
@@ -506,9 +500,7 @@ def _serving(plans: Sequence[Plan]) -> Plan:
     step = min(each.step for each in plans)
     longest = min(each.step * 0.5**each.min_contact_halvings for each in plans)
     shortest = min(each.step * 0.5**each.max_halvings for each in plans)
-    min_contact_halvings, max_halvings = (
-        math.ceil(math.log2(step / each) - 1e-9) for each in (longest, shortest)
-    )
+    min_contact_halvings, max_halvings = (math.ceil(math.log2(step / each) - 1e-9) for each in (longest, shortest))
     return plans[0]._replace(
         step=step,
         min_contact_halvings=max(0, min_contact_halvings),

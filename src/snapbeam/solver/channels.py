@@ -63,17 +63,7 @@ LAWS: dict[type, tuple[int, tuple[str, ...]]] = {
 LINEAR_DAMPING, EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT = 10, 11, 12, 13, 14
 USER_LAWS = {"contact": 15, "lossy contact": 16, "force": 17, "lossy force": 18, "contact with memory": 21}
 """Number of the law that calls a user's, by :attr:`snapbeam.solver.user_laws.UserLaw.kind`."""
-SIGNAL = (
-    "mean",
-    "amplitude",
-    "rate",
-    "phase",
-    "period",
-    "exponential",
-    "most_value",
-    "most_slope",
-    "most_bend",
-)
+SIGNAL = ("mean", "amplitude", "rate", "phase", "period", "exponential", "most_value", "most_slope", "most_bend")
 """Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep speed, first and last rate, time, duration."""
 STEEP = tuple(LAWS[kind][0] for kind in (ElectrostaticForce, MagneticForce))
 """Laws whose force grows without bound towards an end of their range."""
@@ -118,9 +108,7 @@ class Channels:
     def moves(self) -> bool:
         """True if a signal changes with time."""
         return bool(
-            np.any(self.signals[:, :, 1] * (self.kinds != 1))
-            or np.any(self.pieces[:, 1:])
-            or np.any(self.kinds == 2)
+            np.any(self.signals[:, :, 1] * (self.kinds != 1)) or np.any(self.pieces[:, 1:]) or np.any(self.kinds == 2)
         )
 
     def check(self) -> None:
@@ -166,19 +154,13 @@ class _Builder:
         self.offset.append(np.broadcast_to(np.asarray(offset, float), self.runs))
         self.since.append(np.broadcast_to(np.asarray(since, float), self.runs))
 
-    def law(
-        self, law: ContactLaw | LocalForce, model: ReducedModel
-    ) -> tuple[int, tuple[float, ...], tuple[str, ...]]:
+    def law(self, law: ContactLaw | LocalForce, model: ReducedModel) -> tuple[int, tuple[float, ...], tuple[str, ...]]:
         """Number of a law in the core, what is told of a user's, and the names of the law's own numbers."""
         kind = type(law)
         if kind in LAWS:
             number, names = LAWS[kind]
             return number, (), names
-        own = (
-            contact_law(law)
-            if isinstance(law, ContactLaw)
-            else local_force(law, law.largest_displacement(model))
-        )
+        own = contact_law(law) if isinstance(law, ContactLaw) else local_force(law, law.largest_displacement(model))
         self.of_user.append(own)
         return USER_LAWS[own.kind], own.head, kind.numbers_type()._fields
 
@@ -256,10 +238,7 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         left = None
         if contact.law.memory:
             left = ensemble.starts[table["start_row"], 0, structure.mode_of_indentation(number - 1)]
-        values = [
-            *head,
-            *(left if name == contact.law.memory else columns[f"{section}.{name}"] for name in names),
-        ]
+        values = [*head, *(left if name == contact.law.memory else columns[f"{section}.{name}"] for name in names)]
         if number == 1:
             rows, which, rest = ensemble.contact_rows, table["contact_row"], table["rest_contact"]
             offset, since = table["offset"], table["contact_time"]
@@ -294,16 +273,12 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
 
 def _cancelled(structure: Structure, rows: _Array) -> _Array:
     """r.omega^2 r/(r.r)^2: the stiffness along each row that a contact which is held together cancels."""
-    return np.asarray(
-        np.sum((rows * structure.omega) ** 2, axis=1) / np.maximum(np.sum(rows**2, axis=1) ** 2, 1e-300)
-    )
+    return np.asarray(np.sum((rows * structure.omega) ** 2, axis=1) / np.maximum(np.sum(rows**2, axis=1) ** 2, 1e-300))
 
 
 def _motions(system: System) -> list[tuple[str, Drive]]:
     """Every motion by section; a stop at rest too."""
-    found = [
-        (section_of("drive", number), each.striker.drive) for number, each in enumerate(system.contacts, 1)
-    ]
+    found = [(section_of("drive", number), each.striker.drive) for number, each in enumerate(system.contacts, 1)]
     return found + [each for each in system.moving if not each[0].startswith("drive")]
 
 
@@ -312,9 +287,7 @@ _FAR = 1e300
 
 
 def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
-    own = {
-        field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section
-    }
+    own = {field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section}
     return own or {"": np.zeros(runs)}
 
 

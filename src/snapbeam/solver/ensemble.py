@@ -114,6 +114,8 @@ class Ensemble:
     others: FurtherContactTable | None = None
     channels: Any = None
     """:class:`~snapbeam.solver.channels.Channels` for the native core; None with the Python engine."""
+    on_gpu: bool = False
+    """True if a GPU integrates the runs."""
     systems: tuple[Any, ...] = ()
     """The :class:`~snapbeam.System` of each run, for the Python engine."""
 

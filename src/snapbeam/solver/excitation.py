@@ -16,9 +16,7 @@ from snapbeam.model.system import System
 _Array = NDArray[np.float64]
 
 
-def motion_of(
-    drive: Drive, scale: Scale, until: float, columns: Mapping[str, _Array] | None = None
-) -> Motion:
+def motion_of(drive: Drive, scale: Scale, until: float, columns: Mapping[str, _Array] | None = None) -> Motion:
     """Displacement (m), velocity (m/s) and acceleration (m/s^2) of a drive at times since it began, up to one of them, s.
 
     *columns* contains its parameters, those of one run, if they are not its own.

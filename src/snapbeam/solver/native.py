@@ -12,14 +12,7 @@ from numpy.typing import NDArray
 
 from snapbeam import _core
 from snapbeam.model.matrix_pairs import coupled_blocks
-from snapbeam.solver.channels import (
-    AXIAL_LOAD,
-    BASE,
-    EXTERNAL_FORCE,
-    LINEAR_DAMPING,
-    STEEP,
-    Channels,
-)
+from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP, Channels
 from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.solver.statistics import (
     CIRCUIT_LATE_LOSS,
@@ -232,9 +225,7 @@ class _Arrays:
             "rows": (channels + 1, n), "signals": batch["signals"].shape[1:], "end": (), "statistics": (len(STATISTICS),),
             "of_channels": (channels, len(OF_CHANNEL)),
         }  # fmt: skip
-        found = {
-            name: np.zeros((self.ensemble.size, _core.DIRECTIONS, *shape)) for name, shape in shapes.items()
-        }
+        found = {name: np.zeros((self.ensemble.size, _core.DIRECTIONS, *shape)) for name, shape in shapes.items()}
         room = (self.ensemble.size, batch["outputs"], _core.DIRECTIONS, 2 * n + channels)
         return found | {"states": np.full(room, np.nan)}
 
@@ -257,9 +248,7 @@ class _Arrays:
         """States of laws in q of shape (..., N), by their channel: the inverse of :meth:`modes_of`."""
         structure = self.ensemble.structure
         circuits = zip(structure.circuits, self.circuits.tolist(), strict=True)
-        found = {
-            channel: q[..., each.mode] - q @ each.row for each, channel in circuits if each.mode is not None
-        }
+        found = {channel: q[..., each.mode] - q @ each.row for each, channel in circuits if each.mode is not None}
         bodies = structure.modes_of_bodies.stop
         return found | {contact: q[..., mode] for mode, contact in enumerate(structure.indentations, bodies)}
 
@@ -298,11 +287,7 @@ class _Arrays:
             for at, name in ((OTHER_IMPACTS, "impacts"), (OTHER_PEAK, "peak_force"), (OTHER_IMPULSE, "impulse"), (OTHER_WORK, "work")):  # fmt: skip
                 found["others"][:, :, at] = contacts[name][:, 1:]
         if self.circuits.size:
-            for at, name in (
-                (CIRCUIT_LOSS, "lost"),
-                (CIRCUIT_LATE_LOSS, "late_lost"),
-                (CIRCUIT_PEAK, "peak_force"),
-            ):
+            for at, name in ((CIRCUIT_LOSS, "lost"), (CIRCUIT_LATE_LOSS, "late_lost"), (CIRCUIT_PEAK, "peak_force")):
                 found["circuits"][:, :, at] = of_channels[:, self.circuits, OF_CHANNEL.index(name)]
         works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")
         found["gross_work"] = of_channels[:, :, works[1]].sum(axis=1)
@@ -320,23 +305,20 @@ class _Arrays:
 
 def _work_of(law: int) -> str:
     """The accumulator of the work of a channel that is no contact."""
-    return {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work"}.get(
-        law, "local_force_work"
-    )
+    return {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work"}.get(law, "local_force_work")
 
 
 def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) -> None:
-    layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
     if progress is not None:
         progress(0, arrays.ensemble.size)
-    _core.integrate(
-        arrays.problem,
-        arrays.batch,
-        layout,
-        os.environ.get("SNAPBEAM_SET", ""),
-        1 if arrays.calls_python else threads or usable_cores(),
-        progress,
-    )
+    if arrays.ensemble.on_gpu:
+        from snapbeam.solver import cuda
+
+        cuda.integrate(arrays.problem, arrays.batch, progress)
+    else:
+        layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
+        cores = 1 if arrays.calls_python else threads or usable_cores()
+        _core.integrate(arrays.problem, arrays.batch, layout, os.environ.get("SNAPBEAM_SET", ""), cores, progress)
     arrays.check()
     if progress is not None:
         progress(arrays.ensemble.size, arrays.ensemble.size)
@@ -376,8 +358,7 @@ def differentiable(above: Ensemble, below: Ensemble) -> bool:
     if not np.array_equal(one.pieces, other.pieces) or not np.array_equal(one.jumps, other.jumps):
         return False
     first, second = (
-        {name: value for name, value in _Arrays(each).problem.items() if name != "levels"}
-        for each in (above, below)
+        {name: value for name, value in _Arrays(each).problem.items() if name != "levels"} for each in (above, below)
     )
     return all(np.array_equal(value, second[name]) for name, value in first.items())
 
@@ -450,7 +431,7 @@ def changed_accumulators(
     ----------
     ensemble : Ensemble
     beside : sequence of tuple
-        Of each parameter, the ensembles at the two values and their distance.
+        Ensembles at the two values of each parameter, and their distance.
     threads : int, optional
 
     Returns
@@ -548,14 +529,7 @@ def _recorded(arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulat
     found = np.zeros((held, len(SAMPLED) + arrays.circuits.size))
     lost = contacts[:, :, 4].sum(axis=1)
     found[:, :5] = np.stack(
-        (
-            values[:, 1],
-            contacts[:, :, 2].sum(axis=1),
-            contacts[:, :, 3].sum(axis=1),
-            values[:, 2] + lost,
-            lost,
-        ),
-        axis=1,
+        (values[:, 1], contacts[:, :, 2].sum(axis=1), contacts[:, :, 3].sum(axis=1), values[:, 2] + lost, lost), axis=1
     )
     found[:, len(SAMPLED) :] = own[:, arrays.circuits, 4]
     for j, law in enumerate(channels.laws[channels.contacts :].tolist()):
@@ -566,11 +540,7 @@ def _recorded(arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulat
             continue
         found[:, SAMPLED.index(_work_of(law))] += others[:, j, 3] - others[:, j, 4]
     table = recorder["impacts"][:impacts]
-    table = (
-        np.concatenate((table[:, 1:], table[:, :1] + 1.0), axis=1)
-        if channels.contacts > 1
-        else table[:, 1:].copy()
-    )
+    table = np.concatenate((table[:, 1:], table[:, :1] + 1.0), axis=1) if channels.contacts > 1 else table[:, 1:].copy()
     state = _last(arrays, recorder, accumulators)
     return Recorded(values[:, 0].copy(), q, p, contacts[:, :, :2].copy(), found, table, accumulators, state)
 

@@ -50,7 +50,9 @@ _MOST_RESTING = 100
 """Pieces without duration, one after the other, that a run may have."""
 _SECONDS, _TURN = 1.5e-3, 0.6
 """Seconds of a step on one core, and what the fastest mode turns in it at most, rad; both estimates."""
-_SLOW = "engine = 'python' is made to be read: here about {:.0f} times slower than engine = 'native', some {:.1g} s a run"
+_SLOW = (
+    "engine = 'python' is made to be read: here about {:.0f} times slower than engine = 'native', some {:.1g} s a run"
+)
 
 
 class Contact(NamedTuple):
@@ -110,20 +112,14 @@ class Equations:
         self.state = [APART] * len(system.contacts)
         for j, each in enumerate(system.contacts):
             side = 1.0 if each.striker.side == "below" else -1.0
-            row, offset, since = (
-                ensemble.contact_rows[table["contact_row"]],
-                table["offset"],
-                table["contact_time"],
-            )
+            row, offset, since = (ensemble.contact_rows[table["contact_row"]], table["offset"], table["contact_time"])
             if j:
                 assert others is not None
                 row = others.rows[others.places[run, j - 1]]
                 offset, since = others.offset[run, j - 1], others.since[run, j - 1]
             motion = moves(section_of("drive", j + 1), each.striker.drive)
             follows = 0.0 if base is None or base.striker_on_base else -side * self.up
-            self.contacts.append(
-                Contact(each.law, row, offset, motion, follows, structure.mode_of_indentation(j))
-            )
+            self.contacts.append(Contact(each.law, row, offset, motion, follows, structure.mode_of_indentation(j)))
             self.since.append(float(since))
 
     def tip(self, j: int, t: float) -> tuple[float, float]:
@@ -147,8 +143,7 @@ class Equations:
         """F_j(d) + c_j(d) d', which a contact does not let fall below zero."""
         law, d = type(self.contacts[j].law), max(d, 1e-30)  # laws are given for d > 0
         return float(
-            law.force(numbers, d)
-            + (law.damping_coefficient(numbers, d) * rate if law.rate_dependent else 0.0)
+            law.force(numbers, d) + (law.damping_coefficient(numbers, d) * rate if law.rate_dependent else 0.0)
         )
 
     def currents(self, s: _Array) -> list[float]:
@@ -400,6 +395,4 @@ def integrate_with_output_states(
         found.append(run.found)
         if progress is not None:
             progress(i + 1, ensemble.size)
-    return OutputStates(
-        np.concatenate(found), q, p, np.ones((ensemble.size, outputs), dtype=np.int64), lasting
-    )
+    return OutputStates(np.concatenate(found), q, p, np.ones((ensemble.size, outputs), dtype=np.int64), lasting)

@@ -16,9 +16,7 @@ SUMS = ("lost", "dissipated", "gross_work", *WORKS)
 """Integrals beside the state, by the names of accumulators; impulse and work of each contact and losses of circuits follow."""
 APART, PRESSING, LOOSE = range(3)
 """State of a contact; loose: the tip is inside, but a force that loses energy would pull."""
-_NODES, _WEIGHTS = (
-    0.5 * (x + i) for i, x in zip((1.0, 0.0), np.polynomial.legendre.leggauss(5), strict=True)
-)
+_NODES, _WEIGHTS = (0.5 * (x + i) for i, x in zip((1.0, 0.0), np.polynomial.legendre.leggauss(5), strict=True))
 
 
 def nodes_of(times: _Array) -> _Array:
@@ -29,9 +27,7 @@ def nodes_of(times: _Array) -> _Array:
 class Records:
     """Statistics of a run at *t*, in the state *s* of the equations *eq*."""
 
-    def __init__(
-        self, ensemble: Ensemble, run: int, eq: Any, s: _Array, times: _Array, in_contact: bool
-    ) -> None:
+    def __init__(self, ensemble: Ensemble, run: int, eq: Any, s: _Array, times: _Array, in_contact: bool) -> None:
         table, structure, count = ensemble.runs[run], ensemble.structure, len(eq.contacts)
         self.ensemble, self.eq, self.t, self.s = ensemble, eq, 0.0, s
         self.times, self.in_contact, self.tick = times, in_contact, float(table["tick"])
@@ -71,9 +67,7 @@ class Records:
 
     def energy(self) -> float:
         """Energy, contacts included."""
-        return self.eq.energy(self.s) + sum(
-            self.eq.stored(j, self.t, self.s) for j in range(len(self.eq.state))
-        )
+        return self.eq.energy(self.s) + sum(self.eq.stored(j, self.t, self.s) for j in range(len(self.eq.state)))
 
     def force(self, j: int, t: float, s: _Array) -> float:
         """f_j, N."""
@@ -82,9 +76,7 @@ class Records:
     def observe(self, part: Any) -> None:
         """Samples and statistics of a piece: integrals by Gauss's rule in each step, extremes at its nodes and ends."""
         eq, found, n, structure = self.eq, self.found, self.eq.n, self.eq.structure
-        ends = np.union1d(
-            part.t, part.t_events[0]
-        )  # crossings split a step: the energy of the modes jumps there
+        ends = np.union1d(part.t, part.t_events[0])  # crossings split a step: the energy of the modes jumps there
         nodes, weights = nodes_of(ends).ravel(), (np.diff(ends)[:, None] * _WEIGHTS).ravel()
         inside = part.sol(nodes)
         every = np.concatenate((inside, part.y), axis=1)
@@ -108,17 +100,13 @@ class Records:
             * (np.arange(n) < structure.equilibrium.size)[:, None]
         )
         found["energy_time"] += weights @ energies.sum(axis=0)
-        found["high_energy_time"] += weights @ energies[structure.high_modes(self.ensemble.high_omega)].sum(
-            axis=0
-        )
+        found["high_energy_time"] += weights @ energies[structure.high_modes(self.ensemble.high_omega)].sum(axis=0)
         if eq.circuits:
             peaks = np.abs([eq.currents(s) for s in every.T]).max(axis=0)
             found["circuits"][0, :, CIRCUIT_PEAK] = np.maximum(found["circuits"][0, :, CIRCUIT_PEAK], peaks)
         touching = [j for j, state in enumerate(eq.state) if state == PRESSING]
         for j in touching:
-            self.largest[j] = max(
-                self.largest[j], *(self.force(j, t, s) for t, s in zip(nodes, inside.T, strict=True))
-            )
+            self.largest[j] = max(self.largest[j], *(self.force(j, t, s) for t, s in zip(nodes, inside.T, strict=True)))
             self.peaks[j] = max(self.peaks[j], self.largest[j])
         end = float(part.t[-1])
         asked = self.times[(self.times >= self.t) & ((self.times < end) | (end >= self.end))]

@@ -22,11 +22,20 @@ def check_integrable(system: System, engine: str = "auto") -> None:
     ------
     InputError
     """
-    if engine == "python" and updated():
+    if engine in ("python", "cuda") and updated():
         raise InputError(
-            f"statistic {updated()[0].name!r}: is updated after every step, which engine = 'python' does not do; use engine = 'native', "
+            f"statistic {updated()[0].name!r}: is updated after every step, which engine = {engine!r} does not do; use engine = 'native', "
             "or take it out with unregister_statistic"
         )
+    if engine == "cuda":
+        from snapbeam.solver.channels import LAWS
+
+        for each in (*(contact.law for contact in system.contacts), *system.local_forces):
+            if type(each) not in LAWS:
+                raise InputError(
+                    f"{type(each).__name__}: a law of one's own is a function of this computer, which a GPU does not call; use "
+                    "engine = 'native'"
+                )
     for number, each in enumerate(system.contacts, 1):
         section, law = section_of("contact", number), each.law
         if not law.impulsive:

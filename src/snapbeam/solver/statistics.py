@@ -215,9 +215,7 @@ def _response(reading: Reading) -> Values:
 
 def _contact_share(reading: Reading) -> Values:
     with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(
-            reading.duration > 0.0, reading.accumulators["contact_time"] / reading.duration, np.nan
-        )
+        share = np.where(reading.duration > 0.0, reading.accumulators["contact_time"] / reading.duration, np.nan)
     return np.where(reading.good, share, np.nan)
 
 
@@ -453,9 +451,7 @@ def register_statistic(statistic: Statistic) -> None:
     for hook, names in (("value", results), ("update", ("held", "step"))):
         function = getattr(statistic, hook)
         if function is not None and not takes(function, len(names)):
-            raise InputError(
-                f"statistic {statistic.name!r}: {hook} must be a function of ({', '.join(names)})"
-            )
+            raise InputError(f"statistic {statistic.name!r}: {hook} must be a function of ({', '.join(names)})")
     STATISTICS[statistic.name] = statistic
 
 
@@ -549,11 +545,7 @@ def _of_one(name: str, number: int) -> Statistic:
     whole, (column, words) = STATISTICS[name], _EACH[name]
     words = f"{words}, contact {number}"
     return Statistic(
-        f"{name}_contact_{number}",
-        whole.dtype,
-        whole.unit,
-        words,
-        lambda reading: reading.one(column, number),
+        f"{name}_contact_{number}", whole.dtype, whole.unit, words, lambda reading: reading.one(column, number)
     )
 
 
@@ -699,11 +691,7 @@ def statistics_of(ensemble: Ensemble, accumulators_of_runs: Records) -> dict[str
     found = {}
     strikers = 1 if ensemble.others is None else 1 + len(ensemble.others.laws)
     for name, row in rows_for(strikers).items():
-        values = (
-            row.value(reading)
-            if row.update is None
-            else row.value(reading, accumulators_of_runs[f"own_{name}"])
-        )
+        values = row.value(reading) if row.update is None else row.value(reading, accumulators_of_runs[f"own_{name}"])
         found[name] = np.asarray(values).astype(row.dtype)
     return found
 

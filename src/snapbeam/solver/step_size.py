@@ -154,9 +154,7 @@ PARTS = {4: (4, 8.0), 6: (4, 16.0)}
 """Parts of a kick, at least, and over the time in which damping stops a motion, by the order of the composition."""
 
 
-def _with_coupled_damping(
-    structure: Structure, order: int, step: float, limit: float, period: float
-) -> float:
+def _with_coupled_damping(structure: Structure, order: int, step: float, limit: float, period: float) -> float:
     """A step (s) not longer, with which kicks by the damping that couples modes err less than *limit* in a period.
 
     The error is the norm of the difference from the exact flow of the linear modes, in the coordinates omega q and p.
@@ -192,9 +190,7 @@ def _with_coupled_damping(
                 q, p = found[:n], found[n:]
                 found = np.concatenate([flow[:, k, 0] * q + flow[:, k, 1] * p for k in (0, 1)])
         exact = expm(h * matrix)
-        return float(
-            np.linalg.norm(np.linalg.matrix_power(found, steps) - np.linalg.matrix_power(exact, steps), 2)
-        )
+        return float(np.linalg.norm(np.linalg.matrix_power(found, steps) - np.linalg.matrix_power(exact, steps), 2))
 
     shortest = period / _MOST
     with np.errstate(all="ignore"):
@@ -225,11 +221,7 @@ def growth(structure: Structure, order: int, step: float) -> float:
         p = p + kick * step * (pull @ q)
         if i < len(composition[0]):
             time = composition[0][i] * step
-            sine, cosine, decay = (
-                (np.sin(root * time) / root).real,
-                np.cos(root * time).real,
-                np.exp(-damping * time),
-            )
+            sine, cosine, decay = ((np.sin(root * time) / root).real, np.cos(root * time).real, np.exp(-damping * time))
             a = [
                 decay * (cosine + damping * sine),
                 decay * sine * omega,
@@ -269,10 +261,7 @@ class _Bench:
         if model.contact_shape is not None:
             shapes.append(model.contact_shape)
         lowest = slice(0, _MOST_MODES)
-        self.omega, self.damping = (
-            structure.omega[lowest],
-            (structure.damping_ratio * structure.omega)[lowest],
-        )
+        self.omega, self.damping = (structure.omega[lowest], (structure.damping_ratio * structure.omega)[lowest])
         self.coupling = structure.coupling[lowest, lowest]
         self.well = structure.well[lowest]
         self.rest = self.force = np.zeros(self.omega.size)
@@ -286,9 +275,7 @@ class _Bench:
         impulse_shape = (tip @ model.linear_modes)[lowest]
         if not impulse_shape.any():
             impulse_shape = np.ones(self.omega.size)
-        barrier = (
-            barrier_of(structure) or 0.5 * (2.0 * math.pi / self.period / np.abs(self.rows[:, 0]).max()) ** 2
-        )
+        barrier = barrier_of(structure) or 0.5 * (2.0 * math.pi / self.period / np.abs(self.rows[:, 0]).max()) ** 2
         self.starts = []
         for energy, duration, *_ in _STARTS:
             # the spectrum of a pulse falls off beyond the inverse of what it lasts
@@ -391,11 +378,7 @@ class Plan(NamedTuple):
 
 
 def choose_base_step(
-    model: ReducedModel,
-    contact: ContactLaw | None,
-    *,
-    step: float | None = None,
-    accuracy: str = "standard",
+    model: ReducedModel, contact: ContactLaw | None, *, step: float | None = None, accuracy: str = "standard"
 ) -> Plan:
     """The steps of a run: short enough in flight, as measured on the model itself, and for an impact.
 
@@ -420,15 +403,11 @@ def choose_base_step(
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * _first_frequency(model)
         duration = contact.time_scale(mass, speed)
     longer = order == 4 and not (contact is not None and contact.impulsive)
-    flight = flight_step(
-        model, order, limits[accuracy], duration if duration > 0.0 else math.inf, resonances=longer
-    )
+    flight = flight_step(model, order, limits[accuracy], duration if duration > 0.0 else math.inf, resonances=longer)
     if accuracy == "reference" and fastest * flight > _FREE_TURN:
         flight = _FREE_TURN / fastest
     damping = model.modal_damping
-    decay = max(
-        float((damping.ratio * model.omega).max()), 0.5 * float(np.abs(damping.coefficients).max(initial=0.0))
-    )
+    decay = max(float((damping.ratio * model.omega).max()), 0.5 * float(np.abs(damping.coefficients).max(initial=0.0)))
     if decay * flight > _MOST_DECAY:
         flight = _MOST_DECAY / decay
     impact = flight
@@ -462,12 +441,7 @@ class Clocked(NamedTuple):
 
 
 def clocked(
-    table: Records,
-    system: System,
-    integration: Integration,
-    cycle: _Array,
-    plans: list[Plan],
-    periods: float | None,
+    table: Records, system: System, integration: Integration, cycle: _Array, plans: list[Plan], periods: float | None
 ) -> Clocked:
     """Enter the ticks of every run in the table of runs.
 
@@ -485,9 +459,7 @@ def clocked(
     repeats = drive is None or (drive.is_periodic and alone)
     table["step"] = SUBDIVISION
     table["contact_step"] = [
-        min(
-            plan.contact, plan.step * 0.5**plan.min_contact_halvings if plan.contact == math.inf else math.inf
-        )
+        min(plan.contact, plan.step * 0.5**plan.min_contact_halvings if plan.contact == math.inf else math.inf)
         for plan in plans
     ]
     table["min_contact_halvings"] = [plan.min_contact_halvings for plan in plans]
@@ -506,9 +478,7 @@ def clocked(
         held = drive.duration * drive.frequency
         table["output_interval"] = np.rint(table["period"] / held)
         share = cycles_asked / drive.frequency / drive.duration
-        table["end"] = np.rint(
-            share * table["period"] if periods is None else cycles_asked * table["output_interval"]
-        )
+        table["end"] = np.rint(share * table["period"] if periods is None else cycles_asked * table["output_interval"])
         table["end"] = np.minimum(table["end"], np.rint(left * table["period"]))
         cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
     else:
@@ -535,9 +505,7 @@ def clocked(
     return Clocked(cycles)
 
 
-def _asked_cycles(
-    drive: RecordedMotion, integration: Integration, periods: float | None, left: float
-) -> float:
+def _asked_cycles(drive: RecordedMotion, integration: Integration, periods: float | None, left: float) -> float:
     """Cycles to integrate, of a record of which a share *left* is still to come."""
     held = drive.duration * drive.frequency * left
     cycles_asked = integration.cycles if periods is None else periods
@@ -614,9 +582,7 @@ def long_run(modes: int, length: float, steps: float, limited: str) -> list[Diag
         f"the run has {steps:.3g} steps of {length:.3g} s in flight alone and may take some {_words(seconds)} or more; "
         f"{limited}"
     )
-    return [
-        Diagnostic("run.long", message, {"steps": steps, "step": length, "seconds": seconds}, Severity.INFO)
-    ]
+    return [Diagnostic("run.long", message, {"steps": steps, "step": length, "seconds": seconds}, Severity.INFO)]
 
 
 def long_sweep(runs: int, steps: float, each: float, cores: int, early: bool = False) -> list[Diagnostic]:

@@ -331,9 +331,7 @@ def structure_of(
                 structure, striker, contact, carried_by_base=base is not None and base.striker_on_base
             )
     for contact in indentations:
-        structure = dataclasses.replace(
-            _with_mode(structure), indentations=(*structure.indentations, contact)
-        )
+        structure = dataclasses.replace(_with_mode(structure), indentations=(*structure.indentations, contact))
     for harvester in harvesters:
         structure = _with_circuit(structure, harvester)
     return structure
@@ -341,11 +339,7 @@ def structure_of(
 
 def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalForce) -> LocalForceRow:
     shape = local_force.row(model)
-    return LocalForceRow(
-        model.linear_modes.T @ shape,
-        float(shape @ equilibrium),
-        local_force.numbers,
-    )
+    return LocalForceRow(model.linear_modes.T @ shape, float(shape @ equilibrium), local_force.numbers)
 
 
 def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> UnequalWells | None:
@@ -372,11 +366,7 @@ def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> 
 
 
 def _with_mode(
-    structure: Structure,
-    omega: float = 0.0,
-    damping_ratio: float = 0.0,
-    base_load: float = 0.0,
-    shift: float = 0.0,
+    structure: Structure, omega: float = 0.0, damping_ratio: float = 0.0, base_load: float = 0.0, shift: float = 0.0
 ) -> Structure:
     """The structure with one more mode, which the tension does not couple with the others."""
     count = structure.omega.size + 1
@@ -394,9 +384,7 @@ def _with_mode(
         shift=np.append(structure.shift, shift),
         unequal_wells=None
         if wells is None
-        else dataclasses.replace(
-            wells, force=np.append(wells.force, 0.0), second=np.append(wells.second, 0.0)
-        ),
+        else dataclasses.replace(wells, force=np.append(wells.force, 0.0), second=np.append(wells.second, 0.0)),
         base_load=None if structure.base_load is None else np.append(structure.base_load, base_load),
         force_rows=tuple(np.append(each, 0.0) for each in structure.force_rows),
         local_forces=_longer(structure.local_forces),

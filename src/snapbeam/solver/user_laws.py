@@ -55,9 +55,7 @@ class Function:
         self._called = ctypes.CFUNCTYPE(double, *[double] * doubles, ctypes.POINTER(double))(called)
         self.why_slow, self._compiled = _compile(function, doubles, compiled, self._called)
         self.address = int(
-            self._compiled.address
-            if self._compiled
-            else ctypes.cast(self._called, ctypes.c_void_p).value or 0
+            self._compiled.address if self._compiled else ctypes.cast(self._called, ctypes.c_void_p).value or 0
         )
 
     def check(self) -> None:
@@ -80,9 +78,7 @@ def _compile(function: Any, doubles: int, compiled: Any, called: Any) -> tuple[s
         return "", numba.cfunc(real(*[real] * doubles, numba.types.CPointer(real)))(made)
     except Exception as error:
         lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]
-        reasons = [line for line in lines if line and not line.startswith("Failed in")] or [
-            type(error).__name__
-        ]
+        reasons = [line for line in lines if line and not line.startswith("Failed in")] or [type(error).__name__]
         return f"Numba cannot compile {function.__name__} ({reasons[0]})", None
 
 
@@ -231,9 +227,7 @@ def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, flo
     functions = tuple(each for each in made if each is not None)
     reasons = dict.fromkeys(each.why_slow for each in functions if each.why_slow)
     tell(
-        Diagnostic(
-            "law.slow", f"{kind.__name__}: the solver calls Python for every force, which is slow: {each}"
-        )
+        Diagnostic("law.slow", f"{kind.__name__}: the solver calls Python for every force, which is slow: {each}")
         for each in reasons
     )
     low, high = np.clip(limits, -_FAR, _FAR).tolist()

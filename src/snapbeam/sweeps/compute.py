@@ -122,9 +122,7 @@ class CheckpointOptions:
         if self.path is None and self.check_checkpoint:
             raise InputError("check_checkpoint = True: needs a checkpoint; give its folder as path")
         if self.path is not None and self.check_checkpoint and not (Path(self.path) / "map.json").is_file():
-            raise InputError(
-                f"checkpoint = {str(self.path)!r}: is not the folder of a sweep, so it cannot be checked"
-            )
+            raise InputError(f"checkpoint = {str(self.path)!r}: is not the folder of a sweep, so it cannot be checked")
 
 
 def _scattered(task: int) -> float:
@@ -164,9 +162,7 @@ class CheckpointRunner:
         counts.resumed += stage.tasks - len(pending)
         counts.damaged += [(stage.name, task) for task in damaged]
         if damaged:
-            self.note(
-                f"{stage.name}: {len(damaged)} of {stage.tasks} tasks are damaged; they are computed again"
-            )
+            self.note(f"{stage.name}: {len(damaged)} of {stage.tasks} tasks are damaged; they are computed again")
         todo = sorted(damaged if self.only_damaged else pending, key=_scattered)
         if todo and store.read_only:
             raise CheckpointError(
@@ -264,9 +260,7 @@ def _runner(work: PointWork, options: CheckpointOptions, cluster: Cluster | None
             yield CheckpointRunner(kept, ClusterWorkers(client, note), options)
 
 
-def _result(
-    work: PointWork, points: Points, rows: ResultRows, more: dict[str, Any], target: Path | None
-) -> xr.Dataset:
+def _result(work: PointWork, points: Points, rows: ResultRows, more: dict[str, Any], target: Path | None) -> xr.Dataset:
     from snapbeam.util.datasets import xr
 
     if work.replicates is not None:
@@ -298,11 +292,7 @@ def _result(
 
 
 def compute_table(
-    work: PointWork,
-    options: CheckpointOptions,
-    *,
-    cluster: str | None = None,
-    progress: Progress | None = None,
+    work: PointWork, options: CheckpointOptions, *, cluster: str | None = None, progress: Progress | None = None
 ) -> tuple[ResultTable, dict[str, Any]]:
     """Compute any work over the points of its sweep, with a checkpoint if its options give one.
 

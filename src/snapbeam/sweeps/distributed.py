@@ -224,9 +224,7 @@ class ClusterWorkers:
                         queue.append(task)
                         continue
                     if not pool.succeeded and outcome.reason.startswith("raised"):
-                        raise CheckpointError(
-                            f"the workers cannot compute this sweep: a task {outcome.reason}"
-                        )
+                        raise CheckpointError(f"the workers cannot compute this sweep: a task {outcome.reason}")
                     yield task, TaskError(f"{outcome.reason}, {ATTEMPTS} times")
         finally:
             if running:
@@ -264,9 +262,7 @@ class ClusterWorkers:
         if future.status == "finished":
             return self._delivered(future, address)
         if future.status == "cancelled":
-            return (
-                TaskError("was cancelled") if address in self._workers() else TaskError("killed its worker")
-            )
+            return TaskError("was cancelled") if address in self._workers() else TaskError("killed its worker")
         error = future.exception(timeout=self.delivery)
         if isinstance(error, KilledWorker):
             return TaskError("killed its worker")
@@ -390,9 +386,7 @@ def _read_slurm(path: Path) -> dict[str, Any]:
         if name not in _SLURM:
             raise InputError(f"{path.name}: [slurm] {name}: unknown key; must be one of {', '.join(_SLURM)}")
         if not isinstance(value, _SLURM[name]) or isinstance(value, bool):
-            raise InputError(
-                f"{path.name}: [slurm] {name} = {shown(value)}: must be of type {_SLURM[name].__name__}"
-            )
+            raise InputError(f"{path.name}: [slurm] {name} = {shown(value)}: must be of type {_SLURM[name].__name__}")
     for name in _NEEDED:
         if name not in given:
             raise InputError(

@@ -59,9 +59,7 @@ def to_netcdf(work: PointWork, points: Points, rows: ResultRows, attrs: dict[str
         file.attrs.update({name: value for name, value in attrs.items() if value is not None})
         coords = _coordinates(work, points)
         scalars = " ".join(name for name, (dims, _, _) in coords.items() if name not in dims)
-        file.dimensions = {
-            dims[0]: len(values) for name, (dims, values, _) in coords.items() if dims == (name,)
-        }
+        file.dimensions = {dims[0]: len(values) for name, (dims, values, _) in coords.items() if dims == (name,)}
         if isinstance(points, PointList):
             file.dimensions[points.dims[0]] = points.size
         for name, (dims, values, labels) in coords.items():
@@ -79,12 +77,7 @@ def to_netcdf(work: PointWork, points: Points, rows: ResultRows, attrs: dict[str
             stored = "int8" if kind == "bool" else kind
             fill = np.nan if kind == "float64" else None
             written[name] = file.create_variable(
-                name,
-                dims,
-                np.dtype(stored),
-                fillvalue=fill,
-                chunks=None if not dims else True,
-                **_COMPRESSION,
+                name, dims, np.dtype(stored), fillvalue=fill, chunks=None if not dims else True, **_COMPRESSION
             )
             written[name].attrs.update(labels | ({"dtype": "bool"} if kind == "bool" else {}))
             if scalars:

@@ -87,10 +87,7 @@ def _column(name: str, values: Any) -> NDArray[Any]:
 
 
 def read_measured_points(
-    path: str | os.PathLike[str],
-    *,
-    reference_frequency: float | None = None,
-    buckling_level: float | None = None,
+    path: str | os.PathLike[str], *, reference_frequency: float | None = None, buckling_level: float | None = None
 ) -> MeasuredPoints:
     """Read measured responses from a CSV file with a header.
 
@@ -125,9 +122,7 @@ def read_measured_points(
     """
     file = file_path("path", path)
     text = decoded(input_bytes("measurements", file), file.name)
-    first = next(
-        (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
-    )
+    first = next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
     mark = next((one for one in (";", "\t") if one in first), ",")
     rows = [
         (number, [cell.strip() for cell in cells])
@@ -140,9 +135,7 @@ def read_measured_points(
     _check_header(file.name, header)
     frequency_scale, velocity_scale = 1.0, 1.0
     if "frequency_hz" in header:
-        frequency_scale = 1.0 / _wanted(
-            file.name, "frequency_hz", "reference_frequency", reference_frequency, "Hz"
-        )
+        frequency_scale = 1.0 / _wanted(file.name, "frequency_hz", "reference_frequency", reference_frequency, "Hz")
     if "velocity_m_s" in header:
         freq = _wanted(file.name, "velocity_m_s", "reference_frequency", reference_frequency, "Hz")
         level = _wanted(file.name, "velocity_m_s", "buckling_level", buckling_level, "m")
@@ -154,9 +147,7 @@ def read_measured_points(
     for number, raw in rows[1:]:
         cells = raw if mark == "," else [_pointed(cell) for cell in raw]
         if len(cells) != len(header):
-            raise InputError(
-                f"{file.name}, line {number}: has {len(cells)} cells, the header names {len(header)}"
-            )
+            raise InputError(f"{file.name}, line {number}: has {len(cells)} cells, the header names {len(header)}")
         status = cells[header.index("status")] if "status" in header else "measured"
         if status != "measured":
             continue  # a test that gave no number is a row of words
@@ -210,9 +201,7 @@ def _pointed(cell: str) -> str:
 
 
 def _kind(name: str, line: int, cell: str) -> ResponseClass:
-    word = " ".join(
-        cell.lower().replace("_", " ").replace("-", " -" if cell.startswith("-") else " ").split()
-    )
+    word = " ".join(cell.lower().replace("_", " ").replace("-", " -" if cell.startswith("-") else " ").split())
     if word not in _CLASSES:
         known = ", ".join(dict.fromkeys(kind.label for kind in ResponseClass))
         raise InputError(f"{name}, line {line}, column 'response_class': {cell!r} must be one of {known}")

@@ -12,22 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.parameter_axes import (
-    axis_that_changes_unit,
-    checked_physical,
-    parse_axis,
-    ratios_of,
-    unit_of,
-)
-from snapbeam.model.parameters import (
-    PHYSICAL,
-    Parameter,
-    lookup,
-    parameters,
-    ratio_of,
-    refuse_well_axis,
-    short_names,
-)
+from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physical, parse_axis, ratios_of, unit_of
+from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters, ratio_of, refuse_well_axis, short_names
 from snapbeam.model.quantity import split_name
 from snapbeam.util.provenance import array_hash
 from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, require_texts, shown
@@ -164,10 +150,7 @@ class PointList:
 
     def describe(self) -> dict[str, Any]:
         """Return plain values that identify the list."""
-        return {
-            name: {"points": values.size, "sha256": array_hash(values)}
-            for name, values in self.columns.items()
-        }
+        return {name: {"points": values.size, "sha256": array_hash(values)} for name, values in self.columns.items()}
 
 
 Points = Grid | PointList
@@ -213,9 +196,7 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any, system: System | None
         columns = {str(name): np.asarray(given[name].values) for name in given.variables}
         return _list_in_ratios(_list_of(columns), system)
     if hasattr(given, "columns") and hasattr(given, "to_dict"):
-        return _list_in_ratios(
-            _list_of({str(name): np.asarray(given[name]) for name in given.columns}), system
-        )
+        return _list_in_ratios(_list_of({str(name): np.asarray(given[name]) for name in given.columns}), system)
     if not isinstance(given, Mapping):
         raise InputTypeError(
             f"axes = {shown(given)}: must be a mapping of parameters to values, an xarray.Dataset or a table of points"
@@ -312,9 +293,7 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
             known[row.name] = np.array([item.check(name, value) for value in values.tolist()])
         else:
             numbers = finite_array(name, values, 1)
-            known[row.name] = np.array(
-                [item.check(f"{name}[{i}]", value) for i, value in enumerate(numbers.tolist())]
-            )
+            known[row.name] = np.array([item.check(f"{name}[{i}]", value) for i, value in enumerate(numbers.tolist())])
     if not known:
         raise InputError(f"points with {', '.join(columns)}: must contain a parameter")
     lengths = {name: values.size for name, values in (known | labels).items()}

@@ -72,9 +72,7 @@ def refine(runner: StageRunner, levels: int, progress: Progress | None = None) -
         raise InputError("refine_levels: a list of points cannot be refined; give axes")
     split = _split(grid)
     if not any(split):
-        raise InputError(
-            "refine_levels: needs an axis of at least two real numbers; add one, or set refine_levels = 0"
-        )
+        raise InputError("refine_levels: needs an axis of at least two real numbers; add one, or set refine_levels = 0")
     base = Stage("base", grid, runner.chunk)
     parts: list[tuple[_Index, ResultRows]] = [(np.arange(grid.size), runner.complete(base, progress))]
     classes = _classes(runner, parts[0][1], grid.size).reshape(grid.shape)
@@ -148,8 +146,7 @@ def _fine_slices(shape: tuple[int, ...], split: _Split) -> list[tuple[slice, ...
     cells = tuple((count - 1) // 2 if halved else count for count, halved in zip(shape, split, strict=True))
     return [
         tuple(
-            slice(o, o + 2 * c - 1, 2) if halved else slice(0, c)
-            for o, c, halved in zip(at, cells, split, strict=True)
+            slice(o, o + 2 * c - 1, 2) if halved else slice(0, c) for o, c, halved in zip(at, cells, split, strict=True)
         )
         for at in offsets
     ]
@@ -187,11 +184,7 @@ def _fill(corners: _Classes, fine: _Classes, computed: _Mask, active: _Mask, spl
 
 
 def _assemble(
-    runner: StageRunner,
-    grid: Grid,
-    parts: list[tuple[_Index, ResultRows]],
-    classes: _Classes,
-    computed: _Mask,
+    runner: StageRunner, grid: Grid, parts: list[tuple[_Index, ResultRows]], classes: _Classes, computed: _Mask
 ) -> RefinedRows:
     work = runner.work
     columns = work.unfinished(grid.size, RunStatus.FILLED)

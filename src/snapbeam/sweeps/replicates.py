@@ -76,9 +76,7 @@ def perturbed_start(system: System, replicates: Replicates, repeat: int, state: 
     per_unit = np.where(moving, 1.0 / np.where(moving, model.omega, 1.0), 0.0)
     reach = float(np.sqrt(np.sum(((model.midspan_shape @ model.linear_modes) * per_unit) ** 2)))
     if reach == 0.0:
-        raise InputError(
-            "replicates: no mode of this model moves the mid-span; use another model, or no replicates"
-        )
+        raise InputError("replicates: no mode of this model moves the mid-span; use another model, or no replicates")
     speed = replicates.perturbation_rms / reach
     generator = np.random.Generator(np.random.Philox(key=[replicates.seed, repeat]))
     q, velocity = generator.standard_normal((2, model.modes)) * speed

@@ -26,15 +26,7 @@ from snapbeam.solver.engines import engine_of
 from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.statistics import STATISTICS, statistics_of
 from snapbeam.solver.step_size import SUBDIVISION, Plan, long_sweep, require_resolved, seconds_of
-from snapbeam.sweeps.points import (
-    Columns,
-    Grid,
-    PointList,
-    Points,
-    labels_of,
-    points_of,
-    require_memory,
-)
+from snapbeam.sweeps.points import Columns, Grid, PointList, Points, labels_of, points_of, require_memory
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.status_codes import ResponseClass, RunStatus
@@ -83,8 +75,7 @@ def _ends(points: Points) -> list[int]:
     if isinstance(points, Grid):
         corners = [(0,) * len(points.shape)]
         corners += [
-            tuple(size - 1 if i == at else 0 for i in range(len(points.shape)))
-            for at, size in enumerate(points.shape)
+            tuple(size - 1 if i == at else 0 for i in range(len(points.shape))) for at, size in enumerate(points.shape)
         ]
         return [int(np.ravel_multi_index(corner, points.shape)) for corner in dict.fromkeys(corners)]
     numbers = [values for values in points.columns.values() if values.dtype.kind in "if"]
@@ -168,9 +159,7 @@ class SweepSetup:
             for part in _alike(system, state, which.size):
                 columns_of_part = {name: values[part] for name, values in own.items()}
                 begun = state[part] if state is not None and state.batch else state
-                ensemble = make_ensemble(
-                    system, integration, columns_of_part, start=begun, step_factor=step_factor
-                )
+                ensemble = make_ensemble(system, integration, columns_of_part, start=begun, step_factor=step_factor)
 
                 def report(inside: int, _: int, before: int = done) -> None:
                     if progress is not None:
@@ -190,9 +179,7 @@ class SweepSetup:
         own = [name for name in columns if name not in structural]
         total = next(iter(columns.values())).size
         if not structural:
-            points = ratios_of(
-                self.system, {name: np.asarray(columns[name], dtype=np.float64) for name in own}
-            )
+            points = ratios_of(self.system, {name: np.asarray(columns[name], dtype=np.float64) for name in own})
             yield self.system, self.integration, np.arange(total), points
             return
         keys: dict[tuple[Any, ...], list[int]] = {}
@@ -225,9 +212,7 @@ class SweepSetup:
     def start_of(system: System, points: dict[str, NDArray[np.float64]]) -> State | None:
         """Return the initial conditions of the runs, if the points determine them."""
         prefix = "initial_state."
-        own = {
-            name.removeprefix(prefix): values for name, values in points.items() if name.startswith(prefix)
-        }
+        own = {name.removeprefix(prefix): values for name, values in points.items() if name.startswith(prefix)}
         return started(system.model, system.start_state, own) if own else None
 
     @cached_property
@@ -266,9 +251,7 @@ class SweepSetup:
             axes = {name: self.points.axes[name] for name in names}
             first = {name: values[0].item() for name, values in axes.items()}
             asked = [
-                first | {name: values[at].item()}
-                for name, values in axes.items()
-                for at in (0, values.size // 2, -1)
+                first | {name: values[at].item()} for name, values in axes.items() for at in (0, values.size // 2, -1)
             ]
         else:
             table = {name: np.asarray(self.points.columns[name]).ravel() for name in names}
@@ -291,9 +274,7 @@ class SweepSetup:
 
     def identity(self) -> dict[str, Any]:
         """Return plain values of everything that the results depend on; sweeps with equal values have equal results."""
-        integration = {
-            name: getattr(self.integration, name) for name in quantities(Integration) if name != "threads"
-        }
+        integration = {name: getattr(self.integration, name) for name in quantities(Integration) if name != "threads"}
         return {
             "system": self.system.to_mapping(),
             "integration": integration,
@@ -440,6 +421,8 @@ def announce_long_sweep(setup: SweepSetup, repeats: int = 1, *, by_cluster: bool
     The estimate is that of a run (:func:`~snapbeam.solver.step_size.seconds_of`), averaged over points in all parts of the sweep, or
     over the limits of its axes if each point has a model of its own.
     """
+    if setup.integration.engine == "cuda":
+        return
     size, alike = setup.points.size, all(lookup(name).is_run for name in setup.points.names)
     cycles = setup.integration.cycles  # none given: those of a record may be many
     if cycles is not None and size * repeats * cycles * setup.system.model.modes <= _FEW and alike:

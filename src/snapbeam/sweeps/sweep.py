@@ -86,9 +86,7 @@ def sweep(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> axes = {"model.damping_ratio": [0.002, 0.005], "drive.frequency_ratio": [0.8, 1.0, 1.2]}
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> dict(dataset.sizes)

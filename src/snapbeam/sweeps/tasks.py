@@ -119,9 +119,7 @@ class PointWork:
             digest.update(np.ascontiguousarray(values).tobytes())
         return digest.hexdigest()
 
-    def compute(
-        self, points: Columns, threads: int | None = None, progress: Progress | None = None
-    ) -> ResultTable:
+    def compute(self, points: Columns, threads: int | None = None, progress: Progress | None = None) -> ResultTable:
         """Integrate all runs of *points*, replicates included."""
         setup, size = self.setup, next(iter(points.values())).size
         total = size * self.runs_per_point
@@ -151,9 +149,7 @@ class PointWork:
                 repeats.append(setup.integrate(points, threads, report, step_factor=0.5)["response_class"])
                 results[_HALVED] = repeats[-1]
             kinds = np.array(repeats)
-            results |= {
-                name: (kinds == kind).sum(axis=0) for name, kind in zip(_COUNTS, CLASSES, strict=True)
-            }
+            results |= {name: (kinds == kind).sum(axis=0) for name, kind in zip(_COUNTS, CLASSES, strict=True)}
         return ResultTable(
             np.stack([results[name] for name in self.integers], axis=1).astype(np.int32),
             np.stack([results[name] for name in self.numbers], axis=1).astype(np.float64),
@@ -171,8 +167,7 @@ class PointWork:
     def variables(self) -> dict[str, tuple[str, bool, dict[str, Any]]]:
         """Return for each variable its data type, whether it has one value for each class, and its attributes."""
         variables = {
-            name: (row.dtype, False, variable_attributes(name, self.metres))
-            for name, row in self.statistics.items()
+            name: (row.dtype, False, variable_attributes(name, self.metres)) for name, row in self.statistics.items()
         }
         if self.replicates is not None:
             labels = {"units": "1", "long_name": "fraction of the runs of a point, by response class"}
@@ -198,8 +193,7 @@ class PointWork:
         """Return the rows of several parts as one table."""
         whole = [self.unfinished(0), *parts]
         return ResultTable(
-            np.concatenate([part.integers for part in whole]),
-            np.concatenate([part.numbers for part in whole]),
+            np.concatenate([part.integers for part in whole]), np.concatenate([part.numbers for part in whole])
         )
 
 

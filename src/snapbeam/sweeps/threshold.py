@@ -110,10 +110,7 @@ def threshold(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> found = sb.threshold(
     ...     system, "drive.velocity_amplitude", [0.02, 0.08, 0.14, 0.2],
     ...     {"drive.frequency_ratio": [1.0, 1.2]}, sb.Integration(cycles=20),
@@ -194,13 +191,7 @@ def _thresholds(response: NDArray[np.int8]) -> dict[str, NDArray[Any]]:
     always_max = _lowest(interwell & _above_all(intrawell | failed))
     below = intrawell & (np.arange(count) < first[..., None])
     outcome = np.select(
-        [
-            failed.all(axis=-1),
-            (first == count) & failed.any(axis=-1),
-            first == count,
-            first == 0,
-            always == count,
-        ],
+        [failed.all(axis=-1), (first == count) & failed.any(axis=-1), first == count, first == 0, always == count],
         [5, 4, 1, 2, 3],
         0,
     )
@@ -288,9 +279,7 @@ def threshold_notch(x: _Array, threshold: _Array, step: float, window: tuple[flo
     return Notch(float(0.5 * (x[first] + x[last])), float(threshold[at]), float(x[first]), float(x[last]))
 
 
-def class_fraction(
-    response: NDArray[np.int8], kind: ResponseClass, where: NDArray[np.bool_] | None = None
-) -> float:
+def class_fraction(response: NDArray[np.int8], kind: ResponseClass, where: NDArray[np.bool_] | None = None) -> float:
     """Return the fraction of the points, or of those selected by *where*, in a class; NaN without points."""
     points = response if where is None else response[where]
     return float(np.mean(points == kind)) if points.size else float("nan")

@@ -25,9 +25,7 @@ from .probability import probability_map as probability_map
 from .quantiles import QuantileSearchSettings as QuantileSearchSettings
 from .quantiles import quantile_threshold as quantile_threshold
 from .sensitivity_analysis import LifetimeQoI as LifetimeQoI
-from .sensitivity_analysis import NotchQoI as NotchQoI
 from .sensitivity_analysis import StatisticQoI as StatisticQoI
 from .sensitivity_analysis import ThresholdQoI as ThresholdQoI
 from .sensitivity_analysis import sensitivity as sensitivity
 from .sensitivity_analysis import sobol_indices as sobol_indices
-from .sensitivity_analysis import sobol_indices_from_samples as sobol_indices_from_samples

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from snapbeam.model.integration import Integration
 from snapbeam.sweeps.points import Columns, PointList, points_of
 from snapbeam.sweeps.sweep import sweep
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, trials_of, wilson
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, trials_of
 from snapbeam.uncertainty.optimization import OptimizerSettings, optimize_design
 from snapbeam.uncertainty.probability import SamplingPlan, allocation_of, probability_map
 from snapbeam.uncertainty.quantiles import QuantileSearchSettings, quantile_threshold
+from snapbeam.util.proportions import proportion
 from snapbeam.util.validation import InputError, checked, within
 
 LONG = 600.0
@@ -55,9 +56,7 @@ class CostEstimate:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -92,9 +91,7 @@ class CostEstimate:
 
 
 @checked
-def estimate_cost(
-    question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **options: Any
-) -> CostEstimate:
+def estimate_cost(question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **options: Any) -> CostEstimate:
     """Estimate the cost of a computation from a trial of some seconds.
 
     Parameters
@@ -115,9 +112,7 @@ def estimate_cost(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -180,16 +175,14 @@ def _needed(share: float, allocation: SamplingPlan) -> int:
     assert allocation.half_width is not None
     n = allocation.initial_runs
     while n < allocation.max_runs:
-        _, low, high = wilson(share * n, n, allocation.confidence)
+        _, low, high = proportion(share * n, n, allocation.confidence)
         if 0.5 * float(high - low) <= allocation.half_width:
             break
         n = int(n * 1.05) + 1
     return min(n, allocation.max_runs)
 
 
-def _expected(
-    allocation: SamplingPlan, where: NDArray[np.int64], happened: NDArray[np.bool_], points: int
-) -> int:
+def _expected(allocation: SamplingPlan, where: NDArray[np.int64], happened: NDArray[np.bool_], points: int) -> int:
     """Runs of a map, from few runs at few points: those with both outcomes need more."""
     if allocation.half_width is None:
         return points * allocation.initial_runs

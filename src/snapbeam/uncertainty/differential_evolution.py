@@ -157,9 +157,7 @@ def _beats(objectives: _Array, broken: float, others: _Array, others_broken: flo
 
 def front_of(objectives: _Array) -> NDArray[np.bool_]:
     """Mask of the designs that no other one dominates, shape (designs,)."""
-    return np.array(
-        [not any(dominates(other, own) for other in objectives) for own in objectives], dtype=bool
-    )
+    return np.array([not any(dominates(other, own) for other in objectives) for own in objectives], dtype=bool)
 
 
 def _ranked(objectives: _Array, broken: _Array) -> NDArray[np.int64]:

@@ -77,9 +77,7 @@ class Normal(Distribution):
     kind: ClassVar[str] = "normal"
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "standard_deviation", positive("standard_deviation", self.standard_deviation)
-        )
+        object.__setattr__(self, "standard_deviation", positive("standard_deviation", self.standard_deviation))
         flag("relative", self.relative)
 
     def at(self, nominal: _Array, normal: _Array) -> _Array:
@@ -217,9 +215,7 @@ class Empirical(Distribution):
         return np.asarray(np.interp(ndtr(normal), ranks, self.quantiles) + 0.0 * nominal)
 
 
-KINDS: dict[str, type[Distribution]] = {
-    each.kind: each for each in (Normal, UniformTolerance, LogNormal, UniformRange)
-}
+KINDS: dict[str, type[Distribution]] = {each.kind: each for each in (Normal, UniformTolerance, LogNormal, UniformRange)}
 """Distributions by the names that files use."""
 
 
@@ -292,13 +288,9 @@ class ParameterUncertainty:
                 )
             seed = split_name(row.name)[1] == "seed" and row.section != "integration"
             if seed and not isinstance(each, UniformRange):
-                raise InputError(
-                    f"{name} = {each!r}: must be a UniformRange, such as UniformRange(0, 1000000)"
-                )
+                raise InputError(f"{name} = {each!r}: must be a UniformRange, such as UniformRange(0, 1000000)")
             if not seed and (row.quantity.kind is not float or row.section == "integration"):
-                raise InputError(
-                    f"{name}: cannot be uncertain; must be a real number of the system, or a seed"
-                )
+                raise InputError(f"{name}: cannot be uncertain; must be a real number of the system, or a seed")
             if row.name in of:
                 raise InputError(f"{name}: is given twice")
             of[row.name] = each
@@ -378,9 +370,7 @@ class ParameterUncertainty:
         names = sorted(self.of)
         scores = np.empty((which.size, len(names)))
         for row, number in zip(scores, which.tolist(), strict=True):
-            row[:] = np.random.Generator(np.random.Philox(key=[self.seed, number])).standard_normal(
-                len(names)
-            )
+            row[:] = np.random.Generator(np.random.Philox(key=[self.seed, number])).standard_normal(len(names))
         # a parameter's own scores hang on its rank among the names alone, not on the order in which they were given
         scores = scores[:, [names.index(name) for name in self.of]]
         if self.correlation is not None:
@@ -400,9 +390,7 @@ class ParameterUncertainty:
 
 
 def uncertainty_from_mapping(
-    given: Mapping[str, Any],
-    name: str = "uncertainty",
-    full_name: Callable[[str], str] = str,
+    given: Mapping[str, Any], name: str = "uncertainty", full_name: Callable[[str], str] = str
 ) -> ParameterUncertainty:
     """Read the uncertainty from a section of a parameter file.
 
@@ -441,9 +429,7 @@ def _distribution(name: str, table: Mapping[str, Any]) -> Distribution:
     kinds = [key for key in table if key in KINDS]
     others = [key for key in table if key not in KINDS and key != "relative"]
     if len(kinds) != 1 or others:
-        raise InputError(
-            f"{name} = {shown(dict(table))}: must name one of {', '.join(KINDS)}, and may say relative"
-        )
+        raise InputError(f"{name} = {shown(dict(table))}: must name one of {', '.join(KINDS)}, and may say relative")
     value = table[kinds[0]]
     more = {key: table[key] for key in table if key == "relative"}
     if kinds[0] == "range":

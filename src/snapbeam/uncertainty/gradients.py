@@ -27,13 +27,7 @@ if TYPE_CHECKING:
 _Array = NDArray[np.float64]
 _STEP = 1e-5
 """Relative change of a parameter over which numbers of a run and the formulas of statistics are differentiated."""
-_SQUARES = (
-    "square_displacement",
-    "square_center",
-    "square_velocity",
-    "square_midspan_velocity",
-    "energy_time",
-)
+_SQUARES = ("square_displacement", "square_center", "square_velocity", "square_midspan_velocity", "energy_time")
 _FAR = 1e-3
 """Relative change of the sums under a root or in a quotient over that step, beyond which the formulas are not linear: the motion is chaotic."""
 _DOUBTFUL = 1e-4
@@ -108,9 +102,7 @@ def gradient(
     how = instance(
         "integration", Integration() if integration is None else integration, Integration, "an Integration"
     ).replace(early_termination=False)
-    names = [
-        system.parameter(name).name for name in ([parameters] if isinstance(parameters, str) else parameters)
-    ]
+    names = [system.parameter(name).name for name in ([parameters] if isinstance(parameters, str) else parameters)]
     if not names or len(set(names)) < len(names):
         raise InputError(f"parameters = {shown(parameters)}: must be different names, at least one")
     here = np.array([_value(system, name) for name in names])
@@ -154,8 +146,7 @@ def _exact(
         beside = []
         for i in which:
             above, below = (
-                make_ensemble(system.replace(**{names[i]: here[i] * side}), how, step_factor=factor)
-                for side in sides
+                make_ensemble(system.replace(**{names[i]: here[i] * side}), how, step_factor=factor) for side in sides
             )
             beside.append((above, below, 2.0 * _STEP * here[i]))
         same = [native.differentiable(above, below) for above, below, _ in beside]
@@ -166,15 +157,11 @@ def _exact(
         pairs, grown, whole = native.changed_accumulators(ensemble, beside, how.threads)
         with np.errstate(invalid="ignore"):  # chaos: a sum of squares may become negative; the error says so
             values = [
-                [
-                    float(statistics_of(near, rows)[quantity][0])
-                    for near, rows in zip(both, each, strict=False)
-                ]
+                [float(statistics_of(near, rows)[quantity][0]) for near, rows in zip(both, each, strict=False)]
                 for both, each in zip(beside, pairs, strict=True)
             ]
         far = [
-            any(abs(high[name][0] - low[name][0]) > _FAR * whole[name][0] for name in _SQUARES)
-            for high, low in pairs
+            any(abs(high[name][0] - low[name][0]) > _FAR * whole[name][0] for name in _SQUARES) for high, low in pairs
         ]
         found.append((np.array(values) @ (1.0, -1.0)) / (2.0 * _STEP))
         counts = np.array(
@@ -187,12 +174,7 @@ def _exact(
     change = np.abs(found[1] - found[0]) / 3.0  # of first order in the step, at least
     error[which] = np.where(change == 0.0, 0.0, change / np.maximum(np.abs(found[1]), 1e-300))
     (one, some), (other, others) = impacts
-    grazes = (
-        (np.hstack((some, others)) != one).any(axis=1)
-        | (one != other)
-        | np.array(far)
-        | ~np.isfinite(found[1])
-    )
+    grazes = (np.hstack((some, others)) != one).any(axis=1) | (one != other) | np.array(far) | ~np.isfinite(found[1])
     error[which] = np.where(grazes, np.inf, error[which])
     return moved, error, growth
 
@@ -212,12 +194,8 @@ def _value(system: System, name: str) -> float:
 def _unit(quantity: str) -> str:
     """Unit of a statistic that has a derivative."""
     if quantity not in STATISTICS:
-        smooth = [
-            name for name, row in STATISTICS.items() if row.dtype == "float64" and name not in _NOT_SMOOTH
-        ]
-        raise InputError(
-            f"quantity = {shown(quantity)}: must be one of {', '.join(smooth)}, or a function of a system"
-        )
+        smooth = [name for name, row in STATISTICS.items() if row.dtype == "float64" and name not in _NOT_SMOOTH]
+        raise InputError(f"quantity = {shown(quantity)}: must be one of {', '.join(smooth)}, or a function of a system")
     row = STATISTICS[quantity]
     if row.dtype != "float64" or quantity in _NOT_SMOOTH:
         why = _NOT_SMOOTH.get(quantity, "is a class or a count, which changes by jumps")
@@ -245,9 +223,7 @@ def _by_systems(system: System, quantity: Callable[[System], float], names: list
     """Evaluate a function at rows of parameters."""
 
     def evaluate(rows: _Array) -> tuple[_Array, _Array | None]:
-        found = [
-            float(quantity(system.replace(**dict(zip(names, row.tolist(), strict=True))))) for row in rows
-        ]
+        found = [float(quantity(system.replace(**dict(zip(names, row.tolist(), strict=True))))) for row in rows]
         return np.array(found), None
 
     return evaluate

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.simulation.save import code_flags
-from snapbeam.uncertainty.monte_carlo import interval_of
+from snapbeam.util.proportions import proportion
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, InputTypeError, checked, integer, seed_of
 
@@ -35,9 +35,9 @@ def class_counts(dataset: xr.Dataset) -> NDArray[np.int64]:
     hits = dataset["hits"].transpose(..., "outcome")
     of = {str(name): hits.sel(outcome=name).values for name in hits["outcome"].values}
     intrawell = dataset["runs"].transpose(*hits.dims[:-1]).values - of["snap"]
-    return np.stack(
-        [intrawell, of["first_well"] - intrawell, of["other_well"], of["continuous"]], axis=-1
-    ).astype(np.int64)
+    return np.stack([intrawell, of["first_well"] - intrawell, of["other_well"], of["continuous"]], axis=-1).astype(
+        np.int64
+    )
 
 
 @checked
@@ -80,9 +80,7 @@ def score_measurements(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -112,7 +110,7 @@ def score_measurements(
     share = (mine + PSEUDOCOUNT) / (total + PSEUDOCOUNT * len(KNOWN_CLASSES))[:, None]
     kind = np.searchsorted(KNOWN_CLASSES, measurements.response_class[known])
     rows = np.arange(kind.size)
-    _, low, high = interval_of(mine[rows, kind], total, method="jeffreys")
+    _, low, high = proportion(mine[rows, kind], total)
     generator = np.random.Generator(np.random.Philox(key=[seed, 0]))
     ranks = generator.random((samples, kind.size))
     drawn = (ranks[..., None] > np.cumsum(share, axis=-1)[None, :, :-1]).sum(axis=-1)
@@ -157,9 +155,7 @@ def _nearest(
     found = []
     for name in dims:
         if name not in _COORDINATES:
-            raise InputError(
-                f"dataset over {name}: the measurements do not contain it; choose one of its points"
-            )
+            raise InputError(f"dataset over {name}: the measurements do not contain it; choose one of its points")
         axis, values = dataset[name].values, getattr(measurements, name)[known]
         if np.isnan(values).any():
             raise InputError(f"measurements: {name} is not given for all of them, but is an axis of the map")

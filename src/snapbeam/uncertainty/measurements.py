@@ -57,9 +57,7 @@ class ContactTest:
         for name in given:
             positive(name, getattr(self, name))
         if len(given) != 2:
-            raise InputError(
-                f"contact test with {', '.join(given) or 'nothing'}: must have two of {', '.join(names)}"
-            )
+            raise InputError(f"contact test with {', '.join(given) or 'nothing'}: must have two of {', '.join(names)}")
 
     def stiffness(self) -> tuple[float, float]:
         """Contact stiffness [N/m^1.5] and its standard error."""
@@ -127,12 +125,7 @@ class Measurements:
     contact: Sequence[ContactTest] = ()
 
     def __post_init__(self) -> None:
-        for name in (
-            "straight_frequencies",
-            "lower_well_frequencies",
-            "upper_well_frequencies",
-            "damping_ratio",
-        ):
+        for name in ("straight_frequencies", "lower_well_frequencies", "upper_well_frequencies", "damping_ratio"):
             values = _numbers(name, getattr(self, name))
             object.__setattr__(self, name, values)
             errors = getattr(self, f"{name}_se")
@@ -147,9 +140,7 @@ class Measurements:
         for name in ("lower_well", "upper_well"):
             shapes = getattr(self, f"{name}_shape")
             if not isinstance(shapes, (list, tuple)):
-                raise InputTypeError(
-                    f"{name}_shape = {shown(shapes)}: must be a list of words, one for each frequency"
-                )
+                raise InputTypeError(f"{name}_shape = {shown(shapes)}: must be a list of words, one for each frequency")
             object.__setattr__(self, f"{name}_shape", tuple(shapes))
             for i, shape in enumerate(shapes):
                 choice(f"{name}_shape[{i}]", shape, ("symmetric", "antisymmetric"))
@@ -213,9 +204,7 @@ def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[
         names = [field.name for field in fields(ContactTest)]
         for test in tests:
             if set(test) - set(names) or "closing_speed" not in test:
-                raise InputError(
-                    f"contact = {test}: must have closing_speed and two of {', '.join(names[1:4])}"
-                )
+                raise InputError(f"contact = {test}: must have closing_speed and two of {', '.join(names[1:4])}")
         contact = tuple(ContactTest(**test) for test in tests)
         return Measurements(**measured, contact=contact), sections
     except InputError as error:

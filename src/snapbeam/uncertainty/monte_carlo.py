@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import special
+from numpy.typing import NDArray
 
 from snapbeam.dynamics.flow import InitialConditions, held_in_space
-from snapbeam.dynamics.lifetimes import proportion as jeffreys
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameter_axes import unit_of
 from snapbeam.model.parameters import PHYSICAL, lookup, physical_names, ratio_of, row_of
@@ -29,13 +27,12 @@ from snapbeam.sweeps.tasks import PointWork
 from snapbeam.uncertainty.distributions import Distribution, Normal, ParameterUncertainty, UniformTolerance
 from snapbeam.util.diagnostics import DiagnosticWarning
 from snapbeam.util.status_codes import ResponseClass, RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, checked, choice, integer, shown, within
+from snapbeam.util.validation import InputError, InputTypeError, checked, integer, shown
 
 Statistics = dict[str, NDArray[Any]]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 _FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)
 _Array = NDArray[np.float64]
-INTERVALS = ("wilson", "jeffreys")
 
 
 _Numbers = NDArray[np.int64]
@@ -92,9 +89,7 @@ class Trials:
     progress: Progress | None = field(default=None, repr=False)
     """Called with the runs of a round, unless the round has a report of its own."""
 
-    def columns(
-        self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None
-    ) -> Columns:
+    def columns(self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None) -> Columns:
         """The parameters of the samples: those of the points, and those that are sampled around them.
 
         Parameters
@@ -172,9 +167,7 @@ class Trials:
     def _nominal(self, name: str) -> float:
         value = self.system.get(name) if ratio_of(name) in self.system.parameters else None
         if value is None or np.ndim(value) != 0:
-            same = [
-                each for each in self.system.parameters if split_name(each)[1] == split_name(name)[1] != ""
-            ]
+            same = [each for each in self.system.parameters if split_name(each)[1] == split_name(name)[1] != ""]
             way = f"; this system has {', '.join(same)}" if value is None and same else ""
             if way and name == "drive.phase":
                 way += ": leave phase = True out, and give it as a UniformRange(0, 2 pi)"
@@ -236,17 +229,13 @@ class Trials:
         """The start of every sample, as columns; one that would press the tip is turned about, so that it leaves it."""
         given = [name for name in columns if name.startswith("initial_state.")]
         if given:
-            raise InputError(
-                f"{given[0]}: is sampled by the displacement of the uncertainty; leave one of the two out"
-            )
+            raise InputError(f"{given[0]}: is sampled by the displacement of the uncertainty; leave one of the two out")
         striker, size = self.system.striker, numbers.size
         modes = self.system.model.modes
         given_place = 0.5 if striker is None else striker.location
         location = columns.get("contact.location", np.full(size, given_place))
         table = np.empty((size, 2, modes))
-        starts = InitialConditions(
-            count=1, displacement=self.uncertainty.displacement, seed=self.uncertainty.seed
-        )
+        starts = InitialConditions(count=1, displacement=self.uncertainty.displacement, seed=self.uncertainty.seed)
         for system, which in self._structures(columns, size):
             scale = amplitude_scale(system.model)
             speed = scale * 2.0 * np.pi * system.model.reference_frequency
@@ -274,9 +263,7 @@ def _folder(path: Path) -> Path:
     if path.exists() and not path.is_dir():
         raise InputError(f"checkpoint = {str(path)!r}: is a file; must be a folder")
     if not path.absolute().parent.is_dir():
-        raise InputError(
-            f"checkpoint = {str(path)!r}: {str(path.absolute().parent)!r} is not an existing folder"
-        )
+        raise InputError(f"checkpoint = {str(path)!r}: {str(path.absolute().parent)!r} is not an existing folder")
     if (path / "map.json").exists():
         raise InputError(f"checkpoint = {str(path)!r}: holds a sweep; give another folder")
     path.mkdir(exist_ok=True)
@@ -288,19 +275,13 @@ def _remedy(name: str, distribution: Distribution | None) -> str:
     others = "make the uncertainty smaller, or use a LogNormal or a UniformRange"
     if not isinstance(distribution, (Normal, UniformTolerance)) or distribution.relative:
         return others
-    width = (
-        distribution.half_width
-        if isinstance(distribution, UniformTolerance)
-        else distribution.standard_deviation
-    )
+    width = distribution.half_width if isinstance(distribution, UniformTolerance) else distribution.standard_deviation
     unit = lookup(name).quantity.unit
     meant = f"{width:g}{'' if unit == '1' else f' {unit}'}"
     return f"{meant} is in the unit of the parameter; for a share of its value set relative = true; {others}"
 
 
-def _require_allowed(
-    name: str, values: NDArray[np.float64], distribution: Distribution | None = None
-) -> None:
+def _require_allowed(name: str, values: NDArray[np.float64], distribution: Distribution | None = None) -> None:
     """Refuse samples that no system can have, with the advice to sample from something else."""
     for value in (values.min(), values.max()):
         try:
@@ -379,9 +360,7 @@ def sample_systems(system: System, uncertainty: ParameterUncertainty, count: int
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> thickness = sb.uncertainty.Normal(0.01, relative=True)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(of={"beam.thickness": thickness})
     >>> systems = sb.uncertainty.sample_systems(system, uncertainty, 20)
@@ -432,8 +411,7 @@ OUTCOMES: dict[str, Event] = {
         "the beam ends about the well it began in", lambda found: np.isin(found["response_class"], _FIRST)
     ),
     "other_well": Event(
-        "the beam ends about the other well",
-        lambda found: found["response_class"] == ResponseClass.TRANSIENT_2,
+        "the beam ends about the other well", lambda found: found["response_class"] == ResponseClass.TRANSIENT_2
     ),
 }
 """Outcomes that every probability map has.  The last three exclude each other and one of them happens."""
@@ -459,54 +437,3 @@ def require_held(names: Iterable[str], system: System) -> None:
                 f"{name}: the system has {strikers} striker{'s' * (strikers != 1)}; each has its own "
                 "statistics where there are several"
             )
-
-
-# A probability from counts, with its interval.
-
-
-def wilson(hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:
-    """A probability from counts, with Wilson's score interval (J. Am. Stat. Assoc. 22 (1927) 209).
-
-    With z the normal quantile of (1 + confidence)/2, the limits solve |h/n - p| = z sqrt(p(1 - p)/n).
-
-    Returns
-    -------
-    share, low, high : arrays
-        NaN, 0 and 1 where there are no runs.
-    """
-    good, total = np.broadcast_arrays(np.asarray(hits, dtype=np.float64), np.asarray(runs, dtype=np.float64))
-    if (good < 0).any() or (good > total).any():
-        raise InputError("hits: must be between 0 and the number of runs")
-    z = float(special.ndtri(0.5 * (1.0 + within("confidence", confidence, 0.0, 1.0))))
-    n = np.maximum(total, 1.0)
-    share = good / n
-    middle = (good + 0.5 * z * z) / (n + z * z)
-    half = z * np.sqrt(share * (1.0 - share) * n + 0.25 * z * z) / (n + z * z)
-    # at no and at all hits a limit is 0 and 1, to the last digit
-    low = np.where((good == 0) | (total == 0), 0.0, middle - half)
-    high = np.where((good == total) | (total == 0), 1.0, middle + half)
-    return np.where(total > 0, share, np.nan), low, high
-
-
-def interval_of(
-    hits: ArrayLike,
-    runs: ArrayLike,
-    failed: ArrayLike = 0,
-    *,
-    confidence: float = 0.95,
-    method: str = "wilson",
-) -> tuple[_Array, _Array, _Array]:
-    """A probability with its interval; runs that failed may have been hits or not, and widen it both ways.
-
-    Returns
-    -------
-    share, low, high : arrays
-    """
-    choice("interval", method, INTERVALS)
-    of = wilson if method == "wilson" else jeffreys
-    share = of(hits, runs, confidence)[0]
-    lost = np.asarray(failed)
-    total = np.asarray(runs) + lost
-    low = of(hits, total, confidence)[1]
-    high = of(np.asarray(hits) + lost, total, confidence)[2]
-    return share, low, high

@@ -19,16 +19,9 @@ from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Columns
 from snapbeam.uncertainty.differential_evolution import DifferentialEvolution, front_of
 from snapbeam.uncertainty.distributions import ParameterUncertainty
-from snapbeam.uncertainty.monte_carlo import (
-    OUTCOMES,
-    Trials,
-    interval_of,
-    reached,
-    require_held,
-    trials_of,
-    wilson,
-)
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, trials_of
 from snapbeam.util.diagnostics import Diagnostic, counting, tell
+from snapbeam.util.proportions import proportion
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import (
     InputError,
@@ -130,16 +123,12 @@ def quantity_of(name: str) -> DesignQuantity:
         row = STATISTICS[name]
         if row.dtype not in ("float64", "int32"):
             raise InputError(f"{name}: is not a number that can be minimised")
-        return DesignQuantity(
-            name, row.unit, row.long_name, "run", lambda _, found: found[name].astype(np.float64)
-        )
+        return DesignQuantity(name, row.unit, row.long_name, "run", lambda _, found: found[name].astype(np.float64))
     try:
         parameter = lookup(name)
     except InputError:
         known = ", ".join((*OWN, *OUTCOMES))
-        raise InputError(
-            f"{name}: is not a quantity; must be one of {known}, a statistic or a parameter"
-        ) from None
+        raise InputError(f"{name}: is not a quantity; must be one of {known}, a statistic or a parameter") from None
     full = parameter.name
     return DesignQuantity(
         full, parameter.quantity.unit, parameter.quantity.long_name, "design", lambda s, v: _own(full, v, s)
@@ -215,7 +204,7 @@ class Objective:
         """
         n = values.size
         if self._quantity.kind == "outcome":
-            found = interval_of(int(values.sum()), n, failed, confidence=confidence)
+            found = proportion(int(values.sum()), n, confidence, failed)
             return float(found[0]), float(found[1]), float(found[2])
         if n < 2 or failed:  # a run that failed might have been anything
             middle = float(np.mean(values)) if n else float("nan")
@@ -476,8 +465,8 @@ class DesignProblem:
                 continue
             kept = self._kept(constraint, found)
             row[0] = kept.sum() / max(int(good.sum()), 1)
-            row[1] = float(wilson(int(kept.sum()), good.size, confidence)[1])
-            row[2] = float(wilson(int(kept.sum()) + failed, good.size, confidence)[2])
+            row[1] = float(proportion(int(kept.sum()), good.size, confidence)[1])
+            row[2] = float(proportion(int(kept.sum()) + failed, good.size, confidence)[2])
         return Estimate(objectives, constraints, int(good.size), failed)
 
     def runs_of(self, x: _Array, numbers: NDArray[np.int64]) -> list[dict[str, NDArray[Any]]]:
@@ -535,9 +524,7 @@ class DesignProblem:
         return np.where(found > 0.0, found + len(self.constraints), 0.0)
 
     def _own_objectives(self, x: _Array) -> _Array:
-        return np.stack(
-            [self._sign(objective) * self._own(objective, x) for objective in self.objectives], axis=1
-        )
+        return np.stack([self._sign(objective) * self._own(objective, x) for objective in self.objectives], axis=1)
 
     @staticmethod
     def _sign(objective: Objective) -> float:
@@ -575,14 +562,14 @@ class DesignProblem:
             share = float(kept.mean())
             wanted = _share_for(constraint.required, self.validation_samples)
             if hopeful:
-                share, wanted = float(wilson(int(kept.sum()), kept.size, _SURE)[2]), constraint.required
+                share, wanted = float(proportion(int(kept.sum()), kept.size, _SURE)[2]), constraint.required
             total += max(0.0, wanted - share)
         return total
 
 
 def _share_for(required: float, runs: int, confidence: float = 0.95) -> float:
     """The smallest share of *runs* whose lower limit is at least *required*; 1 if there is none."""
-    low = np.asarray(wilson(np.arange(runs + 1), np.full(runs + 1, runs), confidence)[1])
+    low = np.asarray(proportion(np.arange(runs + 1), np.full(runs + 1, runs), confidence)[1])
     enough = np.flatnonzero(low >= required)
     return float(enough[0] / runs) if enough.size else 1.0
 
@@ -601,9 +588,7 @@ def problem_of(
     InputError
     """
     if not isinstance(variables, Mapping) or not variables:
-        raise InputTypeError(
-            f"variables = {shown(variables)}: must map at least one parameter to (low, high)"
-        )
+        raise InputTypeError(f"variables = {shown(variables)}: must map at least one parameter to (low, high)")
     bounds: dict[str, tuple[float, float]] = {}
     for name, pair in variables.items():
         row = trials.system.parameter(str(name))
@@ -622,8 +607,7 @@ def problem_of(
         bounds[row.name] = (low, high)
     made, kept = require_kinds(objectives, constraints)
     require_held(
-        [*(objective.quantity for objective in made), *(constraint.quantity for constraint in kept)],
-        trials.system,
+        [*(objective.quantity for objective in made), *(constraint.quantity for constraint in kept)], trials.system
     )
     integer("samples", samples, 8, 10**6)
     if trials.uncertainty.is_empty:
@@ -735,9 +719,7 @@ def design_problem(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -754,9 +736,7 @@ def design_problem(
     >>> objectives.shape
     (2, 1)
     """
-    trials = trials_of(
-        system, uncertainty, integration, checkpoint=checkpoint, early=_early(objectives, constraints)
-    )
+    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, early=_early(objectives, constraints))
     return problem_of(trials, variables, objectives, constraints, samples, validation_samples)
 
 
@@ -822,9 +802,7 @@ def optimize_design(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -947,12 +925,7 @@ def _refined(
         """Return whether a design satisfies the constraints, its signed objective, the deficit and the distances."""
         found = problem.estimate(design, numbers, effort.confidence)
         state, short = _holds(problem, found)
-        return (
-            state == 2,
-            sign * float(found.objectives[0, 0]),
-            short,
-            _distances(problem, design[None], [found])[0],
-        )
+        return (state == 2, sign * float(found.objectives[0, 0]), short, _distances(problem, design[None], [found])[0])
 
     good = np.flatnonzero(violation == 0.0)
     order = good[np.argsort(objectives[good, 0], kind="stable")]
@@ -972,7 +945,9 @@ def _refined(
         lacking.append((short, i))
         beyond = x[i]
     if best < 0:
-        words = f"none of {len(lacking)} checked designs satisfies the constraints; the one that lacks least is reported"
+        words = (
+            f"none of {len(lacking)} checked designs satisfies the constraints; the one that lacks least is reported"
+        )
         return _Refined(min(lacking)[1], words, [], [], [], [])
     low, high = np.array(list(problem.bounds.values())).T
     inside, chosen = x[best], best
@@ -1051,10 +1026,7 @@ def _dataset(
         "cycles": trials.integration.cycles_or_default, "modes": trials.system.model.modes,
     }  # fmt: skip
     if all(lookup(name).is_run for name in problem.names):  # otherwise the wells differ between designs
-        attrs |= {
-            "initial_well": trials.system.start_well,
-            "initial_well_reason": trials.system.initial_well_reason,
-        }
+        attrs |= {"initial_well": trials.system.start_well, "initial_well_reason": trials.system.initial_well_reason}
     attrs |= {f"fixed_{lookup(name).short}": +value for name, value in trials.system.parameters.items()
               if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
     dataset = xr.Dataset(attrs=attrs)
@@ -1068,37 +1040,26 @@ def _dataset(
     for k, objective in enumerate(problem.objectives):
         sign = -1.0 if objective.maximize else 1.0
         own = {"units": objective._quantity.unit, "long_name": objective.long_name}
-        for end, values in zip(
-            ("", "_low", "_high"), np.array([each.objectives[k] for each in found]).T, strict=True
-        ):
+        for end, values in zip(("", "_low", "_high"), np.array([each.objectives[k] for each in found]).T, strict=True):
             dataset[f"objective_{objective.label}{end}"] = (("design",), values, own)
         dataset[f"objective_{objective.label}_sought"] = (("design",), sign * objectives[chosen, k], own)
         seen = np.where(np.isfinite(objectives[:, k]), sign * objectives[:, k], np.nan)
         dataset[f"tried_objective_{objective.label}"] = (("tried",), seen, own)
     for k, constraint in enumerate(problem.constraints):
-        own = {
-            "units": "1",
-            "long_name": f"fraction of systems that satisfy the constraint of {constraint.quantity}",
-        }
-        own |= {
-            name: value for name in ("lower", "upper") if (value := getattr(constraint, name)) is not None
-        }
-        for end, values in zip(
-            ("", "_low", "_high"), np.array([each.constraints[k] for each in found]).T, strict=True
-        ):
+        own = {"units": "1", "long_name": f"fraction of systems that satisfy the constraint of {constraint.quantity}"}
+        own |= {name: value for name in ("lower", "upper") if (value := getattr(constraint, name)) is not None}
+        for end, values in zip(("", "_low", "_high"), np.array([each.constraints[k] for each in found]).T, strict=True):
             dataset[f"satisfied_{constraint.label}{end}"] = (("design",), values, own)
         required = 1.0 if constraint._quantity.kind == "design" else constraint.required
-        dataset[f"required_{constraint.label}"] = (
-            (),
-            required,
-            {"units": "1", "long_name": "required fraction"},
-        )
+        dataset[f"required_{constraint.label}"] = ((), required, {"units": "1", "long_name": "required fraction"})
         if constraint._quantity.kind == "design":
             unit = constraint._quantity.unit
             about = f"distance of {constraint.quantity} from its limit"
         else:
             unit = "1"
-            about = f"distance of the fraction that satisfies the constraint of {constraint.quantity} from the required one"
+            about = (
+                f"distance of the fraction that satisfies the constraint of {constraint.quantity} from the required one"
+            )
         labels = {"units": unit, "long_name": f"{about}; negative: violated"}
         dataset[f"distance_{constraint.label}"] = (("design",), reported[:, k], labels)
         dataset[f"tried_distance_{constraint.label}"] = (("tried",), distances[:, k], labels)

@@ -97,9 +97,7 @@ class Forward:
                     f"{state}_frequencies_se: is needed; without standard errors nothing can be said of the rest"
                 )
             if len(values) > self.modes:
-                raise InputError(
-                    f"{state}_frequencies: {len(values)} frequencies for a model of {self.modes} modes"
-                )
+                raise InputError(f"{state}_frequencies: {len(values)} frequencies for a model of {self.modes} modes")
         if not self.target.size:
             raise InputError("measured: has no frequency")
 
@@ -176,9 +174,7 @@ class Waveform:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> run = sb.simulate(system, sb.Integration(cycles=5))
     >>> displacement = run.dataset.displacement_at_striker.values * system.scale.length  # m, here of a simulation
     >>> waveform = sb.uncertainty.Waveform(
@@ -207,9 +203,7 @@ class Waveform:
         try:
             seen = np.array(self.displacement, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
-            raise InputTypeError(
-                f"displacement = {shown(self.displacement)}: must be an array of numbers"
-            ) from None
+            raise InputTypeError(f"displacement = {shown(self.displacement)}: must be an array of numbers") from None
         if seen.shape != time.shape or np.isinf(seen).any() or not np.isfinite(seen).any():
             raise InputError(f"displacement of shape {seen.shape}: must hold a number, or NaN, for each time")
         positive("standard_error", self.standard_error, "m")
@@ -323,7 +317,6 @@ class Posterior:
     >>> import snapbeam as sb
     >>> from snapbeam import paper
     >>> from snapbeam.lab import Measurements
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
     >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
     >>> posterior = sb.uncertainty.estimate_posterior(
     ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
@@ -379,9 +372,7 @@ class Posterior:
         """
         more = np.asarray(log_likelihood, dtype=np.float64)
         if more.shape != self.weights.shape or np.isnan(more).any():
-            raise InputError(
-                f"log_likelihood of shape {more.shape}: must have a number for each of the samples"
-            )
+            raise InputError(f"log_likelihood of shape {more.shape}: must have a number for each of the samples")
         with np.errstate(divide="ignore"):
             return replace(self, weights=special.softmax(np.log(self.weights) + more))
 
@@ -492,7 +483,6 @@ def estimate_posterior(
     >>> import snapbeam as sb
     >>> from snapbeam import paper
     >>> from snapbeam.lab import Measurements
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
     >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
     >>> posterior = sb.uncertainty.estimate_posterior(
     ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
@@ -548,9 +538,7 @@ def _known_by_themselves(measured: Measurements) -> list[tuple[str, Any, Any]]:
 
 
 def _has_frequencies(measured: Measurements) -> bool:
-    return bool(
-        measured.straight_frequencies or measured.lower_well_frequencies or measured.upper_well_frequencies
-    )
+    return bool(measured.straight_frequencies or measured.lower_well_frequencies or measured.upper_well_frequencies)
 
 
 def _dotted(name: str) -> str:
@@ -573,13 +561,9 @@ def _checked_waveforms(given: Sequence[Waveform] | Waveform) -> tuple[Waveform, 
     return tuple(listed)
 
 
-def _checked_prior(
-    prior: Mapping[str, float], measured: Measurements | None, tracked: Sequence[Waveform]
-) -> list[str]:
+def _checked_prior(prior: Mapping[str, float], measured: Measurements | None, tracked: Sequence[Waveform]) -> list[str]:
     if not isinstance(prior, Mapping) or not prior:
-        raise InputTypeError(
-            f"prior = {shown(prior)}: must map at least one parameter to how well it was known"
-        )
+        raise InputTypeError(f"prior = {shown(prior)}: must map at least one parameter to how well it was known")
     allowed = (*_BEAM, *_BESIDE) if tracked else _BEAM
     for name in prior:
         if name not in allowed:
@@ -708,13 +692,11 @@ def class_likelihood(
     >>> import snapbeam as sb
     >>> from snapbeam import paper
     >>> from snapbeam.lab import Measurements
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=0.005)
     >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
     >>> posterior = sb.uncertainty.estimate_posterior(
     ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
     ... )
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18, modes=2)
     >>> measurements = sb.MeasuredPoints(
     ...     frequency_ratio=[1.2], velocity_amplitude=[0.2], location=[0.4762], response_class=[3]
     ... )
@@ -736,8 +718,7 @@ def class_likelihood(
     trials.progress = counting(progress, "class likelihood", "runs")
     samples, count = len(posterior.values), int(known.sum())
     sample, dot, number = (
-        each.ravel()
-        for each in np.meshgrid(np.arange(samples), np.arange(count), np.arange(runs), indexing="ij")
+        each.ravel() for each in np.meshgrid(np.arange(samples), np.arange(count), np.arange(runs), indexing="ij")
     )
     points = {name: posterior.values[sample, j] for j, name in enumerate(posterior.parameters)}
     points |= {

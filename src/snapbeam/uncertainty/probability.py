@@ -17,8 +17,9 @@ from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Points, points_of
 from snapbeam.sweeps.setup import SweepSetup, sweep_setup
 from snapbeam.uncertainty.distributions import ParameterUncertainty
-from snapbeam.uncertainty.monte_carlo import INTERVALS, OUTCOMES, Trials, interval_of, reached, trials_of
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, trials_of
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.proportions import proportion
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import InputError, InputTypeError, checked, choice, integer, shown, within
 
@@ -54,9 +55,7 @@ class SamplingPlan:
     total_runs : int, optional
         Runs of all points together at most; those with the widest intervals come first.
     confidence : float
-        Confidence level of the intervals, in (0, 1).
-    interval : {"wilson", "jeffreys"}
-        Interval of a binomial proportion: Wilson's or Jeffreys'.
+        Confidence level of the intervals (Wilson's), in (0, 1).
 
     See Also
     --------
@@ -66,8 +65,8 @@ class SamplingPlan:
     --------
     >>> import snapbeam as sb
     >>> plan = sb.uncertainty.SamplingPlan(half_width=0.1, initial_runs=16, max_runs=200)
-    >>> plan.interval
-    'wilson'
+    >>> plan.outcome
+    'snap'
     """
 
     half_width: float | None = 0.05
@@ -76,7 +75,6 @@ class SamplingPlan:
     max_runs: int = 10_000
     total_runs: int | None = None
     confidence: float = 0.95
-    interval: str = "wilson"
 
     def __post_init__(self) -> None:
         choice("outcome", self.outcome, tuple(OUTCOMES))
@@ -91,7 +89,6 @@ class SamplingPlan:
         if self.total_runs is not None:
             integer("total_runs", self.total_runs, 1, 10**12)
         within("confidence", self.confidence, 0.0, 1.0)
-        choice("interval", self.interval, INTERVALS)
 
 
 @dataclass
@@ -109,10 +106,7 @@ class Counts:
 
     def limits(self, allocation: SamplingPlan, outcome: int) -> tuple[_Array, _Array, _Array]:
         """Probability of an outcome and its interval, at every point."""
-        return interval_of(
-            self.hits[outcome], self.runs, self.failed,
-            confidence=allocation.confidence, method=allocation.interval,
-        )  # fmt: skip
+        return proportion(self.hits[outcome], self.runs, allocation.confidence, self.failed)
 
 
 def allocate(
@@ -250,9 +244,7 @@ def probability_map(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -289,16 +281,11 @@ def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
 
 
 def _counted(
-    trials: Trials,
-    points: Points,
-    allocation: SamplingPlan,
-    tell: Callable[[int, int], object] | None,
+    trials: Trials, points: Points, allocation: SamplingPlan, tell: Callable[[int, int], object] | None
 ) -> Counts:
     told = [0, 0]
 
-    def ask(
-        which: NDArray[np.int64], numbers: NDArray[np.int64]
-    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def ask(which: NDArray[np.int64], numbers: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         def report(done: int, total: int) -> None:
             if tell is not None:
                 tell(told[0] + done, max(told[1], told[0] + total))
@@ -339,7 +326,6 @@ def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Samp
         "uncertainty": canonical_json(drawn),
         "seed": trials.uncertainty.seed,
         "confidence": allocation.confidence,
-        "interval": allocation.interval,
         "watched_outcome": allocation.outcome,
         "rounds": counts.rounds,
         "runs_made": int(counts.runs.sum() + counts.failed.sum()),
@@ -360,10 +346,7 @@ def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Samp
     dataset["hits"] = ((*points.dims, OUTCOME), hits, labels)
     plain = {
         "runs": (counts.runs, "runs that came to an end"),
-        "runs_failed": (
-            counts.failed,
-            "runs that failed; the intervals hold for whatever they might have done",
-        ),
+        "runs_failed": (counts.failed, "runs that failed; the intervals hold for whatever they might have done"),
         "reached": (~counts.open, "true where the interval has the requested width"),
     }
     for name, (values, text) in plain.items():

@@ -18,33 +18,17 @@ from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Grid, PointList, points_of
 from snapbeam.sweeps.setup import sweep_setup
 from snapbeam.uncertainty.distributions import ParameterUncertainty
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, trials_of, wilson
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, trials_of
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.proportions import proportion
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.validation import (
-    InputError,
-    InputTypeError,
-    checked,
-    choice,
-    finite_array,
-    integer,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, InputTypeError, checked, choice, finite_array, integer, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _Array = NDArray[np.float64]
-_TABLE = {
-    0.5: 0.28506,
-    0.75: 0.80694,
-    0.8: 0.98729,
-    0.85: 1.22756,
-    0.9: 1.60246,
-    0.95: 2.26916,
-    0.99: 3.83630,
-}
+_TABLE = {0.5: 0.28506, 0.75: 0.80694, 0.8: 0.98729, 0.85: 1.22756, 0.9: 1.60246, 0.95: 2.26916, 0.99: 3.83630}
 """Quantiles of the limiting distribution (Banerjee and Wellner 2001, Table 1)."""
 _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Array, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
@@ -101,9 +85,7 @@ def critical(confidence: float) -> float:
     """
     within("confidence", confidence, 0.5, 0.99, closed="both")
     # its tail falls almost like an exponential
-    return float(
-        np.interp(-np.log1p(-confidence), [-np.log1p(-each) for each in _TABLE], list(_TABLE.values()))
-    )
+    return float(np.interp(-np.log1p(-confidence), [-np.log1p(-each) for each in _TABLE], list(_TABLE.values())))
 
 
 def crossing(values: ArrayLike, hits: ArrayLike, probability: float, confidence: float = 0.95) -> Crossing:
@@ -179,7 +161,7 @@ def spans(
     parts = np.array_split(order, min(bins, max(order.size // 8, 1)))
     v, h = np.asarray(values, dtype=np.float64), np.asarray(hits, dtype=np.float64)
     sure = 1.0 - (1.0 - confidence) / len(parts)
-    _, low, high = wilson([h[part].sum() for part in parts], [part.size for part in parts], sure)
+    _, low, high = proportion([h[part].sum() for part in parts], [part.size for part in parts], sure)
     first = [float(v[part].min()) for part, top in zip(parts, high, strict=True) if top >= probability]
     last = [float(v[part].max()) for part, bottom in zip(parts, low, strict=True) if bottom <= probability]
     return min(first, default=np.inf), max(last, default=-np.inf)
@@ -338,12 +320,7 @@ def search(
 
 
 def _values(
-    column: Runs,
-    bounds: tuple[float, float],
-    options: QuantileSearchSettings,
-    number: int,
-    count: int,
-    place: int,
+    column: Runs, bounds: tuple[float, float], options: QuantileSearchSettings, number: int, count: int, place: int
 ) -> _Array:
     """Values of the runs of one round."""
     generator = np.random.Generator(np.random.Philox(key=[options.seed, place * 64 + number]))
@@ -355,9 +332,7 @@ def _values(
     return np.concatenate(parts)
 
 
-def _windows(
-    column: Runs, bounds: tuple[float, float], options: QuantileSearchSettings
-) -> list[tuple[float, float]]:
+def _windows(column: Runs, bounds: tuple[float, float], options: QuantileSearchSettings) -> list[tuple[float, float]]:
     """A little more than the interval of each probability."""
     found = []
     for probability in options.probabilities:
@@ -427,9 +402,7 @@ def quantile_threshold(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -461,9 +434,7 @@ def quantile_threshold(
     assert isinstance(points, (Grid, PointList))
     if axes and row.name in points.names:
         raise InputError(f"axes: contains {row.name}, the parameter itself; leave it out")
-    sweep_setup(
-        trials.system, PointList(points.take(np.arange(points.size)) | {row.name: np.full(points.size, high)})
-    )
+    sweep_setup(trials.system, PointList(points.take(np.arange(points.size)) | {row.name: np.full(points.size, high)}))
     setup = sweep_setup(trials.system, points, trials.integration)
     report = counting(progress, "quantile threshold", "runs")
     found = _searched(trials, points, row.name, (low, high), options, report)
@@ -474,9 +445,7 @@ def quantile_threshold(
         "termination_reason": f"{options.runs} runs of every column in {options.rounds} rounds, the maximum (runs, rounds)",
         "seed": trials.uncertainty.seed, "search_seed": options.seed,
     }  # fmt: skip
-    dataset = _labelled(
-        setup.coordinates(), setup.attributes(TITLE, more), points, columns, options, row.name
-    )
+    dataset = _labelled(setup.coordinates(), setup.attributes(TITLE, more), points, columns, options, row.name)
     return dataset if axes else dataset.isel(point=0).drop_vars(row.short)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy import special, stats
 
 from snapbeam.dynamics.flow import InitialConditions
@@ -23,18 +23,7 @@ from snapbeam.uncertainty.distributions import ParameterUncertainty
 from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, trials_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.singular_values import polyfit
-from snapbeam.util.validation import (
-    InputError,
-    axis,
-    checked,
-    choice,
-    finite_array,
-    integer,
-    seed_of,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, axis, checked, choice, finite_array, integer, seed_of, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,64 +47,24 @@ class Indices(NamedTuple):
     low: _Array
     high: _Array
 
+    def variables(self, name: str) -> dict[str, _Array]:
+        """Return the variables of a dataset: the estimate and its limits."""
+        return {name: self.estimate, f"{name}_low": self.low, f"{name}_high": self.high}
 
-@checked
-def sobol_indices_from_samples(
-    inputs: ArrayLike,
-    output: ArrayLike,
-    *,
-    confidence: float = 0.95,
-    bins: int | None = None,
-    rng: int | np.random.Generator | None = 0,
-) -> Indices:
+
+def first_order(x: _Array, y: _Array, confidence: float, seed: int) -> Indices:
     """First-order indices Var(E[y | x_j])/Var(y) of a sample, however it was sampled, of correlated inputs too.
 
-    Inputs are cut into bins of equal numbers of runs; the index is the variance of the means of the bins over
-    that of the output, less the contribution of chance: Kelley's epsilon squared (Plischke, Borgonovo and
-    Smith, Eur. J.  Oper. Res. 226 (2013) 536, on estimates from bins).  The interval is that of a jackknife
-    over twenty groups of runs.
-
-    Parameters
-    ----------
-    inputs : array_like of shape (runs, inputs)
-        Inputs of every run.
-    output : array_like of shape (runs,)
-        Output of every run; at least 200 runs.
-    confidence : float
-        Confidence level of the intervals, in (0, 1).
-    bins : int, optional
-        Number of bins; one for forty runs by default, 5 to 100.  The index does not contain the variation within a bin.
-    rng : int, numpy.random.Generator or None
-        Seed of the groups; a generator, which gives one; None takes one from the system.
-
-    Returns
-    -------
-    Indices
-        Estimate and limits for each input, shape (inputs,).  The estimate of an input that matters little may be less
-        than 0 by chance.
-
-    See Also
-    --------
-    snapbeam.uncertainty.sobol_indices, snapbeam.uncertainty.sensitivity
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import snapbeam as sb
-    >>> inputs = np.random.default_rng(0).uniform(size=(4000, 2))
-    >>> result = sb.uncertainty.sobol_indices_from_samples(inputs, inputs[:, 0] + 2.0 * inputs[:, 1])
-    >>> np.round(result.estimate, 1)
-    array([0.2, 0.8])
+    Inputs, shape (runs, inputs), are cut into bins of equal numbers of runs; the index is the variance of the means of
+    the bins over that of the output, less the contribution of chance: Kelley's epsilon squared (Plischke, Borgonovo
+    and Smith, Eur. J.  Oper. Res. 226 (2013) 536, on estimates from bins).  It may be less than 0 by chance, and does
+    not contain the variation within a bin.  The interval is that of a jackknife over twenty groups of runs.
     """
-    x, y = finite_array("inputs", inputs, 2), finite_array("output", output, 1)
-    if x.shape[0] != y.size:
-        raise InputError(f"inputs of shape {x.shape} with output of shape {y.shape}: must have as many runs")
     if y.size < 200:
-        raise InputError(f"output of {y.size} runs: must be at least 200 to be cut into bins")
-    _check_variation("output", y)
-    within("confidence", confidence, 0.0, 1.0)
-    count = int(np.clip(y.size // 40, 5, 100)) if bins is None else integer("bins", bins, 2, y.size // 10)
-    generator = np.random.Generator(np.random.Philox(key=[seed_of(rng), 0]))
+        raise InputError(f"samples = {y.size}: must be at least 200 to be cut into bins")
+    _check_variation("quantity", y)
+    count = int(np.clip(y.size // 40, 5, 100))
+    generator = np.random.Generator(np.random.Philox(key=[seed, 0]))
     group = generator.permutation(y.size) % _GROUPS
     binned = np.array([_bins(column, count) for column in x.T])
     whole = _all(binned, y, count)
@@ -134,9 +83,7 @@ def _check_variation(name: str, values: _Array) -> None:
     """Refuse an output that is constant up to rounding: its variance has no shares."""
     extent = float(np.ptp(values))
     if extent <= _ROUNDING * float(np.abs(values).max()):
-        raise InputError(
-            f"{name}: is constant, {values.flat[0]:.12g} within {extent:.1g}; must vary with the inputs"
-        )
+        raise InputError(f"{name}: is constant, {values.flat[0]:.12g} within {extent:.1g}; must vary with the inputs")
 
 
 def _bins(x: _Array, count: int) -> NDArray[np.int64]:
@@ -204,7 +151,7 @@ def sobol_indices(
 
     See Also
     --------
-    snapbeam.uncertainty.sobol_indices_from_samples, snapbeam.uncertainty.sensitivity
+    snapbeam.uncertainty.sensitivity
 
     Examples
     --------
@@ -256,13 +203,11 @@ def _matrices(inputs: int, size: int, seed: int, number: int) -> _Array:
 def _mean(table: _Array, confidence: float) -> Indices:
     count = len(table)
     middle = table.mean(axis=0)
-    reach = (
-        float(stats.t.ppf(0.5 * (1.0 + confidence), count - 1)) * table.std(axis=0, ddof=1) / np.sqrt(count)
-    )
+    reach = float(stats.t.ppf(0.5 * (1.0 + confidence), count - 1)) * table.std(axis=0, ddof=1) / np.sqrt(count)
     return Indices(middle, middle - reach, middle + reach)
 
 
-# What is asked of a system as one number: a statistic, a threshold, the notch of the threshold, a lifetime.
+# What is asked of a system as one number: a statistic, a threshold, a lifetime.
 
 
 class QuantityOfInterest(Protocol):
@@ -301,9 +246,7 @@ class StatisticQoI:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -357,7 +300,7 @@ class ThresholdQoI:
 
     See Also
     --------
-    snapbeam.uncertainty.sensitivity, snapbeam.uncertainty.NotchQoI
+    snapbeam.uncertainty.sensitivity
 
     Examples
     --------
@@ -374,9 +317,7 @@ class ThresholdQoI:
     def __post_init__(self) -> None:
         row = lookup(self.parameter)
         if not row.is_run or row.quantity.kind is not float:
-            raise InputError(
-                f"parameter = {shown(self.parameter)}: must be a number that may differ between runs"
-            )
+            raise InputError(f"parameter = {shown(self.parameter)}: must be a number that may differ between runs")
         axis("bounds", self.bounds, -np.inf, np.inf)
         integer("values", self.values, 2, 100_000)
         integer("halvings", self.halvings, 0, 40)
@@ -412,92 +353,10 @@ class ThresholdQoI:
             low, high = np.where(up, low, middle), np.where(up, middle, high)
         return np.where(known, 0.5 * (low + high), np.nan)
 
-    def _snaps(
-        self, trials: Trials, scores: _Array, numbers: _Numbers, row: str, values: _Array
-    ) -> NDArray[np.bool_]:
+    def _snaps(self, trials: Trials, scores: _Array, numbers: _Numbers, row: str, values: _Array) -> NDArray[np.bool_]:
         points = {lookup(name).name: np.full(values.size, float(value)) for name, value in self.at.items()}
         found = trials.statistics(points | {row: values}, numbers, scores=scores)
         return np.asarray(found["response_class"] > 0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class NotchQoI:
-    """Position of the minimum of the threshold along a parameter, or its value there.
-
-    Parameters
-    ----------
-    parameter : str
-        Parameter along which thresholds are compared, such as ``"frequency_ratio"``.
-    values : array_like
-        Its values, strictly increasing, at least 3; the place is that of the parabola through the lowest three.
-    threshold : ThresholdQoI
-        Threshold whose minimum is sought.
-    depth : bool
-        True for the threshold at the minimum, False for its position.
-
-    See Also
-    --------
-    snapbeam.uncertainty.sensitivity, snapbeam.uncertainty.ThresholdQoI
-
-    Examples
-    --------
-    >>> import snapbeam as sb
-    >>> quantity = sb.uncertainty.NotchQoI(parameter="frequency_ratio", values=[1.1, 1.2, 1.3])
-    """
-
-    parameter: str = "frequency_ratio"
-    values: ArrayLike = tuple(np.linspace(1.0, 1.8, 9).tolist())
-    threshold: ThresholdQoI = field(default_factory=ThresholdQoI)
-    depth: bool = False
-
-    def __post_init__(self) -> None:
-        row = lookup(self.parameter)
-        if axis(self.parameter, self.values, row.quantity.low, row.quantity.high).size < 3:
-            raise InputError(f"values = {shown(self.values)}: must be at least 3")
-
-    @property
-    def unit(self) -> str:
-        """Unit of the parameter, or of the threshold."""
-        return self.threshold.unit if self.depth else lookup(self.parameter).quantity.unit
-
-    @property
-    def long_name(self) -> str:
-        """Long name of the quantity."""
-        place = lookup(self.parameter).quantity.long_name
-        return f"minimum threshold over {place}" if self.depth else f"{place} of the minimum threshold"
-
-    def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
-        """A threshold at every value."""
-        x = np.asarray(self.values, dtype=np.float64)
-        table = np.stack([self._threshold(float(value), trials, scores, numbers) for value in x], axis=1)
-        found = np.full(numbers.size, np.nan)
-        for i, row in enumerate(table):
-            known = np.isfinite(row)
-            if not known.any():
-                continue
-            at = int(np.nanargmin(row))
-            if not 0 < at < x.size - 1 or not known[at - 1 : at + 2].all():
-                continue  # at an end, or beside what is not known: the notch may lie elsewhere
-            place, lowest = _vertex(x[at - 1 : at + 2], row[at - 1 : at + 2])
-            found[i] = lowest if self.depth else place
-        return found
-
-    def _threshold(self, value: float, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
-        own = self.threshold
-        there = ThresholdQoI(
-            parameter=own.parameter, bounds=own.bounds, values=own.values, halvings=own.halvings,
-            at={**own.at, self.parameter: value},
-        )  # fmt: skip
-        return there.of(trials, scores, numbers)
-
-
-def _vertex(x: _Array, y: _Array) -> tuple[float, float]:
-    """Place and height of the lowest point of the parabola through three points of which the middle is lowest."""
-    a, b, c = polyfit(x - x[1], y, 2)
-    if not a > 0.0:
-        return float(x[1]), float(y[1])
-    place = float(np.clip(-0.5 * b / a, x[0] - x[1], x[2] - x[1]))
-    return float(x[1] + place), float(a * place**2 + b * place + c)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -567,9 +426,7 @@ def quantity_of_interest(given: QuantityOfInterest | str) -> QuantityOfInterest:
     if isinstance(given, str):
         return StatisticQoI(given)
     if not hasattr(given, "of") or not hasattr(given, "unit"):
-        raise InputError(
-            f"quantity = {shown(given)}: must be the name of a statistic, a ThresholdQoI, a NotchQoI or a LifetimeQoI"
-        )
+        raise InputError(f"quantity = {shown(given)}: must be the name of a statistic, a ThresholdQoI or a LifetimeQoI")
     return given
 
 
@@ -592,7 +449,7 @@ def sensitivity(
     ----------
     system : System
         The nominal system.
-    quantity : str or ThresholdQoI or NotchQoI or LifetimeQoI
+    quantity : str or ThresholdQoI or LifetimeQoI
         A statistic by its name, such as ``"peak_force"``, an outcome, or one of these.
     uncertainty : ParameterUncertainty
         Uncertainty of at least one parameter.
@@ -633,9 +490,7 @@ def sensitivity(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
-    >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
@@ -648,9 +503,7 @@ def sensitivity(
     choice("method", method, METHODS)
     within("confidence", confidence, 0.0, 1.0)
     asked = quantity_of_interest(quantity)
-    trials = trials_of(
-        system, uncertainty, integration, checkpoint=checkpoint, early=not isinstance(quantity, str)
-    )
+    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, early=not isinstance(quantity, str))
     trials.progress = counting(progress, "sensitivity", "runs")
     names = trials.uncertainty.parameters
     if not names:
@@ -694,8 +547,8 @@ def _local(
     half = 0.5 * (both[:, 1] - both[:, 0])
     width = np.array([_width(trials, name) for name in uncertainty.of])
     table = {"quantity_minus": both[:, 0].mean(axis=1), "quantity_plus": both[:, 1].mean(axis=1)}
-    table |= _limits("effect", half, confidence) | {"step": width}
-    table |= _limits("derivative", half / width[:, None], confidence)
+    table |= _mean(half.T, confidence).variables("effect") | {"step": width}
+    table |= _mean(half.T / width, confidence).variables("derivative")
     return table, values
 
 
@@ -705,13 +558,6 @@ def _width(trials: Trials, name: str) -> float:
     given = system.get(name) if ratio_of(name) in system.parameters else None  # a ratio, or one in its unit
     nominal = np.full(2, 0.0 if given is None else given, dtype=np.float64)
     return 0.5 * float(np.ptp(trials.uncertainty.of[name].at(nominal, np.array([-1.0, 1.0]))))
-
-
-def _limits(name: str, pairs: _Array, confidence: float) -> dict[str, _Array]:
-    count = pairs.shape[1]
-    middle = pairs.mean(axis=1)
-    reach = stats.t.ppf(0.5 * (1.0 + confidence), count - 1) * pairs.std(axis=1, ddof=1) / np.sqrt(count)
-    return {name: middle, f"{name}_low": middle - reach, f"{name}_high": middle + reach}
 
 
 def _sobol(
@@ -727,10 +573,7 @@ def _sobol(
     found = sobol_indices(
         function, len(trials.uncertainty.of), count, replicates=_REPLICATES, confidence=confidence, rng=trials.uncertainty.seed
     )  # fmt: skip
-    table: dict[str, _Array] = {}
-    for name, indices in (("first_order", found.first), ("total_order", found.total)):
-        table |= {name: indices.estimate, f"{name}_low": indices.low, f"{name}_high": indices.high}
-    return table, kept[0]
+    return found.first.variables("first_order") | found.total.variables("total_order"), kept[0]
 
 
 def _given_data(
@@ -739,12 +582,7 @@ def _given_data(
     numbers = np.arange(count)
     scores = trials.uncertainty.normals(numbers)
     values = _ask(trials, quantity, scores, numbers)
-    found = sobol_indices_from_samples(scores, values, confidence=confidence, rng=trials.uncertainty.seed)
-    return {
-        "first_order": found.estimate,
-        "first_order_low": found.low,
-        "first_order_high": found.high,
-    }, values
+    return first_order(scores, values, confidence, trials.uncertainty.seed).variables("first_order"), values
 
 
 _WORDS = {

@@ -44,9 +44,7 @@ class _Writer:
 class NetCDFStore(H5NetCDFStore):
     """Store of a NetCDF file that hands numbers on as they are; the coders of texts would import dask too."""
 
-    def set_variables(
-        self, variables: Any, check_encoding_set: Any, writer: Any, unlimited_dims: Any = None
-    ) -> None:
+    def set_variables(self, variables: Any, check_encoding_set: Any, writer: Any, unlimited_dims: Any = None) -> None:
         """Write variables."""
         super().set_variables(variables, check_encoding_set, _Writer(), unlimited_dims)
 

@@ -91,15 +91,8 @@ class Diagnostic:
 
     def plain(self) -> dict[str, Any]:
         """Diagnostic as plain text and numbers; a nonfinite number becomes None."""
-        numbers = {
-            name: float(value) if math.isfinite(value) else None for name, value in self.numbers.items()
-        }
-        return {
-            "code": self.code,
-            "severity": self.severity.value,
-            "message": self.message,
-            "numbers": numbers,
-        }
+        numbers = {name: float(value) if math.isfinite(value) else None for name, value in self.numbers.items()}
+        return {"code": self.code, "severity": self.severity.value, "message": self.message, "numbers": numbers}
 
     def __str__(self) -> str:
         return f"{self.severity.value} [{self.code}]: {self.message}"
@@ -236,9 +229,7 @@ def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -
         line = _Line(what)
         return lambda done, total: line.say(done / max(total, 1), f"{done} of {total} {noun}")
     if not callable(progress):
-        raise InputTypeError(
-            f"progress = {shown(progress)}: must be True or callable, as progress(done, total)"
-        )
+        raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress(done, total)")
     return progress
 
 

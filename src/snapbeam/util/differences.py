@@ -20,9 +20,7 @@ _CLOSE = 1e-8
 
 
 def differences(
-    advance_rows: Callable[[_Array, NDArray[np.intp]], tuple[_Array, _Array | None]],
-    x: _Array,
-    directions: _Array,
+    advance_rows: Callable[[_Array, NDArray[np.intp]], tuple[_Array, _Array | None]], x: _Array, directions: _Array
 ) -> tuple[_Array, _Array]:
     """Directional derivatives of a map by central differences of order six.
 
@@ -47,9 +45,7 @@ def differences(
     left, step = np.indices(error.shape).reshape(2, -1), _STEP
     for _ in range(_SHRINKINGS):
         moves = np.stack([sign * k * step * unit[*left] for k in (1, 2, 3) for sign in (1.0, -1.0)], axis=1)
-        images, impacts = advance_rows(
-            (x[left[0], None] + moves).reshape(-1, x.shape[1]), np.repeat(left[0], 6)
-        )
+        images, impacts = advance_rows((x[left[0], None] + moves).reshape(-1, x.shape[1]), np.repeat(left[0], 6))
         table = images.reshape(left.shape[1], 3, 2, -1)
         six, four = np.einsum("os,psd->opd", _STENCIL, table[:, :, 0] - table[:, :, 1]) / step
         doubt = np.linalg.norm(six - four, axis=-1) / np.maximum(np.linalg.norm(six, axis=-1), 1e-300)

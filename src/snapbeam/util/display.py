@@ -19,9 +19,7 @@ def plotter(name: str) -> Any:
 def html_table(title: str, rows: Iterable[Sequence[object]]) -> str:
     """A table as notebooks show it."""
     lines = [
-        "<tr>"
-        + "".join(f"<td style='text-align:left'>{html.escape(str(cell))}</td>" for cell in row)
-        + "</tr>"
+        "<tr>" + "".join(f"<td style='text-align:left'>{html.escape(str(cell))}</td>" for cell in row) + "</tr>"
         for row in rows
     ]
     return f"<div><strong>{html.escape(title)}</strong><table>{''.join(lines)}</table></div>"

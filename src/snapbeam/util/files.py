@@ -84,11 +84,7 @@ _GUARD: ContextVar[_Guard | None] = ContextVar("guard", default=None)
 
 @contextmanager
 def foreign_files_kept(
-    named: Sequence[Path] = (),
-    *,
-    defaults: Sequence[Path] = (),
-    request: object = None,
-    force: bool = False,
+    named: Sequence[Path] = (), *, defaults: Sequence[Path] = (), request: object = None, force: bool = False
 ) -> Iterator[None]:
     """In the block, refuse to replace files that snapbeam did not write, and those that are read too.
 
@@ -104,10 +100,7 @@ def foreign_files_kept(
         Whether any file may be replaced.
     """
     guard = _Guard(
-        tuple(path.resolve() for path in named),
-        tuple(path.resolve() for path in defaults),
-        _hash(request),
-        force,
+        tuple(path.resolve() for path in named), tuple(path.resolve() for path in defaults), _hash(request), force
     )
     token = _GUARD.set(guard)
     try:
@@ -251,15 +244,11 @@ def check_writable(
         raise InputError(f"{name} = {str(path)!r}: must end in {' or '.join(suffixes)}")
     if target.is_dir():
         raise InputError(f"{name} = {str(path)!r}: must be a file, not a folder")
-    if (
-        target.exists() and not target.is_file()
-    ):  # to open a pipe waits for its reader; a device would be replaced
+    if target.exists() and not target.is_file():  # to open a pipe waits for its reader; a device would be replaced
         raise InputError(f"{name} = {str(path)!r}: must be a regular file, not a device, a pipe or a socket")
     folder = target.parent
     if not folder.is_dir():
-        raise InputError(
-            f"{name} = {str(path)!r}: cannot be written, {str(folder)!r} is not an existing folder"
-        )
+        raise InputError(f"{name} = {str(path)!r}: cannot be written, {str(folder)!r} is not an existing folder")
     if target.suffix.lower() in _NEEDED:
         module, extra = _NEEDED[target.suffix.lower()]
         with needing(f"{name} = {str(path)!r}: a file {target.suffix}", extra):

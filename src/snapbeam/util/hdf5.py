@@ -72,9 +72,7 @@ def open_hdf5(path: str | os.PathLike[str], name: str = "path", *, in_parts: boo
             file.close()
         if isinstance(error, InputError) or not isinstance(error, Exception):
             raise
-        said = (
-            str(error).strip().split("\n")[0][:200]
-        )  # of damaged bytes the library makes errors of every kind
+        said = str(error).strip().split("\n")[0][:200]  # of damaged bytes the library makes errors of every kind
         raise InputError(
             f"{name} = {str(path)!r}: is no NetCDF or HDF5 file, or is damaged ({said or type(error).__name__})"
         ) from error
@@ -132,17 +130,13 @@ def _size(file: h5py.File, where: str) -> tuple[int, bool]:
                 soft.append((group, key, at))
                 continue
             if link != h5py.h5l.TYPE_HARD:
-                raise InputError(
-                    f"{where}: {_said(at)} is a link to another file: copy what it names into this one"
-                )
+                raise InputError(f"{where}: {_said(at)} is a link to another file: copy what it names into this one")
             item = h5py.h5o.open(group, key)
             if isinstance(item, h5py.h5d.DatasetID):
                 add(item, at)
             elif isinstance(item, h5py.h5g.GroupID):
                 if (address := h5py.h5o.get_info(item).addr) in groups:
-                    raise InputError(
-                        f"{where}: {_said(at)} is a group that has another place: must have one place"
-                    )
+                    raise InputError(f"{where}: {_said(at)} is a group that has another place: must have one place")
                 groups.add(address)
                 if len(groups) > _MOST_GROUPS:
                     raise InputError(f"{where}: has more than {_MOST_GROUPS} groups")

@@ -138,16 +138,12 @@ def write_netcdf(
             raise_held()
             group = None if name is None else file.create_group(name)
             store = NetCDFStore(file if group is None else group)
-            dataset.dump_to_store(
-                store, encoding=dict(mapping(f"encoding[{name!r}]", settings.get(name, {})))
-            )
+            dataset.dump_to_store(store, encoding=dict(mapping(f"encoding[{name!r}]", settings.get(name, {}))))
 
 
 def _check_texts(dataset: xr.Dataset) -> None:
     """Raise an error for a name or an attribute of a dataset that is no text of UTF-8, naming it."""
-    parts = {"attrs": dataset.attrs} | {
-        f"{name}.attrs": each.attrs for name, each in dataset.variables.items()
-    }
+    parts = {"attrs": dataset.attrs} | {f"{name}.attrs": each.attrs for name, each in dataset.variables.items()}
     for where, attrs in parts.items():
         require_texts(where, attrs)
     require_texts("name", [*dataset.variables, *dataset.dims])
@@ -319,11 +315,7 @@ class DiskStream(io.RawIOBase):
         number, begin = divmod(at, _PAGE)
         count = min(count, _PAGE - begin, self.size - at)
         page = self._pages.get(number)
-        return (
-            (self._stored(at, count).ljust(count, b"\0"))
-            if page is None
-            else bytes(page[begin : begin + count])
-        )
+        return (self._stored(at, count).ljust(count, b"\0")) if page is None else bytes(page[begin : begin + count])
 
     def copy(self, file: Any) -> None:
         """Write the content to another file."""

@@ -11,6 +11,7 @@ _EXTRAS = {
     "video": ("imageio_ffmpeg", "PIL"),
     "explorer": ("panel", "bokeh", "tornado", "param"),
     "laws": ("numba",),
+    "cuda": ("cuda",),
 }
 """Modules that each extra of the distribution installs."""
 
@@ -33,9 +34,7 @@ def needs(what: str, package: str | None, extra: str) -> str:
     extra : str
         Extra of the distribution that installs the package; several are separated by commas.
     """
-    return (
-        f'{what} needs {package}; install it in the folder of the source code with: pip install ".[{extra}]"'
-    )
+    return f'{what} needs {package}; install it in the folder of the source code with: pip install ".[{extra}]"'
 
 
 @contextmanager

@@ -126,9 +126,7 @@ def canonical_json(parameters: Any) -> str:
     the last digit that tells it from its neighbours, negative zero as 0), arrays as lists, enumerations as
     their values, dataclasses as their fields.
     """
-    return json.dumps(
-        _canonical(parameters, "parameters"), sort_keys=True, separators=(",", ":"), allow_nan=False
-    )
+    return json.dumps(_canonical(parameters, "parameters"), sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def _canonical(value: Any, name: str) -> Any:

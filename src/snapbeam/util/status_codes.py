@@ -116,10 +116,7 @@ _ADVICE = {
 
 
 def classify(
-    zero_crossings: ArrayLike,
-    zero_crossings_last_quarter: ArrayLike,
-    cycles: ArrayLike,
-    final_well: ArrayLike,
+    zero_crossings: ArrayLike, zero_crossings_last_quarter: ArrayLike, cycles: ArrayLike, final_well: ArrayLike
 ) -> NDArray[np.int8]:
     """Class of a response by the rules of section 4.2 of the paper.
 

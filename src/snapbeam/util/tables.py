@@ -162,9 +162,7 @@ def write_table(dataset: xr.Dataset, path: str | os.PathLike[str]) -> list[str]:
         target = check_writable(path, "path", TABLE_SUFFIXES, "MATLAB 5.0 MAT-file")
         long = [str(name) for name in dataset.variables if len(str(name)) > 63]
         with atomic_path(target) as temporary:
-            arrays = {
-                str(name): each.values for name, each in dataset.variables.items() if str(name) not in long
-            }
+            arrays = {str(name): each.values for name, each in dataset.variables.items() if str(name) not in long}
             savemat(str(temporary), arrays, appendmat=False, long_field_names=True, oned_as="column")
         return long
     if Path(path).suffix.lower() != ".csv":
@@ -224,9 +222,7 @@ def write_universal(path: Path, records: list[dict[str, Any]]) -> None:
 
     path.unlink(missing_ok=True)
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", ResourceWarning
-        )  # pyuff leaves a file object to the garbage collector
+        warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves a file object to the garbage collector
         pyuff.UFF(str(path)).write_sets(records, mode="add")
 
 

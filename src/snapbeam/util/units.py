@@ -91,9 +91,7 @@ def _converted(numbers: list[tuple[str, bool]], given: str, unit: str) -> float:
             raise InputError(f"the unit {given!r} does not fit; must be {must}")
     else:
         factor = 1.0
-    if (
-        not math.isfinite(value * factor) or value * factor == 0.0
-    ):  # exponents that a fraction would write out
+    if not math.isfinite(value * factor) or value * factor == 0.0:  # exponents that a fraction would write out
         return value * factor
     exact = Fraction(repr(factor))
     for text, divides in numbers:
@@ -112,11 +110,5 @@ def _product(text: str, unit: str) -> float | None:
             return None
         numbers.append((found[1], divides))
         if found[2]:
-            given += (
-                f" {operator} ({found[2]})"
-                if given
-                else f"({found[2]})"
-                if not divides
-                else f"1 / ({found[2]})"
-            )
+            given += f" {operator} ({found[2]})" if given else f"({found[2]})" if not divides else f"1 / ({found[2]})"
     return _converted(numbers, given, unit)

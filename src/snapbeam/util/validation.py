@@ -32,9 +32,7 @@ Kind = TypeVar("Kind")
 
 
 _LONGEST_MESSAGE = 8000
-_CONTROLS = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]"
-)
+_CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]")
 """Characters that control a terminal or the direction of text, and those that no file format takes as text."""
 
 
@@ -98,9 +96,7 @@ def shown(value: Any) -> str:
 def _require_plain(name: str, value: Any) -> None:
     """Refuse numbers that carry more than numbers, which would be lost: a mask, a unit."""
     if isinstance(value, np.ma.MaskedArray) or value is np.ma.masked:
-        raise InputTypeError(
-            f"{name}: must be plain numbers, not a masked array, whose hidden values would be used"
-        )
+        raise InputTypeError(f"{name}: must be plain numbers, not a masked array, whose hidden values would be used")
     if type(value).__module__.partition(".")[0] != "xarray" and any(
         hasattr(value, attribute) for attribute in ("units", "unit", "dimensionality")
     ):
@@ -151,9 +147,7 @@ def nonnegative(name: str, value: Any, unit: str = "") -> float:
     return number
 
 
-def within(
-    name: str, value: Any, low: float, high: float, *, closed: str = "neither", unit: str = ""
-) -> float:
+def within(name: str, value: Any, low: float, high: float, *, closed: str = "neither", unit: str = "") -> float:
     """Return *value* as a float inside an interval.
 
     ``closed`` is ``"neither"``, ``"left"``, ``"right"`` or ``"both"``.
@@ -279,9 +273,7 @@ def file_path(name: str, value: Any) -> Path:
     try:
         os.fsencode(path)
     except UnicodeEncodeError as error:
-        raise InputError(
-            f"{name} = {shown(str(value))}: cannot be encoded in this locale ({error.encoding})"
-        ) from None
+        raise InputError(f"{name} = {shown(str(value))}: cannot be encoded in this locale ({error.encoding})") from None
     if len(os.fsencode(path)) > _LONGEST_PATH or any(len(os.fsencode(part)) > 255 for part in path.parts):
         raise InputError(f"{name} = {shown(str(value))}: must be a path of names up to 255 bytes")
     return path
@@ -469,9 +461,7 @@ def checked(function: _F) -> _F:
             if bool in kinds and len(kinds) == 1:
                 flag(name, value)
             elif not any(_suits(value, kind) for kind in kinds):
-                raise InputTypeError(
-                    f"{name} = {shown(value)}: must be {_words(kinds)}, not {type(value).__name__}"
-                )
+                raise InputTypeError(f"{name} = {shown(value)}: must be {_words(kinds)}, not {type(value).__name__}")
         return function(*args, **named)
 
     return typing.cast(_F, checked)

@@ -17,15 +17,7 @@ from snapbeam.lab.decay.model import (
     peak_cycles,
     regress,
 )
-from snapbeam.lab.decay.poles import (
-    Line,
-    Pole,
-    Stabilisation,
-    find_poles,
-    thinned,
-    without_lines,
-    without_poles,
-)
+from snapbeam.lab.decay.poles import Line, Pole, Stabilisation, find_poles, thinned, without_lines, without_poles
 from snapbeam.lab.decay.residual_diagnostics import misfit_of
 from snapbeam.lab.decay.window import CLOSE, ENERGY, Centres, Decay
 from snapbeam.lab.diagnostics import KINDS_DECAY

@@ -14,15 +14,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.optimize import isotonic_regression
 
 from snapbeam.lab.decay.model import Cycles, hilbert_cycles, likely, noise_level, regress
-from snapbeam.lab.decay.poles import (
-    Line,
-    Pole,
-    Stabilisation,
-    find_drift,
-    find_lines,
-    find_poles,
-    without_lines,
-)
+from snapbeam.lab.decay.poles import Line, Pole, Stabilisation, find_drift, find_lines, find_poles, without_lines
 from snapbeam.lab.diagnostics import KINDS_DECAY
 from snapbeam.lab.sensor_errors import Hypothesis, best_of
 from snapbeam.lab.signals import SignalSamples

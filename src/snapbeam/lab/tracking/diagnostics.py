@@ -11,14 +11,7 @@ from snapbeam.lab.diagnostics import Kind, table
 from snapbeam.lab.tracking.frame_order import FrameOrder
 from snapbeam.lab.tracking.measure import Rest, Touch, TrackedRows
 from snapbeam.lab.tracking.rulers import Ruler, compare_rulers, option_name, seen_rulers
-from snapbeam.lab.tracking.settings import (
-    BeamView,
-    EdgeShape,
-    FrameFlag,
-    Scene,
-    TrackingSettings,
-    VideoFields,
-)
+from snapbeam.lab.tracking.settings import BeamView, EdgeShape, FrameFlag, Scene, TrackingSettings, VideoFields
 from snapbeam.lab.tracking.survey import CLIPPED
 from snapbeam.util.diagnostics import Diagnostic, Severity
 

@@ -14,14 +14,7 @@ from scipy import ndimage
 from scipy.optimize import minimize_scalar
 
 from snapbeam.lab.signals import stretches
-from snapbeam.lab.tracking.edges import (
-    EdgeFit,
-    Floats,
-    edge_profile,
-    fit_edges,
-    masked_median,
-    width_calibration,
-)
+from snapbeam.lab.tracking.edges import EdgeFit, Floats, edge_profile, fit_edges, masked_median, width_calibration
 from snapbeam.lab.tracking.measure import (
     MIN_FLANK,
     MIN_GAP,

@@ -34,13 +34,7 @@ from snapbeam.lab.tracking.measure import (
     measure_shaker,
     touching,
 )
-from snapbeam.lab.tracking.settings import (
-    FrameFlag,
-    Orientation,
-    Scene,
-    TrackingSettings,
-    VideoFields,
-)
+from snapbeam.lab.tracking.settings import FrameFlag, Orientation, Scene, TrackingSettings, VideoFields
 from snapbeam.lab.tracking.survey import CLIPPED, pixel_noise, saturation_level, survey
 from snapbeam.simulation.dataset import trajectory_dataset
 from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, to_json

@@ -105,10 +105,7 @@ class ContactLaw:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if cls.name and not cls.impulsive:
-            wanted = [
-                "force",
-                *(["energy", "slope", "yield_penetration", "memory_after"] if cls.memory else []),
-            ]
+            wanted = ["force", *(["energy", "slope", "yield_penetration", "memory_after"] if cls.memory else [])]
             missing = [each for each in wanted if not hasattr(cls, each)]
             if missing:
                 raise InputError(
@@ -139,11 +136,7 @@ class ContactLaw:
         """Derivative of the force, N/m, by a central difference."""
         own: Any = type(law).owner
         h = 1e-5 * penetration
-        return (
-            (own.force(law, penetration + h) - own.force(law, penetration - h)) / (2.0 * h)
-            if h > 0.0
-            else 0.0
-        )
+        return (own.force(law, penetration + h) - own.force(law, penetration - h)) / (2.0 * h) if h > 0.0 else 0.0
 
     @staticmethod
     def damping_coefficient(law: Any, penetration: float) -> float:
@@ -193,9 +186,7 @@ class ContactLaw:
         law: Any = type(self)
         numbers = self.numbers()
         steepest = (
-            max((law.slope(numbers, depth * i / 64.0) for i in range(1, 65)), default=0.0)
-            if depth > 0.0
-            else 0.0
+            max((law.slope(numbers, depth * i / 64.0) for i in range(1, 65)), default=0.0) if depth > 0.0 else 0.0
         )
         return min(self.impact_duration(mass, velocity), hertzian_time(steepest, mass))
 

@@ -44,12 +44,7 @@ class ElasticPlasticContact(ContactLaw):
     """
 
     loading_stiffness: float = quantity(
-        "N/m",
-        "contact stiffness on first loading",
-        low=0.0,
-        scope=RUN,
-        symbol="k_1",
-        short="contact_loading_stiffness",
+        "N/m", "contact stiffness on first loading", low=0.0, scope=RUN, symbol="k_1", short="contact_loading_stiffness"
     )
     unloading_stiffness: float = quantity(
         "N/m",

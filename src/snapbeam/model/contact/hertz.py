@@ -15,6 +15,14 @@ from snapbeam.util.validation import InputError, InputTypeError, nonnegative, po
 _DURATION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
 
 
+def hertz_stiffness() -> Any:
+    """Return the field of the contact stiffness k_c."""
+    return quantity(
+        "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
+        plausible=(1.0, 1e15, "N/mm^1.5"),
+    )  # fmt: skip
+
+
 @dataclass(frozen=True)
 class HertzContact(ContactLaw):
     """Hertz's law of a sphere on a flat, f = k_c d^(3/2) for a penetration d > 0 (Eqs. 17-18).
@@ -38,10 +46,7 @@ class HertzContact(ContactLaw):
     '9.73e+09 N/m^1.5'
     """
 
-    stiffness: float = quantity(
-        "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
-        plausible=(1.0, 1e15, "N/mm^1.5"),
-    )  # fmt: skip
+    stiffness: float = hertz_stiffness()
 
     name = "hertz"
 
@@ -62,10 +67,7 @@ class HertzContact(ContactLaw):
 
     @classmethod
     def from_materials(
-        cls,
-        radius: float,
-        young_modulus: tuple[float, float],
-        poisson_ratio: tuple[float, float],
+        cls, radius: float, young_modulus: tuple[float, float], poisson_ratio: tuple[float, float]
     ) -> HertzContact:
         """Contact of a sphere with a flat, both elastic.
 
@@ -101,9 +103,7 @@ class HertzContact(ContactLaw):
         except OverflowError:
             found = math.inf
         if not math.isfinite(found):
-            raise InputError(
-                f"mass = {mass:g} kg, velocity = {velocity:g} m/s: are beyond what a number holds"
-            )
+            raise InputError(f"mass = {mass:g} kg, velocity = {velocity:g} m/s: are beyond what a number holds")
         return found
 
     def impact_duration(self, mass: float, velocity: float) -> float:
@@ -123,9 +123,7 @@ def _pair(name: str, value: tuple[float, float]) -> list[tuple[int, float]]:
     try:
         items = list(value)
     except TypeError:
-        raise InputTypeError(
-            f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat"
-        ) from None
+        raise InputTypeError(f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat") from None
     if len(items) != 2:
         raise InputError(f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat")
     return list(enumerate(items))

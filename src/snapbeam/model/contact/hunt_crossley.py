@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from snapbeam.model.contact.base import ContactLaw
-from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.contact.hertz import HertzContact, hertz_stiffness
 from snapbeam.model.contact.loss import loss_number, preset_loss, restitution_of_loss
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import positive
@@ -42,10 +42,7 @@ class HuntCrossley(ContactLaw):
     0.8
     """
 
-    stiffness: float = quantity(
-        "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
-        plausible=(1.0, 1e15, "N/mm^1.5"),
-    )  # fmt: skip
+    stiffness: float = hertz_stiffness()
     damping_factor: float = quantity(
         "s/m", "loss of the contact per speed of penetration", low=0.0, closed="left", scope=RUN, symbol=r"\chi",
         short="contact_damping_factor",
@@ -54,25 +51,15 @@ class HuntCrossley(ContactLaw):
     name = "hunt_crossley"
     rate_dependent = True
 
-    @staticmethod
-    def force(law: Any, penetration: float) -> float:
-        """The part that is stored, k_c d^(3/2)."""
-        return law.stiffness * penetration * math.sqrt(penetration)
+    # what is stored is Hertz's
+    force = staticmethod(HertzContact.force)
+    energy = staticmethod(HertzContact.energy)
+    slope = staticmethod(HertzContact.slope)
 
     @staticmethod
     def damping_coefficient(law: Any, penetration: float) -> float:
         """The part that is lost, per speed: chi k_c d^(3/2)."""
         return law.damping_factor * law.stiffness * penetration * math.sqrt(penetration)
-
-    @staticmethod
-    def energy(law: Any, penetration: float) -> float:
-        """(2/5) k_c d^(5/2)."""
-        return 0.4 * law.stiffness * penetration * penetration * math.sqrt(penetration)
-
-    @staticmethod
-    def slope(law: Any, penetration: float) -> float:
-        """(3/2) k_c d^(1/2)."""
-        return 1.5 * law.stiffness * math.sqrt(penetration)
 
     @classmethod
     def from_restitution(

@@ -89,10 +89,7 @@ class KelvinVoigt(ContactLaw):
         from scipy.optimize import brentq
 
         e = within("restitution", restitution, 0.0, 1.0, closed="right")
-        linear_stiffness, mass = (
-            positive("linear_stiffness", linear_stiffness, "N/m"),
-            positive("mass", mass, "kg"),
-        )
+        linear_stiffness, mass = (positive("linear_stiffness", linear_stiffness, "N/m"), positive("mass", mass, "kg"))
         if e == 1.0:
             return cls(linear_stiffness, 0.0)
         # it falls with zeta, without an end

@@ -9,11 +9,24 @@ from typing import Any
 import numpy as np
 
 from snapbeam.model.contact.base import ContactLaw, hertzian_time
-from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.contact.hertz import HertzContact, hertz_stiffness
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.validation import positive, within
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
+
+
+def _of_layer(law: Any, penetration: float) -> float:
+    """Return d_l = s^3, where s is the root of s^3 + c s^4 = d, c = (k_l/k_c)^(2/3).
+
+    Newton's iteration comes from above, where the left side is convex: within a fifth of the root at first and within
+    1e-16 after six steps.
+    """
+    c = math.pow(law.layer_stiffness / law.stiffness, 2.0 / 3.0)
+    s = min(math.pow(penetration, 1.0 / 3.0), math.pow(penetration / c, 0.25))
+    for _ in range(7):
+        s -= (s * s * s * (1.0 + c * s) - penetration) / (s * s * (3.0 + 4.0 * c * s))
+    return s * s * s
 
 
 @dataclass(frozen=True)
@@ -45,48 +58,28 @@ class LayeredHertz(ContactLaw):
     >>> contact = sb.LayeredHertz(stiffness=1e9, layer_stiffness=1e6)
     """
 
-    stiffness: float = quantity(
-        "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
-        plausible=(1.0, 1e15, "N/mm^1.5"),
-    )  # fmt: skip
-    layer_stiffness: float = quantity(
-        "N/m^2", "stiffness of the layer", low=0.0, scope=RUN, symbol=r"k_\mathrm{l}"
-    )
+    stiffness: float = hertz_stiffness()
+    layer_stiffness: float = quantity("N/m^2", "stiffness of the layer", low=0.0, scope=RUN, symbol=r"k_\mathrm{l}")
 
     name = "layer"
-
-    # Each of the three begins with d_l = s^3, the root of s^3 + c s^4 = d, c = (k_l/k_c)^(2/3): Newton's iteration from
-    # above, where the left side is convex, within a fifth of the root at first and within 1e-16 after six steps.
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:
         """k_l d_l^2."""
-        k_l, c = law.layer_stiffness, math.pow(law.layer_stiffness / law.stiffness, 2.0 / 3.0)
-        s = min(math.pow(penetration, 1.0 / 3.0), math.pow(penetration / c, 0.25))
-        for _ in range(7):
-            s -= (s * s * s * (1.0 + c * s) - penetration) / (s * s * (3.0 + 4.0 * c * s))
-        part = s * s * s
-        return k_l * part * part
+        part = _of_layer(law, penetration)
+        return law.layer_stiffness * part * part
 
     @staticmethod
     def energy(law: Any, penetration: float) -> float:
         """f (2 d_c/5 + d_l/3)."""
-        k_l, c = law.layer_stiffness, math.pow(law.layer_stiffness / law.stiffness, 2.0 / 3.0)
-        s = min(math.pow(penetration, 1.0 / 3.0), math.pow(penetration / c, 0.25))
-        for _ in range(7):
-            s -= (s * s * s * (1.0 + c * s) - penetration) / (s * s * (3.0 + 4.0 * c * s))
-        part = s * s * s
-        return k_l * part * part * (0.4 * (penetration - part) + part / 3.0)
+        part = _of_layer(law, penetration)
+        return law.layer_stiffness * part * part * (0.4 * (penetration - part) + part / 3.0)
 
     @staticmethod
     def slope(law: Any, penetration: float) -> float:
         """f/(2 d_c/3 + d_l/2): the compliances add up."""
-        k_l, c = law.layer_stiffness, math.pow(law.layer_stiffness / law.stiffness, 2.0 / 3.0)
-        s = min(math.pow(penetration, 1.0 / 3.0), math.pow(penetration / c, 0.25))
-        for _ in range(7):
-            s -= (s * s * s * (1.0 + c * s) - penetration) / (s * s * (3.0 + 4.0 * c * s))
-        part = s * s * s
-        return k_l * part * part / ((penetration - part) / 1.5 + 0.5 * part)
+        part = _of_layer(law, penetration)
+        return law.layer_stiffness * part * part / ((penetration - part) / 1.5 + 0.5 * part)
 
     @classmethod
     def from_layer(

@@ -18,12 +18,8 @@ class Preset(NamedTuple):
 
 PRESETS: dict[str, Preset] = {
     "hunt-crossley": Preset(lambda e: 1.5 * (1.0 - e), "Hunt and Crossley, J. Appl. Mech. 42 (1975)"),
-    "lankarani-nikravesh": Preset(
-        lambda e: 0.75 * (1.0 - e * e), "Lankarani and Nikravesh, J. Mech. Des. 112 (1990)"
-    ),
-    "gonthier": Preset(
-        lambda e: (1.0 - e * e) / e, "Gonthier et al., Multibody Syst. Dyn. 11 (2004), leading term"
-    ),
+    "lankarani-nikravesh": Preset(lambda e: 0.75 * (1.0 - e * e), "Lankarani and Nikravesh, J. Mech. Des. 112 (1990)"),
+    "gonthier": Preset(lambda e: (1.0 - e * e) / e, "Gonthier et al., Multibody Syst. Dyn. 11 (2004), leading term"),
     "flores": Preset(lambda e: 1.6 * (1.0 - e) / e, "Flores et al., Multibody Syst. Dyn. 25 (2011)"),
 }
 """Published approximations by name; :func:`restitution_of_loss` gives the restitution that results."""

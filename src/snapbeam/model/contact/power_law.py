@@ -37,9 +37,7 @@ class PowerLaw(ContactLaw):
     >>> contact = sb.PowerLaw.from_stiffness(1e13, exponent=2.0)
     """
 
-    force_at_1um: float = quantity(
-        "N", "force at a penetration of one micrometre", low=0.0, scope=RUN, symbol="f_1"
-    )
+    force_at_1um: float = quantity("N", "force at a penetration of one micrometre", low=0.0, scope=RUN, symbol="f_1")
     exponent: float = quantity(
         "1", "exponent of the contact law", low=1.0, high=10.0, closed="both", scope=RUN, symbol="p",
         short="contact_exponent",

@@ -71,9 +71,7 @@ def _held(value: Callable[[], float]) -> float:
     return found
 
 
-def hertz_stress(
-    force: float, stiffness: float, radius: float, yield_stress: float | None = None
-) -> HertzStress:
+def hertz_stress(force: float, stiffness: float, radius: float, yield_stress: float | None = None) -> HertzStress:
     """Pressure of a sphere on a flat under Hertz's law.
 
     With E* = 3 k_c/(4 sqrt(R)) the pressure is p_0 = (6 F E*^2/(pi^3 R^2))^(1/3) and the circle of contact has the
@@ -123,9 +121,7 @@ def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array
         raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
     beam = model.beam
     if beam is None:
-        raise InputError(
-            "model: a structure given by matrices has no curvature; give a model made from a beam"
-        )
+        raise InputError("model: a structure given by matrices has no curvature; give a model made from a beam")
     alpha = finite_array("amplitude", amplitude)
     if alpha.shape[-1:] != (model.modes,):
         raise InputError(f"amplitude of shape {alpha.shape}: must have the shape (..., {model.modes})")

@@ -13,5 +13,4 @@ from snapbeam.model.drive import (  # noqa: F401, I001  the order of DRIVES
     sine,
     fixed_stop,
     sum,
-    two_tone,
 )

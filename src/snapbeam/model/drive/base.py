@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.drive.components import Component, Tone, fitted, side_by_side
 from snapbeam.model.extension import check_defined, check_names, overrides
-from snapbeam.model.quantity import check_fields
+from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.validation import InputError, NamedTable
 
@@ -33,6 +33,25 @@ def _sum_named(name: str) -> type[Drive] | None:
 
 DRIVES: dict[str, type[Drive]] = NamedTable(_sum_named)
 """Every drive by the name it has in parameter files; one such as ``sine+burst`` is found too, though not listed."""
+
+
+# Fields that several drives share.
+
+
+def excitation_ratio() -> Any:
+    """Return the field of a frequency over that of the first mode."""
+    text = "excitation frequency over the first natural frequency"
+    return quantity("1", text, low=0.0, scope=RUN, symbol=r"\Omega")
+
+
+def velocity_ratio() -> Any:
+    """Return the field of a velocity amplitude."""
+    return quantity("1", "velocity amplitude over b omega_1", low=0.0, closed="left", scope=RUN, symbol="V")
+
+
+def displacement_ratio() -> Any:
+    """Return the field of a displacement amplitude."""
+    return quantity("1", "displacement amplitude over b", low=0.0, closed="left", scope=RUN, symbol="A/b")
 
 
 class Scale(NamedTuple):
@@ -229,6 +248,4 @@ class Timed(Drive):
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The rate of the phase, and what the subclass needs."""
-        return {"omega": 2.0 * math.pi / (HORIZON * self.cycle(columns, scale))} | self.shape_numbers(
-            columns, scale
-        )
+        return {"omega": 2.0 * math.pi / (HORIZON * self.cycle(columns, scale))} | self.shape_numbers(columns, scale)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.base import Scale, Timed, excitation_ratio, velocity_ratio
 from snapbeam.model.drive.components import SHARPEST, STEEPEST, Component, Tone, in_pieces, rising
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.util.validation import InputError
@@ -50,17 +50,11 @@ class Burst(Timed):
     >>> striker = sb.Striker(drive=sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.1, duration_cycles=20.0))
     """
 
-    frequency_ratio: float = quantity(
-        "1", "excitation frequency over the first natural frequency", low=0.0, scope=RUN, symbol=r"\Omega"
-    )
-    velocity_amplitude: float = quantity(
-        "1", "velocity amplitude over b omega_1", low=0.0, closed="left", scope=RUN, symbol="V"
-    )
+    frequency_ratio: float = excitation_ratio()
+    velocity_amplitude: float = velocity_ratio()
     duration_cycles: float = quantity("1", "cycles of the burst", low=0.0, scope=RUN)
     ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
-    ramp_down_cycles: float = quantity(
-        "1", "cycles in which the drive falls", default=1.0, low=0.0, scope=RUN
-    )
+    ramp_down_cycles: float = quantity("1", "cycles in which the drive falls", default=1.0, low=0.0, scope=RUN)
     retraction: float = quantity(
         "1", "distance that the tip withdraws after the burst, over b", default=0.0, low=0.0, closed="left", scope=RUN,
     )  # fmt: skip

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.base import Scale, Timed, velocity_ratio
 from snapbeam.model.drive.components import Component, Sweep
 from snapbeam.model.quantity import RUN, STRUCTURE, quantity
 
@@ -51,9 +51,7 @@ class Chirp(Timed):
 
     start_ratio: float = quantity("1", "frequency ratio at the start of the sweep", low=0.0, scope=RUN)
     stop_ratio: float = quantity("1", "frequency ratio at the end of the sweep", low=0.0, scope=RUN)
-    velocity_amplitude: float = quantity(
-        "1", "velocity amplitude over b omega_1", low=0.0, closed="left", scope=RUN, symbol="V"
-    )
+    velocity_amplitude: float = velocity_ratio()
     sweep_cycles: float = quantity("1", "duration of the sweep, in its first period", low=0.0, scope=RUN)
     sweep_type: str = quantity(
         "1", "how the frequency changes in time", default="linear", kind=str, choices=("linear", "log"), scope=STRUCTURE,
@@ -65,9 +63,7 @@ class Chirp(Timed):
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """One sweep."""
         found = self.shape_numbers(columns, scale)
-        return [
-            Sweep(found["speed"], found["first"], found["last"], found["duration"], self.sweep_type == "log")
-        ]
+        return [Sweep(found["speed"], found["first"], found["last"], found["duration"], self.sweep_type == "log")]
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """The first period."""

@@ -100,9 +100,7 @@ class Motion:
                 np.stack(np.broadcast_arrays(*map(own, each)))
                 for each in zip(*(tone[:4] for tone in tones), strict=True)
             ]
-            self._tones.append(
-                ([each if each.ndim > 1 else each[:, None] for each in numbers], tones[0].window)
-            )
+            self._tones.append(([each if each.ndim > 1 else each[:, None] for each in numbers], tones[0].window))
 
     def __call__(self, times: ArrayLike) -> _Array:
         """Value, rate and acceleration at *times* (s); shape (3, ...) of times of shape (...)."""
@@ -226,11 +224,7 @@ _THROUGH = np.linalg.inv(np.vstack([_NODES[:, None] ** np.arange(6), np.arange(6
 
 
 def fitted(
-    name: str,
-    motion: Callable[[float], tuple[float, float]],
-    until: float,
-    longest: float,
-    jumps: Sequence[float],
+    name: str, motion: Callable[[float], tuple[float, float]], until: float, longest: float, jumps: Sequence[float]
 ) -> Pieces:
     """Quintics through values and rates of a *motion*, of time (s), up to *until*; shorter where they miss it by more than 1e-9.
 
@@ -283,8 +277,6 @@ def fitted(
 def side_by_side(pieces: Sequence[Pieces], which: NDArray[np.int64]) -> Pieces:
     """Pieces of many runs, *which* of them each has, as one table."""
     most = max(each.begins.shape[1] for each in pieces)
-    begins = [
-        np.pad(each.begins[0], (0, most - each.begins.shape[1]), constant_values=1e300) for each in pieces
-    ]
+    begins = [np.pad(each.begins[0], (0, most - each.begins.shape[1]), constant_values=1e300) for each in pieces]
     rows = [np.pad(each.coefficients[0], ((0, most - each.begins.shape[1]), (0, 0))) for each in pieces]
     return Pieces(np.array(begins)[which], np.array(rows)[which])

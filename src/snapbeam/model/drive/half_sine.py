@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.drive.base import Scale, Timed, displacement_ratio
 from snapbeam.model.drive.components import Component, Tone, in_pieces
 from snapbeam.model.quantity import RUN, quantity
 
@@ -43,15 +43,9 @@ class HalfSine(Timed):
     >>> striker = sb.Striker(drive=sb.HalfSine(displacement_amplitude=0.5, duration=0.5))
     """
 
-    displacement_amplitude: float = quantity(
-        "1", "displacement amplitude over b", low=0.0, closed="left", scope=RUN, symbol="A/b"
-    )
+    displacement_amplitude: float = displacement_ratio()
     duration: float = quantity(
-        "1",
-        "duration of the shock over the period of the first mode",
-        low=0.0,
-        scope=RUN,
-        short="shock_duration",
+        "1", "duration of the shock over the period of the first mode", low=0.0, scope=RUN, short="shock_duration"
     )
 
     name = "half_sine"

@@ -24,14 +24,7 @@ _LOW_BITS = np.uint64(0xFFFFFFFF)
 def seed_of_noise() -> Any:
     """The field ``seed`` of a random drive."""
     return quantity(
-        "1",
-        "seed of the noise",
-        default=0,
-        kind=int,
-        low=0,
-        high=2**31 - 1,
-        scope=STRUCTURE,
-        short="noise_seed",
+        "1", "seed of the noise", default=0, kind=int, low=0, high=2**31 - 1, scope=STRUCTURE, short="noise_seed"
     )
 
 
@@ -69,19 +62,10 @@ class BandLimitedNoise(Timed):
     >>> striker = sb.Striker(drive=noise)
     """
 
-    low_ratio: float = quantity(
-        "1", "lower end of the band over the first natural frequency", low=0.0, scope=RUN
-    )
-    high_ratio: float = quantity(
-        "1", "upper end of the band over the first natural frequency", low=0.0, scope=RUN
-    )
+    low_ratio: float = quantity("1", "lower end of the band over the first natural frequency", low=0.0, scope=RUN)
+    high_ratio: float = quantity("1", "upper end of the band over the first natural frequency", low=0.0, scope=RUN)
     velocity_rms: float = quantity(
-        "1",
-        "root mean square velocity over b omega_1",
-        low=0.0,
-        closed="left",
-        scope=RUN,
-        symbol=r"V_\mathrm{rms}",
+        "1", "root mean square velocity over b omega_1", low=0.0, closed="left", scope=RUN, symbol=r"V_\mathrm{rms}"
     )
     seed: int = seed_of_noise()
     ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
@@ -92,9 +76,7 @@ class BandLimitedNoise(Timed):
     def __post_init__(self) -> None:
         check_fields(self)
         if self.low_ratio >= self.high_ratio:
-            raise InputError(
-                f"low_ratio = {self.low_ratio:g}: must be less than high_ratio = {self.high_ratio:g}"
-            )
+            raise InputError(f"low_ratio = {self.low_ratio:g}: must be less than high_ratio = {self.high_ratio:g}")
 
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """The tones in one window."""
@@ -142,9 +124,7 @@ class BandLimitedNoise(Timed):
         """Place of each sine in the band, in units of its part, then the phases."""
         counter = np.arange(2 * LINES, dtype=np.uint64)
         # a 32-bit integer mixed with its neighbours: every bit of seed and counter touches every bit of it
-        mixed: NDArray[Any] = (
-            np.uint64(self.seed * 2654435769) + counter * 2246822519 + 374761393
-        ) & _LOW_BITS
+        mixed: NDArray[Any] = (np.uint64(self.seed * 2654435769) + counter * 2246822519 + 374761393) & _LOW_BITS
         mixed = ((mixed ^ (mixed >> 16)) * 2146121005) & _LOW_BITS
         mixed = ((mixed ^ (mixed >> 15)) * 2221713035) & _LOW_BITS
         shares = (mixed ^ (mixed >> 16)) / 4294967296.0

@@ -74,14 +74,10 @@ def break_points(name: str, value: Any) -> _Points:
         found.append(tuple(_number(name, *each) for each in zip(pair, _UNITS, strict=True)))
     points = np.array(found)
     if not (points > 0.0).all():
-        raise InputError(
-            f"{name}: {found[int(np.argmin(points.min(axis=1)))]}: both numbers must be greater than 0"
-        )
+        raise InputError(f"{name}: {found[int(np.argmin(points.min(axis=1)))]}: both numbers must be greater than 0")
     if not (np.diff(points[:, 0]) > 0.0).all():
         at = int(np.argmin(np.diff(points[:, 0])))
-        raise InputError(
-            f"{name}: {found[at + 1][0]:g} Hz after {found[at][0]:g} Hz: frequencies must increase"
-        )
+        raise InputError(f"{name}: {found[at + 1][0]:g} Hz after {found[at][0]:g} Hz: frequencies must increase")
     return tuple((float(f), float(g)) for f, g in found)
 
 
@@ -97,9 +93,7 @@ def _number(name: str, value: Any, unit: tuple[str, float]) -> float:
             raise InputError(f"{name}: {shown(value)}: {error}") from None
         number = math.nan if stated is None else stated * size
     if not math.isfinite(number):
-        raise InputError(
-            f"{name}: {shown(value)}: must be a finite number in {'Hz' if own == 'Hz' else 'g^2/Hz'}"
-        )
+        raise InputError(f"{name}: {shown(value)}: must be a finite number in {'Hz' if own == 'Hz' else 'g^2/Hz'}")
     return number
 
 
@@ -115,9 +109,7 @@ def mean_square(points: _Points, low: ArrayLike, high: ArrayLike) -> _Array:
     def up_to(f: _Array) -> _Array:
         rise = np.clip(np.log(f[..., None] / f0[:-1]), 0.0, np.diff(np.log(f0)))
         slope = np.where(order == 0.0, 1.0, order)
-        return np.sum(
-            g0[:-1] * f0[:-1] * np.where(order == 0.0, rise, np.expm1(slope * rise) / slope), axis=-1
-        )
+        return np.sum(g0[:-1] * f0[:-1] * np.where(order == 0.0, rise, np.expm1(slope * rise) / slope), axis=-1)
 
     lowest = f0[0]
     return np.asarray(
@@ -192,9 +184,7 @@ class RandomVibration(SampledAcceleration):
                 f"{self.psd[-1][0]:g} Hz"
             )
         if self.ramp_up_s >= self.duration_s:
-            raise InputError(
-                f"ramp_up_s = {self.ramp_up_s:g} s: must be less than duration_s = {self.duration_s:g} s"
-            )
+            raise InputError(f"ramp_up_s = {self.ramp_up_s:g} s: must be less than duration_s = {self.duration_s:g} s")
         if self.rms_g is None:
             object.__setattr__(self, "rms_g", self._rms_of_psd)
 

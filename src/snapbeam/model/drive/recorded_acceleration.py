@@ -70,9 +70,7 @@ class RecordedAcceleration(FileKeys, SampledAcceleration):
         return cls(record=GRAVITY * finite_array("record", record, 1), sampling_frequency=sampling_frequency)
 
     @classmethod
-    def _of_signal(
-        cls, values: _Array, unit: str, rate: float, decided: bool, **fields: Any
-    ) -> RecordedAcceleration:
+    def _of_signal(cls, values: _Array, unit: str, rate: float, decided: bool, **fields: Any) -> RecordedAcceleration:
         require_unit(unit, {"m/s^2": "an acceleration"})
         made = cls(record=values, sampling_frequency=rate, **fields)
         if made.drift > 0.0 and not decided:

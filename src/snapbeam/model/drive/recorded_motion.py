@@ -107,9 +107,7 @@ class RecordedMotion(FileKeys, Drive):
         )
 
     @classmethod
-    def _of_signal(
-        cls, values: _Array, unit: str, rate: float, decided: bool, **fields: Any
-    ) -> RecordedMotion:
+    def _of_signal(cls, values: _Array, unit: str, rate: float, decided: bool, **fields: Any) -> RecordedMotion:
         """The cubic spline through displacements and its rate, or the integral of the one through velocities."""
         from scipy.interpolate import CubicSpline
 
@@ -127,14 +125,11 @@ class RecordedMotion(FileKeys, Drive):
             return NotImplemented
         numbers = (self.sampling_frequency, self.frequency) == (other.sampling_frequency, other.frequency)
         return numbers and bool(
-            np.array_equal(self.displacement, other.displacement)
-            and np.array_equal(self.velocity, other.velocity)
+            np.array_equal(self.displacement, other.displacement) and np.array_equal(self.velocity, other.velocity)
         )
 
     def __hash__(self) -> int:
-        return hash(
-            (self.sampling_frequency, self.frequency, self.displacement.tobytes(), self.velocity.tobytes())
-        )
+        return hash((self.sampling_frequency, self.frequency, self.displacement.tobytes(), self.velocity.tobytes()))
 
     @property
     def duration(self) -> float:

@@ -58,11 +58,7 @@ class Sampled(Timed):
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """A rate that the steps resolve, rad/s."""
-        return {
-            "fastest": np.full(
-                next(iter(columns.values())).size, 2.0 * math.pi * self.sampling_frequency / _KNOTS
-            )
-        }
+        return {"fastest": np.full(next(iter(columns.values())).size, 2.0 * math.pi * self.sampling_frequency / _KNOTS)}
 
 
 # ----------------------------------------------------------------------------------------------------

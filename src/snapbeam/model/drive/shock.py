@@ -105,9 +105,7 @@ class Shock(Timed):
             return [way, Tone(-a / rate**2, rate, window=window)]
         if self.shape == "haversine":  # a/2 (t^2/2 - (1 - cos wt)/w^2)
             rate, half = 2.0 * math.pi / d, 0.5 * a
-            way = in_pieces(
-                (begin, {0: -half / rate**2, 2: 0.5 * half}), (d, {0: 0.5 * half * d**2, 1: half * d})
-            )
+            way = in_pieces((begin, {0: -half / rate**2, 2: 0.5 * half}), (d, {0: 0.5 * half * d**2, 1: half * d}))
             return [way, Tone(half / rate**2, rate, np.full(d.size, 0.5 * math.pi), window=window)]
         u = fall - r
         there, speed = a * (r**2 / 6.0 + 0.5 * r * u + 0.5 * u**2), a * (0.5 * r + u)
@@ -133,13 +131,7 @@ class Shock(Timed):
         if self.shape == "trapezoid":
             rise = columns["rise_fraction"] * duration
             fastest = 0.5 * math.pi / rise
-        return {
-            "fastest": fastest,
-            "peak": peak,
-            "duration": duration,
-            "rise": rise,
-            "fall": duration - rise,
-        }
+        return {"fastest": fastest, "peak": peak, "duration": duration, "rise": rise, "fall": duration - rise}
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """Bounds of displacement and velocity: the motion continues at its last velocity."""

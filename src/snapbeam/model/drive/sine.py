@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Drive, Scale
+from snapbeam.model.drive.base import Drive, Scale, displacement_ratio, excitation_ratio, velocity_ratio
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.diagnostics import Diagnostic
 
@@ -22,8 +22,44 @@ _LARGEST_RATIO = 20.0
 """Ratios from which on a number is probably given in Hz or mm/s."""
 
 
+def _phase() -> Any:
+    return quantity(
+        "rad", "phase of the drive at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN,
+        short="drive_phase",
+    )  # fmt: skip
+
+
 @dataclass(frozen=True, kw_only=True)
-class Sine(Drive):
+class _Harmonic(Drive):
+    """A sine of the tip, whose amplitude (m) its kind gives."""
+
+    frequency_ratio: float = excitation_ratio()
+    harmonic = True
+
+    def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        raise NotImplementedError
+
+    def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Angular frequency (rad/s) and amplitude of the displacement (m)."""
+        return {"omega": columns["frequency_ratio"] * scale.omega, "amplitude": self._amplitude(columns, scale)}
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """One period of the sine."""
+        return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """Amplitudes of displacement and velocity."""
+        numbers = self.numbers(columns, scale)
+        return numbers["amplitude"], numbers["amplitude"] * numbers["omega"]
+
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A omega^2."""
+        numbers = self.numbers(columns, scale)
+        return np.asarray(numbers["amplitude"] * numbers["omega"] ** 2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sine(_Harmonic):
     """Harmonic motion of the tip with the velocity amplitude V b omega_1 (Eq. 16).
 
     The displacement of the tip is
@@ -51,42 +87,15 @@ class Sine(Drive):
     >>> striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.18))
     """
 
-    frequency_ratio: float = quantity(
-        "1", "excitation frequency over the first natural frequency", low=0.0, scope=RUN, symbol=r"\Omega"
-    )
-    velocity_amplitude: float = quantity(
-        "1", "velocity amplitude over b omega_1", low=0.0, closed="left", scope=RUN, symbol="V"
-    )
-    phase: float = quantity(
-        "rad", "phase of the drive at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN,
-        short="drive_phase",
-    )  # fmt: skip
+    velocity_amplitude: float = velocity_ratio()
+    phase: float = _phase()
 
     name = "sine"
-    harmonic = True
 
-    def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """Angular frequency (rad/s) and amplitude of the displacement (m)."""
-        omega = columns["frequency_ratio"] * scale.omega
-        return {
-            "omega": omega,
-            "amplitude": columns["velocity_amplitude"] * scale.length * scale.omega / omega,
-        }
-
-    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """One period of the sine."""
-        period: _Array = 2.0 * math.pi / (columns["frequency_ratio"] * scale.omega)
-        return period
-
-    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Amplitudes of displacement and velocity."""
-        numbers = self.numbers(columns, scale)
-        return numbers["amplitude"], numbers["amplitude"] * numbers["omega"]
-
-    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """A omega^2."""
-        numbers = self.numbers(columns, scale)
-        return np.asarray(numbers["amplitude"] * numbers["omega"] ** 2)
+    def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        return np.asarray(
+            columns["velocity_amplitude"] * scale.length * scale.omega / (columns["frequency_ratio"] * scale.omega)
+        )
 
     def diagnostics(self, section: str, model: ReducedModel) -> list[Diagnostic]:
         """Values that look like another unit."""
@@ -112,41 +121,7 @@ class Sine(Drive):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _OwnAmplitude(Drive):
-    """A sine whose amplitude is given otherwise."""
-
-    frequency_ratio: float = quantity(
-        "1", "excitation frequency over the first natural frequency", low=0.0, scope=RUN, symbol=r"\Omega"
-    )
-    harmonic = True
-
-    def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        raise NotImplementedError
-
-    def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
-        """Angular frequency (rad/s) and amplitude of the displacement (m)."""
-        return {
-            "omega": columns["frequency_ratio"] * scale.omega,
-            "amplitude": self._amplitude(columns, scale),
-        }
-
-    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """One period of the sine."""
-        return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
-
-    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
-        """Amplitudes of displacement and velocity."""
-        numbers = self.numbers(columns, scale)
-        return numbers["amplitude"], numbers["amplitude"] * numbers["omega"]
-
-    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
-        """A omega^2."""
-        numbers = self.numbers(columns, scale)
-        return np.asarray(numbers["amplitude"] * numbers["omega"] ** 2)
-
-
-@dataclass(frozen=True, kw_only=True)
-class DisplacementSine(_OwnAmplitude):
+class DisplacementSine(_Harmonic):
     """A sine of the tip by its displacement, w_s(t) = w_0 + A sin(omega t + phase).
 
     Parameters
@@ -168,13 +143,8 @@ class DisplacementSine(_OwnAmplitude):
     >>> striker = sb.Striker(drive=sb.DisplacementSine(frequency_ratio=1.2, displacement_amplitude=0.15))
     """
 
-    displacement_amplitude: float = quantity(
-        "1", "displacement amplitude over b", low=0.0, closed="left", scope=RUN, symbol="A/b"
-    )
-    phase: float = quantity(
-        "rad", "phase of the drive at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN,
-        short="drive_phase",
-    )  # fmt: skip
+    displacement_amplitude: float = displacement_ratio()
+    phase: float = _phase()
     name = "displacement_sine"
 
     def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
@@ -182,7 +152,7 @@ class DisplacementSine(_OwnAmplitude):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AccelerationSine(_OwnAmplitude):
+class AccelerationSine(_Harmonic):
     """A sine of the tip by its acceleration, whose amplitude is a: A = a/omega^2.
 
     Parameters
@@ -207,10 +177,7 @@ class AccelerationSine(_OwnAmplitude):
     acceleration_amplitude: float = quantity(
         "1", "acceleration amplitude over b omega_1^2", low=0.0, closed="left", scope=RUN
     )
-    phase: float = quantity(
-        "rad", "phase of the drive at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN,
-        short="drive_phase",
-    )  # fmt: skip
+    phase: float = _phase()
     name = "acceleration_sine"
 
     def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:

@@ -35,7 +35,7 @@ class SumDrive(Timed):
 
     See Also
     --------
-    snapbeam.Drive, snapbeam.TwoTone
+    snapbeam.Drive, snapbeam.Sine
 
     Examples
     --------
@@ -151,8 +151,7 @@ class SumDrive(Timed):
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """All terms at their heights at once."""
         pairs = [
-            (drive.bounds(own, scale), self._begun(drive, own, scale))
-            for _, drive, own in self.each_term(columns)
+            (drive.bounds(own, scale), self._begun(drive, own, scale)) for _, drive, own in self.each_term(columns)
         ]
         highest = sum(pair[0] - begun for pair, begun in pairs)
         return np.asarray(highest), np.asarray(sum(pair[1] for pair, _ in pairs))
@@ -161,16 +160,14 @@ class SumDrive(Timed):
         """The same of the mirror image."""
         return np.asarray(
             sum(
-                drive.mirrored_bounds(own, scale) - self._begun(drive, own, scale)
+                drive.mirrored_bounds(own, scale) + self._begun(drive, own, scale)
                 for _, drive, own in self.each_term(columns)
             )
         )
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """All terms at their hardest at once."""
-        return np.asarray(
-            sum(drive.peak_acceleration(own, scale) for _, drive, own in self.each_term(columns))
-        )
+        return np.asarray(sum(drive.peak_acceleration(own, scale) for _, drive, own in self.each_term(columns)))
 
 
 def _names(kind: type[Drive]) -> list[str]:
@@ -216,12 +213,8 @@ def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
         "__doc__": f"The sum of {', '.join(kind.name for kind in kinds)}.",
         "terms": kinds,
     }
-    found: Any = dataclasses.make_dataclass(
-        name, fields, bases=(SumDrive,), namespace=body, frozen=True, kw_only=True
-    )
-    found.name = _JOIN.join(
-        kind.name for kind in kinds
-    )  # later than the class, so that no table of drives has it
+    found: Any = dataclasses.make_dataclass(name, fields, bases=(SumDrive,), namespace=body, frozen=True, kw_only=True)
+    found.name = _JOIN.join(kind.name for kind in kinds)  # later than the class, so that no table of drives has it
     mixed: type[SumDrive] = found
     return mixed
 

@@ -69,9 +69,7 @@ def fill(text: str, result: ClaimResult) -> str:
 
     def value(match: re.Match[str]) -> str:
         name, uncertainty, spec, yes, no = match.groups()
-        given: Quantity | Number = (
-            result.quantities[name] if name in result.quantities else result.numbers[name]
-        )
+        given: Quantity | Number = result.quantities[name] if name in result.quantities else result.numbers[name]
         if isinstance(given, Quantity):
             given = given.uncertainty if uncertainty else given.value
         elif uncertainty:

@@ -131,9 +131,7 @@ def _csv(claims: Sequence[Claim]) -> str:
     for claim in claims:
         row = {key: value for key, value in asdict(claim).items() if key != "quantities"}
         name, quantity = next(iter(claim.quantities.items()))
-        rows.append(
-            row | {"quantity": name, "value": quantity.value, "value_uncertainty": quantity.uncertainty}
-        )
+        rows.append(row | {"quantity": name, "value": quantity.value, "value_uncertainty": quantity.uncertainty})
     writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)

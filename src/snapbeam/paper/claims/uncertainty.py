@@ -72,17 +72,11 @@ def median_of(values: NDArray[np.float64], *more: float) -> Quantity:
 
 
 def _named(modes: int, variant: str, *, long: bool) -> str:
-    words = [
-        *(["one_mode"] if modes == 1 else []),
-        *([variant] if variant else []),
-        *(["long"] if long else []),
-    ]
+    words = [*(["one_mode"] if modes == 1 else []), *([variant] if variant else []), *(["long"] if long else [])]
     return "_".join(words) or "base"
 
 
-def chaos(
-    results: Results, number: Callable[[xr.Dataset], float], modes: int, *, long: bool = False
-) -> float:
+def chaos(results: Results, number: Callable[[xr.Dataset], float], modes: int, *, long: bool = False) -> float:
     """Change of a number from a map when the drive changes by 1e-9, or the step is halved.
 
     Both are measured on the smaller map of the sensitivity study, with 1 mode or many; the *long* one, of 1000
@@ -90,9 +84,7 @@ def chaos(
     """
     base = number(part(results, "sensitivity", _named(modes, "", long=long)))
     variants = ("perturbed",) if long else ("perturbed", "half_step")
-    moved = [
-        abs(number(part(results, "sensitivity", _named(modes, name, long=long))) - base) for name in variants
-    ]
+    moved = [abs(number(part(results, "sensitivity", _named(modes, name, long=long))) - base) for name in variants]
     return float(np.nanmax([0.0, *moved]))
 
 

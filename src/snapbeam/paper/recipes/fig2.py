@@ -72,9 +72,7 @@ def draw(results: Results) -> Figure:
 
 def _clamps(ax: Axes) -> None:
     for left in (-0.06, 1.0):
-        ax.add_patch(
-            Rectangle((left, -0.5), 0.06, 1.0, facecolor="0.85", hatch="////", edgecolor="0.4", lw=0.6)
-        )
+        ax.add_patch(Rectangle((left, -0.5), 0.06, 1.0, facecolor="0.85", hatch="////", edgecolor="0.4", lw=0.6))
 
 
 def _shaker(ax: Axes, x: float, touch: float) -> None:

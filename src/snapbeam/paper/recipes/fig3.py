@@ -30,9 +30,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     onset, duration = float(hit.onset[0]), float(hit.duration[0])
     close = np.linspace(max(onset - 0.5 * duration, 0.0), min(onset + 1.5 * duration, end), 601)
     times = np.union1d(np.linspace(0.0, end, 200 * _WINDOW + 1), close)
-    run = paper_run(
-        modes, FREQUENCY_RATIO, VELOCITY_AMPLITUDE, _WINDOW, sample_times=times, tolerance=TOLERANCE
-    )
+    run = paper_run(modes, FREQUENCY_RATIO, VELOCITY_AMPLITUDE, _WINDOW, sample_times=times, tolerance=TOLERANCE)
     names = ["displacement_at_striker", "striker_displacement", "penetration_normalised", "contact_force"]
     return {"run": run.dataset[names], "impact": hit}
 
@@ -51,9 +49,7 @@ def draw(results: Results) -> Figure:
         wave = figure.add_subplot(grid[:, 0])
         close = figure.add_subplot(grid[0, 1])
         force = figure.add_subplot(grid[1, 1], sharex=close)
-        wave.plot(
-            cycle, run.displacement_at_striker, color=BEAM_COLOR, label=r"beam $w_\mathrm{b}(x_\mathrm{s})$"
-        )
+        wave.plot(cycle, run.displacement_at_striker, color=BEAM_COLOR, label=r"beam $w_\mathrm{b}(x_\mathrm{s})$")
         wave.plot(cycle, run.striker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$")
         wave.set(xlabel=r"Cycles of excitation $\tau$", ylabel="Displacement $w$", xlim=(0.0, cycle[-1]))
         low, top = float(run.displacement_at_striker.min()), float(run.displacement_at_striker.max())

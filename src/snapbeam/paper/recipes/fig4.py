@@ -56,19 +56,12 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
         If the lab part is not installed, or if the grid lacks one of the kinds of response.
     """
     if "lab" not in installed_parts():
-        raise InputError(
-            "fig4: needs the package snapbeam.lab to track recordings; install snapbeam with its lab part"
-        )
+        raise InputError("fig4: needs the package snapbeam.lab to track recordings; install snapbeam with its lab part")
     modes, cycles = results.pick(4, 32), results.pick(40, CYCLES)
     amplitude = results.pick(np.linspace(0.05, 0.3, 6), np.linspace(0.04, 0.4, 37))
     ratio = results.pick(np.array([1.4]), np.linspace(0.8, 2.0, 13))
     searched = class_map(
-        results,
-        "fig4",
-        paper_model(modes),
-        frequency_ratio=ratio,
-        velocity_amplitude=amplitude,
-        cycles=cycles,
+        results, "fig4", paper_model(modes), frequency_ratio=ratio, velocity_amplitude=amplitude, cycles=cycles
     )
     chosen = _choose(searched, modes, cycles)
     found = {"searched": searched}
@@ -99,9 +92,7 @@ def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[fl
         candidates = np.flatnonzero(settled & (crossings % 2 == 1))
         swings = {i: _swings(modes, omega, drive[i]) for i in candidates[:_TRIED]}
         single = [i for i in swings if crossings[i] == 1 and swings[i] == 1][:1]
-        several = [i for i in swings if single and i > single[0] and swings[i] >= 3 and swings[i] % 2 == 1][
-            :1
-        ]
+        several = [i for i in swings if single and i > single[0] and swings[i] >= 3 and swings[i] % 2 == 1][:1]
         if not several:
             continue
         below = range(max(snapped[0] - 3, 0), snapped[0])
@@ -137,9 +128,7 @@ def _scatter(modes: int, omega: float, drive: float, cycles: int) -> float:
     period = 1.0 / (omega * paper_model(modes).reference_frequency)
     times = period * np.arange(cycles // 2, cycles)
     return float(
-        paper_run(
-            modes, float(omega), float(drive), cycles, sample_times=times
-        ).dataset.displacement_at_striker.std()
+        paper_run(modes, float(omega), float(drive), cycles, sample_times=times).dataset.displacement_at_striker.std()
     )
 
 
@@ -154,15 +143,11 @@ def _recorded(run: xr.Dataset) -> xr.Dataset:
     with tempfile.TemporaryDirectory() as folder:
         file = recording.write(Path(folder) / "synthetic.cihx")
         with open_recording(file) as frames:
-            tracked = track(
-                frames, buckling_level=BEAM.buckling_level, location=LOCATION, rest_frames=_REST_FRAMES
-            )
+            tracked = track(frames, buckling_level=BEAM.buckling_level, location=LOCATION, rest_frames=_REST_FRAMES)
     tracked = tracked[["displacement_at_striker", "striker_displacement", "valid"]]
     frequency = float(run.attrs["frequency_ratio"]) * float(run.attrs["reference_frequency"])
     cycle = (tracked.time.values - _REST_FRAMES / _FRAME_RATE) * frequency
-    tracked = tracked.assign_coords(
-        cycle=("time", cycle, {"units": "1", "long_name": "cycles of excitation"})
-    )
+    tracked = tracked.assign_coords(cycle=("time", cycle, {"units": "1", "long_name": "cycles of excitation"}))
     tracked.attrs["title"] = "synthetic recording of a simulated run, tracked"
     return tracked
 
@@ -183,16 +168,12 @@ def draw(results: Results, measured: Sequence[str | os.PathLike[str]] | None = N
     with figure_style():
         figure = new_figure("double", 132.0)
         axes = figure.subplots(3, 2, sharey=True, sharex=measured is None)
-        for row, ((first, second), recorded, (kind, words)) in enumerate(
-            zip(axes, left, KINDS.items(), strict=True)
-        ):
+        for row, ((first, second), recorded, (kind, words)) in enumerate(zip(axes, left, KINDS.items(), strict=True)):
             run = data[kind]
             _waveform(first, recorded)
             _waveform(second, run)
             first.set_ylabel("Displacement $w$")
-            place = (
-                rf"$\Omega$ = {run.attrs['frequency_ratio']:.4g}, $V$ = {run.attrs['velocity_amplitude']:.4g}"
-            )
+            place = rf"$\Omega$ = {run.attrs['frequency_ratio']:.4g}, $V$ = {run.attrs['velocity_amplitude']:.4g}"
             second.set_title(f"{words[0].upper()}{words[1:]}\n{place}", loc="left")
             again = f"No measurement: the run of {'BDF'[row]}, drawn as\na camera would see it, and tracked"
             first.set_title(again if measured is None else "Measured", loc="left")
@@ -209,13 +190,7 @@ def _waveform(ax: Axes, run: Any) -> None:
     cycles = "cycle" in run.variables
     x = run["cycle"].values if cycles else 1e3 * run["time"].values
     ax.axhline(0.0, color="0.75", linewidth=0.5)
-    ax.plot(
-        x,
-        run.displacement_at_striker,
-        color=BEAM_COLOR,
-        label=r"beam $w_\mathrm{b}(x_\mathrm{s})$",
-        linewidth=0.8,
-    )
+    ax.plot(x, run.displacement_at_striker, color=BEAM_COLOR, label=r"beam $w_\mathrm{b}(x_\mathrm{s})$", linewidth=0.8)
     ax.plot(x, run.striker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$", linewidth=0.8)
     ax.set_xlim(0.0 if cycles else x[0], min(x[-1], _SHOWN) if cycles else x[-1])
     ax.set_gid("cycles" if cycles else "time")

@@ -38,9 +38,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     model = paper_model(modes)
     period = 1.0 / (FREQUENCY_RATIO * model.reference_frequency)
     times = np.linspace(0.0, _CYCLES * period, _CYCLES * _SAMPLES + 1)
-    run = paper_run(
-        modes, FREQUENCY_RATIO, VELOCITY_AMPLITUDE, _CYCLES, sample_times=times, tolerance=TOLERANCE
-    )
+    run = paper_run(modes, FREQUENCY_RATIO, VELOCITY_AMPLITUDE, _CYCLES, sample_times=times, tolerance=TOLERANCE)
     names = [
         "displacement_at_striker",
         "midspan_displacement",
@@ -126,9 +124,7 @@ def _numbers(ax: Axes, cycle: _Array, curve: _Array, marks: _Array) -> None:
     for number, (at, offset) in enumerate(zip(marks, offsets, strict=True), 1):
         y = float(np.interp(at, cycle, curve))
         ax.plot(at, y, "o", markersize=2.5, color=SHAKER_COLOR, markeredgewidth=0)
-        ax.annotate(
-            str(number), (at, y), offset, textcoords="offset points", fontsize=7, ha="center", va="center"
-        )
+        ax.annotate(str(number), (at, y), offset, textcoords="offset points", fontsize=7, ha="center", va="center")
 
 
 def _snapshots(ax: Axes, run: xr.Dataset, along: xr.Dataset, marks: _Array) -> None:

@@ -37,23 +37,14 @@ def draw(results: Results, measurements: str | os.PathLike[str] | None = None) -
         for (above, below), name in zip(axes.T, long, strict=True):
             ds = long[name]
             plot_response_map(
-                ds,
-                above,
-                measurements=read_measurements(measurements, ds),
-                quasi_static_line=True,
-                legend=False,
+                ds, above, measurements=read_measurements(measurements, ds), quasi_static_line=True, legend=False
             )
             changed = ds.response_class.values != short[name].response_class.values
             plot_response_map(
-                ds.assign(response_class=ds.response_class.where(changed)),
-                below,
-                quasi_static_line=True,
-                legend=False,
+                ds.assign(response_class=ds.response_class.where(changed)), below, quasi_static_line=True, legend=False
             )
             cycles = int(short[name].attrs["cycles"])
-            below.set_title(
-                f"changed since {cycles} cycles: {100.0 * changed.mean():.1f} % of points", loc="center"
-            )
+            below.set_title(f"changed since {cycles} cycles: {100.0 * changed.mean():.1f} % of points", loc="center")
             above.set_xlabel("")
         for ax in axes[:, 1]:
             ax.set_ylabel("")

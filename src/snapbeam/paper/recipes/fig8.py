@@ -123,17 +123,8 @@ def _starts(ax: Axes) -> None:
     ax.plot([0.0, 1.0], [0.0, 0.0], color="0.6", linewidth=0.5, dashes=(8, 3, 2, 3))
     for at, strength in zip(_STARTS, (0.35, 0.6, 1.0), strict=True):
         touch = -float(np.interp(at, x, rest))
-        ax.plot(
-            [at, at],
-            [-1.9, touch - 0.06],
-            color=SHAKER_COLOR,
-            alpha=strength,
-            linewidth=4,
-            solid_capstyle="round",
-        )
-        ax.annotate(
-            rf"$x_\mathrm{{s}}$ = {at:.3g}", (at, -1.9), (5, 2), textcoords="offset points", fontsize=7
-        )
+        ax.plot([at, at], [-1.9, touch - 0.06], color=SHAKER_COLOR, alpha=strength, linewidth=4, solid_capstyle="round")
+        ax.annotate(rf"$x_\mathrm{{s}}$ = {at:.3g}", (at, -1.9), (5, 2), textcoords="offset points", fontsize=7)
     ax.set(xlim=(-0.02, 1.02), ylim=(-2.0, 0.3))
     ax.set_axis_off()
 

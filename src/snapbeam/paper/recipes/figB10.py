@@ -33,9 +33,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
             paper_model(modes), frequency_ratio=ratio, velocity_amplitude=np.array(LEVELS),
             cycles=results.pick(100, LONG_CYCLES), progress=results.progress(f"figB10, N = {modes}"),
         )  # fmt: skip
-        found[f"modes_{modes}"] = ds[
-            ["max_displacement", "response_class", "status", "contact_time_fraction"]
-        ]
+        found[f"modes_{modes}"] = ds[["max_displacement", "response_class", "status", "contact_time_fraction"]]
     return found
 
 
@@ -61,13 +59,7 @@ def draw(results: Results) -> Figure:
         for ax, ds in zip(axes, data.values(), strict=True):
             for level, (color, line) in enumerate(_STYLES):
                 drive = float(ds.velocity_amplitude[level])
-                ax.plot(
-                    ds.frequency_ratio,
-                    ds.max_displacement[:, level],
-                    line,
-                    color=color,
-                    label=f"$V$ = {drive:g}",
-                )
+                ax.plot(ds.frequency_ratio, ds.max_displacement[:, level], line, color=color, label=f"$V$ = {drive:g}")
                 for ratio, height in maxima(ds, level)[:2]:
                     ax.plot(ratio, height, "v", color=color, markersize=3.5, markeredgewidth=0)
                     if level == len(_STYLES) - 1:  # no curve is above it

@@ -30,13 +30,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     counts = results.pick((1, 2, 4), (*range(1, 9), 10, 12, 14, 16, 20, 24, 28, 32))
     return {
         f"modes_{modes}": relative_map(
-            results,
-            f"si5, N = {modes}",
-            modes,
-            FREQUENCY_RATIO,
-            locations,
-            relative,
-            results.pick(30, CYCLES),
+            results, f"si5, N = {modes}", modes, FREQUENCY_RATIO, locations, relative, results.pick(30, CYCLES)
         )
         for modes in counts
     }

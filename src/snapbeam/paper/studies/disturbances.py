@@ -52,9 +52,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     for at, (omega, drive) in enumerate(points):
         for name, given in _variants(model, float(omega), float(drive), cycles).items():
             run = sb.simulate(
-                sb.System(model, **given),
-                sb.Integration(cycles=cycles, early_termination=True),
-                sample_times=[0.0],
+                sb.System(model, **given), sb.Integration(cycles=cycles, early_termination=True), sample_times=[0.0]
             )
             kinds[name].append(int(run.summary.response_class))
         border.append(_at_border(model, float(omega), float(drive), cycles))
@@ -181,9 +179,7 @@ _IMPACT_COLUMNS = {
 }
 
 
-def _class_table(
-    points: _Array, kinds: dict[str, list[int]], border: list[bool], attrs: dict[str, Any]
-) -> xr.Dataset:
+def _class_table(points: _Array, kinds: dict[str, list[int]], border: list[bool], attrs: dict[str, Any]) -> xr.Dataset:
     from snapbeam.util.datasets import xr
 
     names = list(kinds)

@@ -64,9 +64,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     for i, omega in enumerate(ratio):
         for j, velocity in enumerate(drives):
             drive = sb.Sine(frequency_ratio=float(omega), velocity_amplitude=float(velocity))
-            system = sb.System(
-                model, contacts=[sb.Contact(CONTACT, sb.Striker(drive=drive))], harvesters=[PIEZO]
-            )
+            system = sb.System(model, contacts=[sb.Contact(CONTACT, sb.Striker(drive=drive))], harvesters=[PIEZO])
             end = cycles / (omega * freq)
             times = np.arange(0.5 * end, end * (1.0 - 1e-9), 1.0 / rate)
             run = sb.simulate(system, sb.Integration(cycles=cycles), sample_times=times)

@@ -39,9 +39,7 @@ _APART = 1.0
 def _system(modes: int, ratio: float, velocity: float) -> sb.System:
     return sb.System(
         paper_model(modes),
-        contacts=[
-            sb.Contact(CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity).striker())
-        ],
+        contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity).striker())],
     )
 
 

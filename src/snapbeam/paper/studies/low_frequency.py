@@ -52,9 +52,7 @@ def draw(results: Results) -> Figure:
     with figure_style():
         figure = new_figure("single", 62.0)
         ax = figure.add_subplot()
-        for ds, color, marker in zip(
-            results["low_frequency"].values(), ("#2E7EBB", "#B03A27"), "os", strict=True
-        ):
+        for ds, color, marker in zip(results["low_frequency"].values(), ("#2E7EBB", "#B03A27"), "os", strict=True):
             curve = interwell_threshold(ds, "relative_amplitude")
             ax.plot(
                 ds.frequency_ratio, curve, marker=marker, color=color, markersize=3,

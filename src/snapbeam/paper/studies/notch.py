@@ -39,10 +39,7 @@ _PLACES = LOCATION + 0.002 * np.array([-1.0, 1.0])
 
 def _system(modes: int, beam: sb.Beam = BEAM, **parts: Any) -> sb.System:
     model = sb.ReducedModel.from_beam(
-        beam,
-        modes=modes,
-        damping_ratio=parts.pop("damping_ratio", 0.005),
-        imperfection=parts.pop("imperfection", None),
+        beam, modes=modes, damping_ratio=parts.pop("damping_ratio", 0.005), imperfection=parts.pop("imperfection", None)
     )
     drive = parts.pop("drive", sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1))
     contact = parts.pop("contact", CONTACT)
@@ -68,17 +65,12 @@ def _body(mass: float, frequency: float, zeta: float = 0.1) -> dict[str, Any]:
 def _start_up(rise: float) -> sb.Burst:
     """A sine that rises over some cycles and stays."""
     return sb.Burst(
-        frequency_ratio=1.0,
-        velocity_amplitude=0.1,
-        duration_cycles=1e6,
-        ramp_up_cycles=rise,
-        ramp_down_cycles=1.0,
+        frequency_ratio=1.0, velocity_amplitude=0.1, duration_cycles=1e6, ramp_up_cycles=rise, ramp_down_cycles=1.0
     )
 
 
 _SOFT = {
-    k: _supported(left_rotational_stiffness=k * _UNIT, right_rotational_stiffness=k * _UNIT)
-    for k in (100.0, 30.0)
+    k: _supported(left_rotational_stiffness=k * _UNIT, right_rotational_stiffness=k * _UNIT) for k in (100.0, 30.0)
 }
 _GIVING = BEAM.young_modulus * BEAM.thickness * BEAM.width / BEAM.length
 

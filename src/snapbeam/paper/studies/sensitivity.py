@@ -116,9 +116,7 @@ def draw(results: Results) -> Figure:
             before = data[first]
             after = data[name].assign_coords(velocity_amplitude=before.velocity_amplitude)
             changed = after.response_class.values != before.response_class.values
-            plot_response_map(
-                after.assign(response_class=after.response_class.where(changed)), ax, legend=False
-            )
+            plot_response_map(after.assign(response_class=after.response_class.where(changed)), ax, legend=False)
             ax.set_title(f"{words}: {100.0 * changed.mean():.1f} % changed", loc="center")
             drawn.append(ax)
         for ax in axes[:, 1]:

@@ -58,8 +58,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     draws = {name: rng.standard_normal(shape) for name in _OFF}
     columns = {
         "drive.duration_cycles": np.broadcast_to(lengths[:, None, None], shape),
-        "drive.velocity_amplitude": drives[:, None]
-        * (1.0 + _OFF["velocity_amplitude"] * draws["velocity_amplitude"]),
+        "drive.velocity_amplitude": drives[:, None] * (1.0 + _OFF["velocity_amplitude"] * draws["velocity_amplitude"]),
         "drive.frequency_ratio": OMEGA * (1.0 + _OFF["frequency_ratio"] * draws["frequency_ratio"]),
         "contact.location": LOCATION + _OFF["location"] * draws["location"],
     }
@@ -131,20 +130,14 @@ def draw(results: Results) -> Figure:
                 at = int(np.argmin(np.abs(ds.length.values - length)))
                 ax.plot([drive], [at], "*", color="white", markeredgecolor="black", markersize=7)
             ax.set_title(f"bias {100 * bias:.0f} %", loc="left", fontsize=7)
-            ax.set_yticks(
-                rows, [f"{each:g}" for each in ds.length.values] if ax is axes[0] else [""] * rows.size
-            )
+            ax.set_yticks(rows, [f"{each:g}" for each in ds.length.values] if ax is axes[0] else [""] * rows.size)
             ax.set_xlabel("Velocity $V$")
         axes[0].set_ylabel("Length of the burst (cycles)")
         figure.colorbar(mesh, ax=list(axes[:count]), label="Fraction that switches", pad=0.02)
         last = axes[count]
         found = [cheapest(ds, float(bias)) for bias in ds.bias.values]
         last.plot(
-            ds.bias,
-            1e6 * np.array([each[2] for each in found]),
-            "o-",
-            color=SHAKER_COLOR,
-            label="cheapest burst",
+            ds.bias, 1e6 * np.array([each[2] for each in found]), "o-", color=SHAKER_COLOR, label="cheapest burst"
         )
         last.plot(ds.bias, 1e6 * ds.barrier, "s--", color=BEAM_COLOR, markersize=3, label="barrier")
         last.set(xlabel="Bias / fold", ylabel="Energy (µJ)")

@@ -24,10 +24,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     amplitude = results.pick(np.linspace(0.1, 0.65, 6), np.linspace(0.65 / 22, 0.65, 22))
     found = {}
     for modes in (1, results.pick(4, 32)):
-        for name, cycles in (
-            ("before", results.pick(120, LONG_CYCLES)),
-            ("after", results.pick(360, 3 * LONG_CYCLES)),
-        ):
+        for name, cycles in (("before", results.pick(120, LONG_CYCLES)), ("after", results.pick(360, 3 * LONG_CYCLES))):
             found[f"modes_{modes}_{name}"] = class_map(
                 results, f"transients, N = {modes}, {cycles} cycles", paper_model(modes),
                 frequency_ratio=ratio, velocity_amplitude=amplitude, cycles=cycles,
@@ -43,9 +40,7 @@ def draw(results: Results) -> Figure:
         axes = figure.subplots(1, 2, sharey=True)
         for ax, before, after in zip(axes, maps[::2], maps[1::2], strict=True):
             changed = after.response_class.values != before.response_class.values
-            plot_response_map(
-                after.assign(response_class=after.response_class.where(changed)), ax, legend=False
-            )
+            plot_response_map(after.assign(response_class=after.response_class.where(changed)), ax, legend=False)
             ax.set_title(
                 f"$N$ = {int(after.attrs['modes'])}: {100.0 * changed.mean():.1f} % changed from "
                 f"{int(before.attrs['cycles'])} to {int(after.attrs['cycles'])} cycles",

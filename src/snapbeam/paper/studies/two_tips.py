@@ -105,9 +105,7 @@ class _Press:
                     touching = (self.rows @ new < heights)[:, None] * self.rows
                     pressed = firm * touching.T @ np.maximum(heights - self.rows @ new, 0.0)
                     residual = (new - a) / step + self.gradient(new) - pressed
-                    change = np.linalg.solve(
-                        own / step + self.tangent(new) + firm * touching.T @ touching, -residual
-                    )
+                    change = np.linalg.solve(own / step + self.tangent(new) + firm * touching.T @ touching, -residual)
                     new = new + change
                     if np.abs(change).max() < 1e-11:
                         break
@@ -138,10 +136,7 @@ def push(model: sb.ReducedModel, places: _Array, step: float = _STEP) -> Pushed:
     rows = np.atleast_2d([model.shape_at(float(x)) for x in np.atleast_1d(places)])
     press = _Press(model.stiffness / unit, model.nonlinear_stiffness * level**2 / unit, rows)
     a, active = model.well_amplitude / level, [int(np.argmin(rows @ model.well_amplitude))]
-    at, highest = (
-        float((rows @ a).min()),
-        float((rows @ -a).max()),
-    )  # above its upper shape it cannot leave them
+    at, highest = (float((rows @ a).min()), float((rows @ -a).max()))  # above its upper shape it cannot leave them
     path: list[list[float]] = []
     while at < highest:
         height = at + step
@@ -158,9 +153,7 @@ def push(model: sb.ReducedModel, places: _Array, step: float = _STEP) -> Pushed:
     return Pushed(np.nan, len(active), a, np.array(path))
 
 
-def _follow(
-    press: _Press, a: _Array, heights: _Array, active: list[int]
-) -> tuple[_Array | None, list[int], _Array]:
+def _follow(press: _Press, a: _Array, heights: _Array, active: list[int]) -> tuple[_Array | None, list[int], _Array]:
     """The pressed state at the next height, with the tips that touch; none once the beam has left them all.
 
     Newton's method with the tips that touch, as long as that state is a minimum; then the beam creeps on, and may come
@@ -207,10 +200,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     # none at the centre and none symmetric about it: there chance decides to which side the beam gives way
     first = np.linspace(0.093, 0.913, results.pick(5, 21))
     model = beam_of(LEVEL, modes)
-    height, tips = (
-        np.full((first.size, first.size), np.nan),
-        np.zeros((first.size, first.size), dtype=np.int8),
-    )
+    height, tips = (np.full((first.size, first.size), np.nan), np.zeros((first.size, first.size), dtype=np.int8))
     shapes, places, lowest = [model.well_amplitude / _size(model)], [np.nan, np.nan], np.inf
     for i, j in itertools.combinations(range(first.size), 2):
         found = push(model, first[[i, j]], step)
@@ -230,23 +220,11 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     units = {"units": "1", "long_name": "height of the tips over b at the snap"}
     ds = xr.Dataset(
         {
-            "height": (
-                ("first_tip", "second_tip"),
-                height,
-                units | {"comment": "NaN: not left up to the upper well"},
-            ),
-            "tips": (
-                ("first_tip", "second_tip"),
-                tips,
-                {"units": "1", "long_name": "tips that it left last"},
-            ),
+            "height": (("first_tip", "second_tip"), height, units | {"comment": "NaN: not left up to the upper well"}),
+            "tips": (("first_tip", "second_tip"), tips, {"units": "1", "long_name": "tips that it left last"}),
             "best": (("level", "pusher"), np.array(best), units),
             "shape": (("pusher", "mode"), np.array(shapes), {"units": "1", "long_name": "amplitudes over b"}),
-            "place": (
-                "tip",
-                np.array([places[0], *places]),
-                {"units": "1", "long_name": "places of the tips"},
-            ),
+            "place": ("tip", np.array([places[0], *places]), {"units": "1", "long_name": "places of the tips"}),
         },
         {"first_tip": first, "second_tip": first, "level": levels, "pusher": ["one tip", "two tips"]},
         {"modes": modes, "buckling_level": LEVEL},

@@ -129,10 +129,7 @@ def _run_table(points: _Array, rows: list[dict[str, Any]], attrs: dict[str, Any]
     words = {
         "samples": (("run", "bin"), "samples with |alpha_1| in the bin"),
         "higher_exceed": (("run", "bin"), "of these, with the norm of all other amplitudes above |alpha_1|"),
-        "antisymmetric_exceed": (
-            ("run", "bin"),
-            "of these, with the norm of the antisymmetric ones above it",
-        ),
+        "antisymmetric_exceed": (("run", "bin"), "of these, with the norm of the antisymmetric ones above it"),
         "peak_amplitude": (("run", "mode"), "maximum |alpha_i| over alpha_1 at rest"),
     }
     data: dict[str, Any] = {
@@ -177,9 +174,7 @@ def _strobed(results: Results, modes: int, points: _Array, attrs: dict[str, Any]
     shape = (len(found), kept_cycles, _STROBE_PHASES)
     record = np.array(found, dtype=np.float64).reshape(shape)
     data: dict[str, Any] = {"displacement": (("run", "cycle", "phase"), record, words)}
-    for name, column in zip(
-        ("frequency_ratio", "velocity_amplitude"), np.reshape(kept, (-1, 2)).T, strict=True
-    ):
+    for name, column in zip(("frequency_ratio", "velocity_amplitude"), np.reshape(kept, (-1, 2)).T, strict=True):
         data[name] = (("run",), column, {"units": "1"})
     return xr.Dataset(data, {"cycle": np.arange(cycles - kept_cycles, cycles)}, attrs | {"cycles": cycles})
 

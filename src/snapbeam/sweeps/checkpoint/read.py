@@ -57,10 +57,7 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005),
-    ...     contacts=[sb.Contact(paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))],
-    ... )
+    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> found = sb.sweep(
     ...     system, {"drive.velocity_amplitude": [0.05, 0.2]}, sb.Integration(cycles=2),
     ...     checkpoint=sb.CheckpointOptions("sweep.checkpoint"),
@@ -131,15 +128,11 @@ def _work(described: dict[str, Any], name: str, done: dict[int, TaskRecord]) -> 
     work = PointWork(setup, repeats, metres=setup.length_varies)
     number, record = next(iter(done.items()), (0, None))
     if record is not None and work.task_hash(Stage(BASE, points, chunk).columns(number)) != record.parameters:
-        raise InputError(
-            f"checkpoint = {shown(name)}: its tasks do not match its description; compute it again"
-        )
+        raise InputError(f"checkpoint = {shown(name)}: its tasks do not match its description; compute it again")
     return work
 
 
-def _rows(
-    folder: Path, work: PointWork, stage: Stage, done: dict[int, TaskRecord]
-) -> tuple[ResultTable, int]:
+def _rows(folder: Path, work: PointWork, stage: Stage, done: dict[int, TaskRecord]) -> tuple[ResultTable, int]:
     """Return the rows of all points of a stage, and the number of points that are finished."""
     found = work.unfinished(stage.size)
     points = 0

@@ -99,9 +99,7 @@ def refuse_foreign(folder: Path) -> None:
     """Refuse a folder that is not empty and is not a checkpoint, before anything is written into it."""
     names = {entry.name for entry in folder.iterdir() if not entry.name.endswith(PARTIAL)}
     if "map.json" not in names and names - _KNOWN:
-        raise InputError(
-            f"checkpoint = {str(folder)!r}: is not empty and is not a checkpoint; give another folder"
-        )
+        raise InputError(f"checkpoint = {str(folder)!r}: is not empty and is not a checkpoint; give another folder")
 
 
 def read_description(file: Path) -> dict[str, Any]:
@@ -280,12 +278,7 @@ def grown(description: Mapping[str, Any], wanted: Mapping[str, Any], names: Sequ
     """Return the description of a checkpoint after an extension, without its new hash."""
     before = {"points": description["parameters"]["points"], "axes": description["axes"]}
     layers = [*description.get("grown", []), before]
-    return {
-        **description,
-        "parameters": dict(wanted),
-        "axes": list(names),
-        "grown": layers,
-    }
+    return {**description, "parameters": dict(wanted), "axes": list(names), "grown": layers}
 
 
 def layers_of(work: PointWork, earlier: Sequence[Mapping[str, Any]], chunk: int) -> list[RefinementLayer]:
@@ -294,15 +287,11 @@ def layers_of(work: PointWork, earlier: Sequence[Mapping[str, Any]], chunk: int)
     if not isinstance(now, Grid):  # a list of points cannot be extended
         return [RefinementLayer(work, Stage(BASE, now, chunk), np.arange(now.size))]
     grids = [
-        Grid({name: np.array(each["points"][name], now.axes[name].dtype) for name in each["axes"]})
-        for each in earlier
+        Grid({name: np.array(each["points"][name], now.axes[name].dtype) for name in each["axes"]}) for each in earlier
     ]
     for grid in grids:  # before any array over their points is made
         for name, values in now.axes.items():
-            if (
-                len(set(grid.axes[name].tolist())) < grid.axes[name].size
-                or not np.isin(grid.axes[name], values).all()
-            ):
+            if len(set(grid.axes[name].tolist())) < grid.axes[name].size or not np.isin(grid.axes[name], values).all():
                 raise ValueError(f"{name}: is no part of the extended axis")
     found = []
     for number, grid in enumerate([*grids, now]):
@@ -467,14 +456,8 @@ class Checkpoint:
             return int(held["points_per_task"])
         setup = self.work.setup
         chunk = chunk_size(setup.points.size) if chunk is None else chunk
-        held = FORMAT | {
-            "parameters": wanted,
-            "parameter_hash": parameter_hash(wanted),
-            "points_per_task": chunk,
-        }
-        if isinstance(
-            setup.points, Grid
-        ):  # the parameters are sorted by name, so the order of the axes is separate
+        held = FORMAT | {"parameters": wanted, "parameter_hash": parameter_hash(wanted), "points_per_task": chunk}
+        if isinstance(setup.points, Grid):  # the parameters are sorted by name, so the order of the axes is separate
             held["axes"] = list(setup.points.names)
         if config is not None:
             held["config"] = config
@@ -554,9 +537,7 @@ class Checkpoint:
         """Return the tasks of a stage that were damaged when the stage was opened."""
         return [task for name, task in self.damaged if name == stage.name]
 
-    def commit(
-        self, stage: Stage, task: int, columns: ResultTable, provenance: Provenance | None = None
-    ) -> None:
+    def commit(self, stage: Stage, task: int, columns: ResultTable, provenance: Provenance | None = None) -> None:
         """Write and sync the results of a task, and then record the task as done."""
         start, stop = stage.bounds(task)
         if any(len(table) != stop - start for table in columns):
@@ -639,11 +620,7 @@ def _mixture(provenances: list[Provenance], models: set[str]) -> str:
         found = ["reduction of the model"]
     if not found:
         return ""
-    how = (
-        "only as far as the code agrees"
-        if {"code", "version"} & _apart(provenances)
-        else "to rounding, not bitwise"
-    )
+    how = "only as far as the code agrees" if {"code", "version"} & _apart(provenances) else "to rounding, not bitwise"
     return f"{how}: more than one {' and '.join(found)} was used"
 
 
@@ -720,8 +697,7 @@ def open_tables(folder: Path, stage: Stage, work: PointWork) -> dict[str, Any]:
             durable_write(path, data)
     store = _durable_store(folder)
     return {
-        name: zarr.open_array(store, path=f"{stage.name}/{name}", mode="r+", config=_CONFIG)
-        for name in _tables(work)
+        name: zarr.open_array(store, path=f"{stage.name}/{name}", mode="r+", config=_CONFIG) for name in _tables(work)
     }
 
 

@@ -72,9 +72,7 @@ def half_the_modes(results: Results) -> ClaimResult:
     first, second = maps[last // 2], maps[last]
     apart = _apart(first, second)
     a, b = first.response_class.values, second.response_class.values
-    base, nudged = (
-        part(results, "sensitivity", name).response_class.values for name in ("base", "perturbed")
-    )
+    base, nudged = (part(results, "sensitivity", name).response_class.values for name in ("base", "perturbed"))
     changed, floor = share(a != b), share(base != nudged)
     snapped = share(is_interwell(a) != is_interwell(b))
     return found(
@@ -174,9 +172,7 @@ def twice_the_modes(results: Results) -> ClaimResult:
     step = float(np.diff(base.velocity_amplitude.values).max()) / float(np.nanmedian(curves[0]))
     apart = median_of(np.abs(off), 0.5 * step)
     changed = share(base.response_class.values != double.response_class.values)
-    floor = share(
-        base.response_class.values != part(results, "sensitivity", "perturbed").response_class.values
-    )
+    floor = share(base.response_class.values != part(results, "sensitivity", "perturbed").response_class.values)
     return found(
         below(apart, 0.05) & below(changed, floor.value + floor.uncertainty), below(apart, 0.1), apart=apart,
         changed=changed, floor=floor, mean=float(off.mean()), modes=int(base.attrs["modes"]),

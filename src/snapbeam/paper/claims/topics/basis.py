@@ -121,8 +121,7 @@ def dynamic_basis(results: Results) -> ClaimResult:
             return float(model.potential_energy(rest + basis @ (u * scale))) / depth
 
         coarse, fine = (
-            float(minimize(energy, start / scale, method="BFGS", options={"gtol": gtol}).fun)
-            for gtol in (1e-7, 1e-9)
+            float(minimize(energy, start / scale, method="BFGS", options={"gtol": gtol}).fun) for gtol in (1e-7, 1e-9)
         )
         gaps.append(fine - model.well_energy / depth)
         errors.append(abs(coarse - fine) + 1e-8)

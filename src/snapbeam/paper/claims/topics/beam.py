@@ -106,9 +106,7 @@ def _crossing() -> float:
 
     def lead(level: float) -> float:
         model = sb.ReducedModel.from_beam(BEAM.replace(buckling_level=level), modes=MODES)
-        first = [
-            float(model.natural_frequencies[np.flatnonzero(model.parity == parity)[0]]) for parity in (1, -1)
-        ]
+        first = [float(model.natural_frequencies[np.flatnonzero(model.parity == parity)[0]]) for parity in (1, -1)]
         return first[0] - first[1]
 
     return float(brentq(lead, 0.2e-3, 2e-3, xtol=1e-9))
@@ -118,9 +116,7 @@ def first_is_symmetric(results: Results) -> ClaimResult:
     """21a: at the level of the paper the first dynamic mode is the first symmetric one."""
     level = Quantity(1e3 * BEAM.buckling_level, 5e-4)
     parity = int(paper_model(MODES).parity[0])
-    return found(
-        below(level, 1e3 * _crossing()) & above(parity, 0.0), level=level, crossing=1e3 * _crossing()
-    )
+    return found(below(level, 1e3 * _crossing()) & above(parity, 0.0), level=level, crossing=1e3 * _crossing())
 
 
 def order_changes(results: Results) -> ClaimResult:

@@ -36,11 +36,7 @@ def _map(results: Results, name: str, which: int) -> xr.Dataset:
 
 
 def share_of(
-    results: Results,
-    name: str,
-    which: int,
-    hits: Callable[[xr.Dataset], _Mask],
-    among: Callable[[xr.Dataset], _Mask],
+    results: Results, name: str, which: int, hits: Callable[[xr.Dataset], _Mask], among: Callable[[xr.Dataset], _Mask]
 ) -> Quantity:
     """A share of the points of a map, with what sampling and chaos leave open."""
     ds = _map(results, name, which)
@@ -95,9 +91,7 @@ def settled(results: Results) -> ClaimResult:
 
 def continuous_one_mode(results: Results) -> ClaimResult:
     """4b: many interwell responses of one mode stay continuous."""
-    shares = [
-        share_of(results, "fig7", which, is_kind(ResponseClass.CONTINUOUS), _interwell) for which in (0, 1)
-    ]
+    shares = [share_of(results, "fig7", which, is_kind(ResponseClass.CONTINUOUS), _interwell) for which in (0, 1)]
     one, many = shares
     return found(above(one, 0.25) & above(one, many.value), above(one, 0.1), share=one, many=many)
 
@@ -108,12 +102,9 @@ def first_well_disappears(results: Results) -> ClaimResult:
     before = share_of(results, "fig6", 0, first, _interwell)
     after = share_of(results, "fig7", 0, first, _interwell)
     rare = below(after, 0.01)
-    gone = below(
-        Quantity(after.value / max(before.value, 1e-12), after.uncertainty / max(before.value, 1e-12)), 0.25
-    )
+    gone = below(Quantity(after.value / max(before.value, 1e-12), after.uncertainty / max(before.value, 1e-12)), 0.25)
     points = [
-        int((_map(results, name, 0).response_class == ResponseClass.TRANSIENT_1).sum())
-        for name in ("fig6", "fig7")
+        int((_map(results, name, 0).response_class == ResponseClass.TRANSIENT_1).sum()) for name in ("fig6", "fig7")
     ]
     return found(
         rare & gone & above(before, 0.01), rare, after=after, before=before,

@@ -64,9 +64,7 @@ def hertz(results: Results) -> ClaimResult:
     ratio = min(float(changes[-1] / changes[-2]), 0.9) if changes[-2] > 0.0 else 0.0
     change = Quantity(float(changes[-1]), float(changes[-1]) * ratio / (1.0 - ratio))
     falling = below(float(changes[-1]), float(changes[0]))
-    return found(
-        below(change, 0.01) & falling, below(change, 0.05), change=change, before=counts[-2], after=counts[-1]
-    )
+    return found(below(change, 0.01) & falling, below(change, 0.05), change=change, before=counts[-2], after=counts[-1])
 
 
 def stiffness(results: Results) -> ClaimResult:
@@ -101,9 +99,7 @@ def impulse_like(results: Results) -> ClaimResult:
     ratio = runs.frequency_ratio.values[table.run.values.astype(int)]
     length = table.duration.values * float(table.attrs["reference_frequency"]) * np.maximum(1.0, ratio)
     impulse = table.impulse.values
-    carried = _over_runs(
-        results, lambda at: float(impulse[at][length[at] < _SHORT].sum() / impulse[at].sum())
-    )
+    carried = _over_runs(results, lambda at: float(impulse[at][length[at] < _SHORT].sum() / impulse[at].sum()))
     return found(
         above(carried, 0.9), above(carried, 0.5), carried=carried, short=float((length < _SHORT).mean()),
         middle=1e6 * float(np.median(table.duration.values)), impacts=int(table.sizes["impact"]),
@@ -119,9 +115,7 @@ def shallow(results: Results) -> ClaimResult:
     depth = _penetration(part(results, "waveforms", "impacts").peak_force.values)
     deep = _over_runs(results, lambda at: float(np.quantile(depth[at], 0.99)) / _TIP_RADIUS)
     in_b = depth / BEAM.buckling_level
-    return found(
-        below(deep, 0.01), below(deep, 0.05), deep=deep, middle=float(np.median(in_b)), most=float(in_b.max())
-    )
+    return found(below(deep, 0.01), below(deep, 0.05), deep=deep, middle=float(np.median(in_b)), most=float(in_b.max()))
 
 
 def elastic(results: Results) -> ClaimResult:
@@ -142,11 +136,4 @@ def elastic(results: Results) -> ClaimResult:
     )  # fmt: skip
 
 
-ROWS = {
-    "12a": restitution,
-    "12b": hertz,
-    "16": stiffness,
-    "22a": impulse_like,
-    "22b": shallow,
-    "22c": elastic,
-}
+ROWS = {"12a": restitution, "12b": hertz, "16": stiffness, "22a": impulse_like, "22b": shallow, "22c": elastic}

@@ -77,9 +77,4 @@ def impacts_need_all_modes(results: Results) -> ClaimResult:
     )  # fmt: skip
 
 
-ROWS = {
-    "25a": startup,
-    "25b": initial_conditions,
-    "25c": near_transitions,
-    "29": impacts_need_all_modes,
-}
+ROWS = {"25a": startup, "25b": initial_conditions, "25c": near_transitions, "29": impacts_need_all_modes}

@@ -32,9 +32,7 @@ def _relative(results: Results, ratio: float) -> tuple[Quantity, Quantity]:
 
 def _efficient(results: Results, ratio: float) -> ClaimResult:
     end, centre = _relative(results, ratio)
-    return found(
-        below(end, 0.6) & below(centre, 0.6), below(end, 0.9) & below(centre, 0.9), end=end, centre=centre
-    )
+    return found(below(end, 0.6) & below(centre, 0.6), below(end, 0.9) & below(centre, 0.9), end=end, centre=centre)
 
 
 def efficient_middle(results: Results) -> ClaimResult:
@@ -51,13 +49,10 @@ def more_so_when_fast(results: Results) -> ClaimResult:
     """33c: particularly at high frequency."""
     slow, fast = (_relative(results, ratio) for ratio in (0.625, 1.625))
     gains = [
-        Quantity(s.value - f.value, combined(s.uncertainty, f.uncertainty))
-        for s, f in zip(slow, fast, strict=True)
+        Quantity(s.value - f.value, combined(s.uncertainty, f.uncertainty)) for s, f in zip(slow, fast, strict=True)
     ]
     end, centre = gains
-    return found(
-        above(end, 0.0) & above(centre, 0.0), above(end, 0.0) | above(centre, 0.0), end=end, centre=centre
-    )
+    return found(above(end, 0.0) & above(centre, 0.0), above(end, 0.0) | above(centre, 0.0), end=end, centre=centre)
 
 
 def _window(results: Results, ratio: float) -> xr.Dataset:
@@ -111,12 +106,7 @@ def _fine(results: Results, ratio: float) -> ClaimResult:
     end, centre = _means(ds.location.values, room, error)
     times = _ratio(centre, end, error)
     return found(
-        above(times, 2.0),
-        above(times, 1.0),
-        times=times,
-        end=end,
-        centre=centre,
-        without=int(np.isnan(low).sum()),
+        above(times, 2.0), above(times, 1.0), times=times, end=end, centre=centre, without=int(np.isnan(low).sum())
     )
 
 

@@ -32,9 +32,7 @@ def _beyond(value: Quantity, floor: Quantity) -> Quantity:
     return Quantity(value.value - floor.value, combined(value.uncertainty, floor.uncertainty))
 
 
-def _compare(
-    results: Results, base: str, variant: str, nudged: str
-) -> tuple[Check, dict[str, Quantity | Number]]:
+def _compare(results: Results, base: str, variant: str, nudged: str) -> tuple[Check, dict[str, Quantity | Number]]:
     """A variant of a map against what a change of 1e-9 does to that map."""
     first, second, floor = (part(results, "sensitivity", name) for name in (base, variant, nudged))
     a, b, c = (ds.response_class.values for ds in (first, second, floor))
@@ -86,9 +84,7 @@ def end_rule(results: Results) -> ClaimResult:
 
         def unsettled(other: xr.Dataset) -> float:
             inside = transient(other)
-            return (
-                float((~other.final_well_proven.values.astype(bool))[inside].mean()) if inside.any() else 0.0
-            )
+            return float((~other.final_well_proven.values.astype(bool))[inside].mean()) if inside.any() else 0.0
 
         moved = chaos(results, unsettled, int(ds.attrs["modes"]))
         values.append(share((~ds.final_well_proven.values.astype(bool))[transient(ds)], moved))
@@ -103,15 +99,7 @@ def step(results: Results) -> ClaimResult:
     changed = base.response_class.values != half.response_class.values
     inside = is_interwell(base.response_class.values)[changed]
     border = compare_maps(base, half).at_border
-    return measured(
-        matters, **named, border=border, interwell=float(inside.mean()) if changed.any() else float("nan")
-    )
+    return measured(matters, **named, border=border, interwell=float(inside.mean()) if changed.any() else float("nan"))
 
 
-ROWS = {
-    "A": reference_frequency,
-    "B": contact_stiffness,
-    "C": damping,
-    "D": end_rule,
-    "E": step,
-}
+ROWS = {"A": reference_frequency, "B": contact_stiffness, "C": damping, "D": end_rule, "E": step}

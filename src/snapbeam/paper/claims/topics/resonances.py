@@ -42,11 +42,7 @@ def low_drive(results: Results) -> ClaimResult:
     first, second = _two(results, 0, _LOW)
     close = near(first, 1.8, 0.05 + first.uncertainty) & near(second, 3.6, 0.05 + second.uncertainty)
     return found(
-        close,
-        near(first, 1.8, 0.15) & near(second, 3.6, 0.15),
-        first=first,
-        second=second,
-        drive=_drives(results)[0],
+        close, near(first, 1.8, 0.15) & near(second, 3.6, 0.15), first=first, second=second, drive=_drives(results)[0]
     )
 
 
@@ -58,9 +54,7 @@ def shifts_left(results: Results) -> ClaimResult:
     """9b: one mode, moderate drive."""
     low, moderate = _two(results, 0, _LOW), _two(results, 0, _MODERATE)
     first, second = (_shift(before, after) for before, after in zip(low, moderate, strict=True))
-    return found(
-        above(first, 0.0), first=first, second=second, at=moderate[0].value, drive=_drives(results)[1]
-    )
+    return found(above(first, 0.0), first=first, second=second, at=moderate[0].value, drive=_drives(results)[1])
 
 
 def another_maximum(results: Results) -> ClaimResult:
@@ -96,9 +90,7 @@ def one_mode_is_adequate(results: Results) -> ClaimResult:
     for one, many in zip(_two(results, 0, _LOW), _two(results, 1, _LOW), strict=True):
         value = one.value * own / (many.value * other) - 1.0
         offs.append(
-            Quantity(
-                value, (1.0 + value) * combined(one.uncertainty / one.value, many.uncertainty / many.value)
-            )
+            Quantity(value, (1.0 + value) * combined(one.uncertainty / one.value, many.uncertainty / many.value))
         )
     first, second = offs
     return found(
@@ -140,9 +132,7 @@ def _linked(results: Results, which: int) -> ClaimResult:
     grid = float(np.diff(study.frequency_ratio.values).max())
     if not ratios.size:
         nothing = Quantity(math.nan, math.nan)
-        return found(
-            above(0.0, 0.0), apart=nothing, end=nothing, start=math.nan, drive=math.nan, notch=math.nan
-        )
+        return found(above(0.0, 0.0), apart=nothing, end=nothing, start=math.nan, drive=math.nan, notch=math.nan)
     ds = list(results["fig6"].values())[which]
     notch = notch_of(ds)
     spread = 0.5 * (notch.high - notch.low) + 0.5 * float(np.diff(ds.frequency_ratio.values).max())

@@ -98,10 +98,4 @@ def all_modes_excited(results: Results) -> ClaimResult:
     )  # fmt: skip
 
 
-ROWS = {
-    "10c": ripples,
-    "10d": odd_ripples,
-    "10e": few_modes,
-    "14": central_shaker,
-    "28": all_modes_excited,
-}
+ROWS = {"10c": ripples, "10d": odd_ripples, "10e": few_modes, "14": central_shaker, "28": all_modes_excited}

@@ -128,10 +128,7 @@ def high_frequency(results: Results) -> ClaimResult:
     def rise(curve: _Array, modes: int) -> Quantity:
         moved = chaos(results, lambda ds: _rise(ds.frequency_ratio.values, interwell_threshold(ds)), modes)
         inside = [np.flatnonzero((ratio >= first) & (ratio <= last)) for first, last in (_LOW, _HIGH)]
-        error = [
-            1.96 * float(np.nanstd(curve[at]) / np.sqrt(max(at.size, 1)) / np.nanmean(curve[at]))
-            for at in inside
-        ]
+        error = [1.96 * float(np.nanstd(curve[at]) / np.sqrt(max(at.size, 1)) / np.nanmean(curve[at])) for at in inside]
         value = _rise(ratio, curve)
         return Quantity(value, combined(moved, value * error[0], value * error[1]))
 
@@ -184,9 +181,7 @@ def _far_below(results: Results, which: int) -> ClaimResult:
     ratio, curve, step = _slow(results, which)
     fast = curve[ratio >= 1.0]
     most = Quantity(float(np.nanmax(fast)), step)
-    return found(
-        below(most, 0.5), below(most, 1.0), most=most, least=float(np.nanmin(fast)), last=float(ratio[-1])
-    )
+    return found(below(most, 0.5), below(most, 1.0), most=most, least=float(np.nanmin(fast)), last=float(ratio[-1]))
 
 
 def fast_one_mode(results: Results) -> ClaimResult:

@@ -62,9 +62,7 @@ def outlasts_first_well(results: Results) -> ClaimResult:
     first = before.response_class.values == ResponseClass.TRANSIENT_1
     value = share(changed[first])
     rest = share(changed[is_interwell(before.response_class.values) & ~first])
-    return found(
-        above(value, 2.0 * rest.value) & above(value, 0.0), share=value, rest=rest, points=int(first.sum())
-    )
+    return found(above(value, 2.0 * rest.value) & above(value, 0.0), share=value, rest=rest, points=int(first.sum()))
 
 
 def ends_in_second_well(results: Results) -> ClaimResult:

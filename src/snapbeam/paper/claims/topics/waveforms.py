@@ -121,9 +121,7 @@ def first_mode_away(results: Results) -> ClaimResult:
     groups = [delay[run == at] for at in np.unique(run)]
     soon = resampled(lambda at: float(np.median(np.concatenate([groups[i] for i in at]))), len(groups))
     leads = Quantity(1.0 - exceeded.value, exceeded.uncertainty)
-    return found(
-        above(leads, 0.95) & below(soon, 0.25), above(leads, 0.95) | below(soon, 0.25), leads=leads, soon=soon
-    )
+    return found(above(leads, 0.95) & below(soon, 0.25), above(leads, 0.95) | below(soon, 0.25), leads=leads, soon=soon)
 
 
 def _repeats(record: _Array) -> bool:

@@ -1,0 +1,42 @@
+"""A probability from counts, with Wilson's score interval: the interval of every proportion of the package."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from snapbeam.util.validation import InputError, within
+
+_Array = NDArray[np.float64]
+
+
+def proportion(
+    hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95, failed: ArrayLike = 0
+) -> tuple[_Array, _Array, _Array]:
+    """Return a probability with Wilson's score interval (J. Am. Stat. Assoc. 22 (1927) 209).
+
+    With z the normal quantile of (1 + confidence)/2, the limits solve |h/n - p| = z sqrt(p(1 - p)/n).  Runs that
+    failed, besides *runs*, may have been hits or not, and widen the interval both ways.
+
+    Returns
+    -------
+    share, low, high : arrays
+        NaN, 0 and 1 where there are no runs.
+    """
+    good, total, lost = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (hits, runs, failed)))
+    if (good < 0).any() or (good > total).any():
+        raise InputError("hits: must be between 0 and the number of runs")
+    z = float(special.ndtri(0.5 * (1.0 + within("confidence", confidence, 0.0, 1.0))))
+    share = np.divide(good, total, where=total > 0, out=np.full(total.shape, np.nan))
+    low, high = _limits(good, total + lost, z)[0], _limits(good + lost, total + lost, z)[1]
+    return share, low, high
+
+
+def _limits(good: _Array, total: _Array, z: float) -> tuple[_Array, _Array]:
+    n = np.maximum(total, 1.0)
+    middle = (good + 0.5 * z * z) / (n + z * z)
+    half = z * np.sqrt(good * (n - good) / n + 0.25 * z * z) / (n + z * z)
+    # at no and at all hits a limit is 0 and 1, to the last digit
+    low = np.where((good == 0) | (total == 0), 0.0, middle - half)
+    return low, np.where((good == total) | (total == 0), 1.0, middle + half)
