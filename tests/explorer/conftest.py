@@ -199,9 +199,7 @@ class Tab:
         self.page.mouse.click(*self.place(x, y))
         limit = time.monotonic() + 2.0  # of a click on the point that is shown
         self.wait(
-            lambda: (
-                (self.head(0), self.head(1)) != before or (self.page.url == url and time.monotonic() > limit)
-            ),
+            lambda: (self.head(0), self.head(1)) != before or (self.page.url == url and time.monotonic() > limit),
             "another run",
         )
 

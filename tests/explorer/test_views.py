@@ -34,9 +34,7 @@ def test_every_view_shows_the_run(opened):
     page.wait(lambda: len(page.data("section", "w")) > 0, "the section")
     at = np.arange(0.0, 30.5)
     np.testing.assert_allclose(
-        page.data("section", "w"),
-        np.interp(at, run.dataset["cycle"], run.dataset["midspan_displacement"]),
-        atol=1e-6,
+        page.data("section", "w"), np.interp(at, run.dataset["cycle"], run.dataset["midspan_displacement"]), atol=1e-6
     )
     _turn(page, "Spectrum")
     page.wait(lambda: len(page.data("spectrum", "x")) > 0, "the spectrum")
@@ -46,9 +44,7 @@ def test_every_view_shows_the_run(opened):
     np.testing.assert_allclose(page.data("modal", "rms"), alpha.std(axis=0), rtol=1e-6)
     _turn(page, "Energy")
     page.wait(lambda: len(page.data("energy", "y")) > 0, "the energy")
-    assert page.data("energy", "y")[-1] == pytest.approx(
-        1e6 * float(run.dataset["striker_work"][-1]), rel=1e-6
-    )
+    assert page.data("energy", "y")[-1] == pytest.approx(1e6 * float(run.dataset["striker_work"][-1]), rel=1e-6)
     _turn(page, "Impacts")
     page.wait(lambda: len(page.data("impacts", "peak")) > 0, "the impacts")
     np.testing.assert_array_equal(page.data("impacts", "peak"), run.impacts["peak_force"].values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping
@@ -51,7 +52,7 @@ _PUSH = 0.2
 _COARSE = 9.0
 """Pixels of a cell above which a view is worth computing again."""
 _WAIT = 10.0
-"""Seconds of a window that are computed without a question."""
+"""Seconds of a window that are computed unasked."""
 
 
 class WindowControl:
@@ -61,8 +62,8 @@ class WindowControl:
         self.card = card
         self._token: jobs.Token | None = None
         self._moved, self._pushed = 0, 0.0
-        self._allowed: dict[Any, float] = {}
-        """Seconds that were agreed to for each window: no question is asked twice."""
+        self._asked: set[Any] = set()
+        """Keys of the windows that were asked for: they are computed to their end."""
         self._awake = False
         self._waiting = jobs.Waiting(card.later)
 
@@ -105,10 +106,10 @@ class WindowControl:
         ]
         return not self.card.view.is_whole and max(wide / inside[0], tall / inside[1]) > _COARSE
 
-    def compute_view(self, force: bool = False, seconds: float = _WAIT) -> None:
+    def compute_view(self, force: bool = False) -> None:
         """Compute what is seen where it becomes finer, from coarse to fine, in place of what was being computed.
 
-        It asks before a level that would end later than *seconds* after the beginning.
+        Unless *force* asks for all of it, it ends before a level that would take too long.
         """
         if self.card.system is None or not self.card.plane.can_zoom:
             self.card.tell("a window needs two axes of numbers, and a system" if force else "")
@@ -117,7 +118,9 @@ class WindowControl:
         if bounds is None:
             return
         key = (self.card.plane_key, bounds)
-        self._allowed[key] = seconds = max(seconds, self._allowed.get(key, 0.0))
+        if force:
+            self._asked.add(key)
+        seconds = math.inf if key in self._asked else _WAIT
         self.cancel("")
         self.card.own.add(key)
         try:
@@ -128,28 +131,22 @@ class WindowControl:
             self.card.tell(str(error))
             return
         log = (self.card.plane.x.log, self.card.plane.y.log)
-        made = maps.planned(
-            system, integration, self.card.plane.names, bounds, log, self.card.view.pixels, key=key
-        )
+        made = maps.planned(system, integration, self.card.plane.names, bounds, log, self.card.view.pixels, key=key)
         window = self.card.shared.window(made)
         if window is made:
             others = [each for each in self.card.windows() if each is not made]
             strides = [each.stride.copy() for each in others]
-            made.known = maps.known_cells(
-                made, self.card.shown_plane, list(zip(others, strides, strict=True))
-            )
+            made.known = maps.known_cells(made, self.card.shown_plane, list(zip(others, strides, strict=True)))
         if window.finished or not window.wanted:  # by this page before, or by another
             self.card.show_windows()
             self.card.tell("" if window.finished or not force else "the map is as fine as the screen shows")
             return
         self._token = token = jobs.Token(jobs.WINDOW_SECONDS)
-        self.card.stop.visible, self.card.more.visible = True, False
+        self.card.stop.visible = True
         self.card.tell("computing this view")
         self._waiting.begin(0, self._still)
         self.card.shared.jobs.window(
-            lambda _: maps.compute(
-                window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds
-            ),
+            lambda _: maps.compute(window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds),
             lambda _, words: self.card.post(lambda: self._ended(window, token, words)),
             token,
         )
@@ -196,19 +193,9 @@ class WindowControl:
             self.card.stop.visible = False
             self._token = None
             self.card.show_windows()
-            if not words and window.asks is not None:
-                points, seconds = window.asks
-                self.card.more.name = f"Compute {points} finer points (about {_duration(seconds)})"
-                self.card.more.visible = True
-                words = f"window: {window.done} of {window.wanted} points computed; finer cells wait for your answer"
+            if not words and window.waits:
+                words = f"window: {window.done} of {window.wanted} points computed; Compute view continues"
             self.card.tell(words or f"window: all {window.wanted} points computed")
-
-    def more(self) -> None:
-        """Compute the requested level."""
-        window = next((w for w in reversed(self.card.windows()) if w.asks is not None), None)
-        self.card.more.visible = False
-        asked = 0.0 if window is None or window.asks is None else window.asks[1]
-        self.compute_view(force=True, seconds=_WAIT + 1.5 * asked)
 
     def cancel(self, words: str) -> None:
         """Compute no window any more."""
@@ -217,7 +204,6 @@ class WindowControl:
             self._token = None
             self._waiting.end(0)
             self.card.stop.visible = False
-        self.card.more.visible = False
         if words:
             self.card.tell(f"{words}; what was computed is kept")
 
@@ -276,9 +262,7 @@ class MapCard:
         dims, names = source.dims, source.variables()
         sizes = {name: source.coordinate(name) for name in dims}
         longest = sorted(dims, key=lambda name: (sizes[name].dtype.kind != "f", -sizes[name].size))
-        best = (
-            sorted(longest[:2], key=dims.index) + longest[2:]
-        )  # the longest continuous axes, in the map's order
+        best = sorted(longest[:2], key=dims.index) + longest[2:]  # the longest continuous axes, in the map's order
         x = address.x if address.x in dims else next(name for name in best if name != address.y)
         y = address.y if address.y in dims and address.y != x else next(name for name in best if name != x)
         if (address.x and address.x not in dims) or (address.y and address.y not in dims):
@@ -299,23 +283,11 @@ class MapCard:
         self.auto = pn.widgets.Checkbox(name="compute the view automatically", value=True, align="center")
         hidden: dict[str, Any] = {"visible": False, "align": "center"}
         self.stop = style.button(
-            "Stop",
-            self.post,
-            lambda: self.control.cancel("stopped"),
-            button_type="warning",
-            width=70,
-            **hidden,
-        )
-        self.more = style.button(
-            "Finer", self.post, lambda: self.control.more(), button_type="primary", **hidden
+            "Stop", self.post, lambda: self.control.cancel("stopped"), button_type="warning", width=70, **hidden
         )
         self.again = style.button(
-            "Compute view",
-            self.post,
-            lambda: self.control.more() if self.more.visible else self.control.compute_view(force=True),
-            width=110,
-            align="center",
-        )
+            "Compute view", self.post, lambda: self.control.compute_view(force=True), width=110, align="center"
+        )  # fmt: skip
         self.layers = pn.widgets.CheckButtonGroup(
             options={
                 "interwell threshold": "threshold", "quasi-static threshold": "quasi",
@@ -323,13 +295,9 @@ class MapCard:
             },
             value=["windows"], button_type="default",
         )  # fmt: skip
-        self.hover = style.Html(
-            "\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4)
-        )
+        self.hover = style.Html("\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4))
         self._selected: Markup = Markup("&nbsp;")
-        self.state = style.Html(
-            "", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4)
-        )
+        self.state = style.Html("", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4))
         self.key = style.Html("", sizing_mode="stretch_width", margin=(0, 0, 0, 4), css_classes=["key-box"])
         for widget in (self.x, self.y):
             widget.param.watch(self._axes_changed, "value")
@@ -345,8 +313,7 @@ class MapCard:
     def _slider(self, name: str, address: Address) -> Any:
         points = self.source.coordinate(name)
         labels = {
-            f"{value:.6g}" if isinstance(value, float) else str(value): at
-            for at, value in enumerate(points.tolist())
+            f"{value:.6g}" if isinstance(value, float) else str(value): at for at, value in enumerate(points.tolist())
         }
         if len(labels) < points.size:
             labels = {repr(value): at for at, value in enumerate(points.tolist())}
@@ -369,10 +336,7 @@ class MapCard:
     def cut(self) -> dict[str, Any]:
         """The values of the axes that have a slider and are not shown, by dotted name."""
         skeleton, held = self.source.skeleton, self._fixed()
-        return {
-            maps.parameter_of(skeleton, name): self.source.coordinate(name)[at].item()
-            for name, at in held.items()
-        }
+        return {maps.parameter_of(skeleton, name): self.source.coordinate(name)[at].item() for name, at in held.items()}
 
     def restore(self, address: Address) -> None:
         """Show the axes, the variable, the cut and the part of the map of an address of this page."""
@@ -415,9 +379,7 @@ class MapCard:
 
     def _fixed(self) -> dict[str, int]:
         return {
-            name: int(slider.value)
-            for name, slider in self.sliders.items()
-            if name not in (self.x.value, self.y.value)
+            name: int(slider.value) for name, slider in self.sliders.items() if name not in (self.x.value, self.y.value)
         }
 
     # ------------------------------------------------------------------ the cut
@@ -449,7 +411,7 @@ class MapCard:
         """The card."""
         return pn.Column(
             pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder,
-            pn.Row(self.state, self.stop, self.more, sizing_mode="stretch_width", margin=0), self.key, self.hover,
+            pn.Row(self.state, self.stop, sizing_mode="stretch_width", margin=0), self.key, self.hover,
             self.typed, pn.FlexBox(self.auto, self.again, self.layers, align_items="center", margin=0),
             sizing_mode="stretch_width", css_classes=["card"],
         )  # fmt: skip
@@ -507,9 +469,7 @@ class MapCard:
             self.view.show(name, values, limits, title)
         self.view.fade(self.changed)
         self.show_windows()
-        words.append(
-            self.view.show_quasi_static("quasi" in layers, self.source.scalars() | self._fixed_short())
-        )
+        words.append(self.view.show_quasi_static("quasi" in layers, self.source.scalars() | self._fixed_short()))
         if "threshold" in layers and self.source.is_list:
             words.append("the threshold is that of the columns of a grid; these are points")
         wanted = "threshold" in layers and values is not None and not self.source.is_list
@@ -578,9 +538,7 @@ class MapCard:
             if kind is ResponseClass.UNKNOWN and int(kind) not in shares:
                 continue
             share = f" {100.0 * shares.get(int(kind), 0.0):.1f} %" if shares else ""
-            swatch = Markup(
-                '<span class="item"><span class="swatch" style="background:{}"></span>{}{}</span>'
-            )
+            swatch = Markup('<span class="item"><span class="swatch" style="background:{}"></span>{}{}</span>')
             items.append(swatch.format(CLASS_COLORS[kind], kind.label, share))
         if shares:
             part = "the map" if self.view.is_whole else "the view"
@@ -621,9 +579,7 @@ class MapCard:
         for window, stride in reversed(self._drawn):
             at = window.computed_at(x, y, stride) if window.covers(x, y) else None
             if at is not None:
-                values = dict(
-                    zip(window.names, (window.x[at[1]].item(), window.y[at[0]].item()), strict=True)
-                )
+                values = dict(zip(window.names, (window.x[at[1]].item(), window.y[at[0]].item()), strict=True))
                 held = {name: found[at].item() for name, found in window.values.items()}
                 return maps.Point(values | self.plane.fixed_values(), held)
         return self.plane.at(*self.plane.index(x, y))
@@ -885,10 +841,7 @@ class SystemCard:
                 if section == "contact" and self.system.contacts:
                     fields = [self.law, *fields]
                 if fields:
-                    parts += [
-                        style.Html(style.HEADING.format(title), margin=0),
-                        pn.FlexBox(*fields, margin=0),
-                    ]
+                    parts += [style.Html(style.HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]
             for part in parts:
                 style.styled(part, self.page.look)
             self.box.objects = parts
@@ -972,9 +925,7 @@ class SystemCard:
             for name, value in config.given.get("integration", {}).items()
             if hasattr(config.integration, name)
         }
-        how = self.page.shared.integration.replace(
-            **{name: getattr(config.integration, name) for name in of_run}
-        )
+        how = self.page.shared.integration.replace(**{name: getattr(config.integration, name) for name in of_run})
         try:
             self.page.use(config.system, how, given)
         except InputError as error:
@@ -1104,8 +1055,7 @@ class TakeCard:
             "Map as NetCDF": self._map_data, "Window as NetCDF": self._window_data,
         }  # fmt: skip
         self.buttons = {
-            name: style.button(name, page.post, partial(self._tried, work), width=145)
-            for name, work in buttons.items()
+            name: style.button(name, page.post, partial(self._tried, work), width=145) for name, work in buttons.items()
         }
         self.link = pn.widgets.Button(name="Copy the link", width=145)
         self.link.js_on_click(args={"button": self.link}, code=_COPY)
@@ -1148,9 +1098,7 @@ class TakeCard:
             texts.append(part.format("The same in Python", "python", lines))
         if card.windows():
             command = maps.map_command(card.windows()[-1], card.plane.fixed_values())
-            texts.append(
-                part.format(f"The command that makes the finest window{beside}", "map-command", command)
-            )
+            texts.append(part.format(f"The command that makes the finest window{beside}", "map-command", command))
         old = page.runs[page.which].old
         none = (
             "The run is old: that of the present system is not computed."
@@ -1173,9 +1121,7 @@ class TakeCard:
         except InputError as error:
             self.refuse(str(error))
 
-    def _make(
-        self, name: str, suffix: str, write: Callable[[Any], object], token: jobs.Token | None = None
-    ) -> None:
+    def _make(self, name: str, suffix: str, write: Callable[[Any], object], token: jobs.Token | None = None) -> None:
         """Make a file in the background and send it to the browser."""
         page, token = self.page, token or jobs.Token(_EXPORT_SECONDS)
         self.words.object = style.BUSY.format(f"making {name}{suffix}")
@@ -1305,9 +1251,7 @@ class TakeCard:
         data, (low, high) = self._run().dataset, self.page.runs[self.page.which].window
         part = data.isel(time=within(across(self._run())[0], low, high))
         self._make(
-            "velocity",
-            ".wav",
-            lambda path: write_sound(part["time"].values, part["midspan_velocity"].values, path),
+            "velocity", ".wav", lambda path: write_sound(part["time"].values, part["midspan_velocity"].values, path)
         )
 
     def _map_data(self) -> None:
@@ -1368,9 +1312,7 @@ def _uploaded_points(content: bytes, attrs: dict[str, Any]) -> Any:
         path = Path(folder) / "points.csv"
         path.write_bytes(content)
         level = attrs.get("beam_buckling_level")
-        return read_measured_points(
-            path, reference_frequency=attrs.get("reference_frequency"), buckling_level=level
-        )
+        return read_measured_points(path, reference_frequency=attrs.get("reference_frequency"), buckling_level=level)
 
 
 def draw(painter: Callable[[], Any], path: Any) -> None:
@@ -1395,11 +1337,7 @@ def window_dataset(window: maps.Window, *, blocks: bool = False) -> xr.Dataset:
     for name, values in window.values.items():
         row = STATISTICS[name]
         held = values.astype(np.float64) if values.dtype.kind == "f" else values.copy()
-        unknown = (
-            np.nan
-            if held.dtype.kind == "f"
-            else {"response_class": -1, "status": RunStatus.NOT_RUN}.get(name, 0)
-        )
+        unknown = np.nan if held.dtype.kind == "f" else {"response_class": -1, "status": RunStatus.NOT_RUN}.get(name, 0)
         held[window.stride == 0 if blocks else ~own] = unknown
         dataset[name] = (dims, held, {"units": row.unit, "long_name": row.long_name})
     labels = {"units": "1", "long_name": "whether the point was run"}

@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 from urllib.parse import parse_qs
 
-import numpy as np
 import panel as pn
 from bokeh.models import ColumnDataSource
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam import InputError, Integration, Run, RunStatus, System
+from snapbeam import InputError, Integration, Run, System
 from snapbeam.explorer import jobs, maps
 from snapbeam.explorer.address import Address, typed
 from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard, changed_words
@@ -26,11 +24,7 @@ from snapbeam.explorer.style import WRONG, Html, Look, framed, look_of, styled
 from snapbeam.model.parameters import PHYSICAL, lookup
 
 # ----------------------------------------------------------------------------------------------------
-# What a page computes of a point, beside the page: a first look at the run, the run, and how it compares.
-
-
-_QUICK = 4000
-"""Samples of a run that is shown at once; all others follow."""
+# What a page computes of a point, beside the page: the run, and how it compares.
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,18 +39,13 @@ class Answer:
     """Probabilities and lifetime of the point, where the map holds them."""
 
 
-def answer(
-    card: MapCard, point: maps.Point, base: Any, how: Any, token: jobs.Token, look: Callable[[Run], None]
-) -> Answer:
-    """Compute a point of a card's map; *look* is given the run at a few instants before it is recorded whole."""
+def answer(card: MapCard, point: maps.Point, base: Any, how: Any, token: jobs.Token) -> Answer:
+    """Compute a point of a card's map."""
     system, integration = point.system(base, how.replace(engine="auto", threads=None))
     jobs.check_run(system, integration)
-    quick = _quick(system, integration, token)
-    if quick is not None:
-        look(quick)
-    count = jobs.samples_of(system, integration)
-    times = None if count is None else _even_times(system, integration, count)
+    times = jobs.sample_times(system, integration)
     run = sb.simulate(system, integration, sample_times=times, progress=token.check)
+    _ = run.dataset  # made here and not on the page's thread, which others wait for
     chances, source = "", card.shared.source
     try:
         held = card.expected(point)
@@ -69,24 +58,6 @@ def answer(
     return Answer(run, words, same, chances)
 
 
-def _quick(system: Any, integration: Any, token: jobs.Token) -> Run | None:
-    """The run at a few instants, all that its pictures need made; None where those instants cannot be known."""
-    if system.striker is None or not system.striker.drive.harmonic or integration.early_termination:
-        return None
-    times = _even_times(system, integration, _QUICK)
-    run = sb.simulate(system, integration, sample_times=times, progress=token.check)
-    if run.summary.status is not RunStatus.OK:
-        return None
-    _ = run.dataset  # made here and not on the page's thread, which others wait for
-    return run
-
-
-def _even_times(system: Any, integration: Any, count: int) -> NDArray[np.float64]:
-    """Instants evenly over a run with a sinusoidal drive."""
-    frequency = system.striker.drive.frequency_ratio * system.model.reference_frequency
-    return np.linspace(0.0, integration.cycles_or_default / frequency, count)
-
-
 # ----------------------------------------------------------------------------------------------------
 
 
@@ -96,14 +67,10 @@ _AFTER = 700
 """Milliseconds from the first picture of the page to the building of views that are not seen yet."""
 _PATIENT = 150
 """Milliseconds after which a run that is still computed is said to be."""
-_SENT = 40
-"""Milliseconds that what was drawn needs to be on its way to the browser."""
 _EARLY = 0.5
 """Seconds for which a page that is not sent yet waits for its first run."""
 _DRAGGED = 30
 """Cycles of the run that is shown while a slider is dragged."""
-_LONGEST = 1.0
-"""Seconds for which the rest of a run waits until its first look has been sent."""
 
 
 class Page(jobs.Tab):
@@ -122,9 +89,7 @@ class Page(jobs.Tab):
         self.shared = shared
         self.address = Address.read(arguments)
         self.look: Look = look_of(
-            self.address.theme,
-            lecture=self.address.type == "large",
-            physical=self.address.units == "physical",
+            self.address.theme, lecture=self.address.type == "large", physical=self.address.units == "physical"
         )
         self.card = MapCard(self.look, shared, self.address, self.post, self.later)
         self.card.asked = self.ask
@@ -139,9 +104,7 @@ class Page(jobs.Tab):
         self._dragging = False
         self.runs_box: Any = None
         self.compare = pn.widgets.Toggle(name="Two points", width=100, align="center")
-        self.target = pn.widgets.RadioButtonGroup(
-            options=["A", "B"], value="A", visible=False, align="center"
-        )
+        self.target = pn.widgets.RadioButtonGroup(options=["A", "B"], value="A", visible=False, align="center")
         self.compare.param.watch(lambda _: self.post(self._compared), "value")
         self.target.param.watch(lambda _: self.post(self._follow), "value")
         self.downloads = jobs.Downloads()
@@ -191,25 +154,18 @@ class Page(jobs.Tab):
         ended, token = threading.Event(), jobs.Token(jobs.RUN_SECONDS)
 
         def work(token: jobs.Token) -> None:
-            system, integration = point.system(base, how.replace(engine="auto", threads=None))
-            jobs.check_run(system, integration)
-            found.append(
-                _quick(system, integration, token) or sb.simulate(system, integration, progress=token.check)
-            )
+            try:
+                found.append(answer(self.card, point, base, how, token).run)
+            finally:
+                ended.set()
 
         def show() -> None:
             ended.wait(_EARLY)
             token.cancel()
             for run in found:
-                self.runs[0].show(run, point.words(), fresh=True)
+                self.runs[0].show(run, point.words())
 
-        def work_and_end(token: jobs.Token) -> None:
-            try:
-                work(token)
-            finally:
-                ended.set()
-
-        self.shared.jobs.run(work_and_end, lambda _, __: None, token)
+        self.shared.jobs.run(work, lambda _, __: None, token)
         return show
 
     def _stands(self) -> None:
@@ -218,9 +174,7 @@ class Page(jobs.Tab):
             self._look_for_more()
             self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         with self._together():
-            self._show_runs(
-                self.address, again=True
-            )  # changes made before the browser is connected may be lost
+            self._show_runs(self.address, again=True)  # changes made before the browser is connected may be lost
             self._quiet = False
             self.write_address()  # the state to which Back returns
         self.card.control.wake()  # after the run, for which windows wait
@@ -369,9 +323,7 @@ class Page(jobs.Tab):
         base, how = self.card.system, self.card.integration
 
         def work(token: jobs.Token) -> Answer:
-            return answer(
-                self.card, point, base, how, token, lambda run: self._first(which, point, token, run)
-            )
+            return answer(self.card, point, base, how, token)
 
         def done(found: Answer | None, error: str) -> None:
             self.post(lambda: self._done(which, point, token, found, error))
@@ -416,24 +368,7 @@ class Page(jobs.Tab):
         if point is not None and point.values | cut != point.values:
             self.ask(maps.Point(point.values | cut))
 
-    def _first(self, which: int, point: maps.Point, token: jobs.Token, run: Run) -> None:
-        """Show a first look, asked on a thread of the server, and wait until it is on its way to the browser."""
-        sent = threading.Event()
-        self.post(lambda: self._look(which, point, token, run, sent))
-        sent.wait(_LONGEST)  # Python does one thing at a time
-
-    def _look(
-        self, which: int, point: maps.Point, token: jobs.Token, run: Run, sent: threading.Event
-    ) -> None:
-        if not token.cancelled and self.points[which] is point:
-            self.waiting.end(which)
-            self.runs[which].show(run, self._words(which), fresh=True)
-            self._pair()
-        self.later(sent.set, _SENT)
-
-    def _done(
-        self, which: int, point: maps.Point, token: jobs.Token, found: Answer | None, error: str
-    ) -> None:
+    def _done(self, which: int, point: maps.Point, token: jobs.Token, found: Answer | None, error: str) -> None:
         if token.cancelled or self.points[which] is not point:
             return
         self.waiting.end(which)
@@ -442,16 +377,14 @@ class Page(jobs.Tab):
             view.fail(f"{self._words(which)}: {error}")
             self._pair()
             return
-        run, shown = found.run, view.run
-        fresh = shown is None or shown.system.hash != run.system.hash
-        view.show(run, self._words(which), fresh=fresh)
+        view.show(found.run, self._words(which))
         self._pair()
         view.say("map", found.words, bad=not found.same)
         view.say("chances", found.chances)
         view.say("conditioning", "")
         if self._take is not None:
             self._take.refresh()
-        self._condition(which, point, run, token)
+        self._condition(which, point, found.run, token)
 
     def _condition(self, which: int, point: maps.Point, run: Run, token: jobs.Token) -> None:
         def done(words: str | None, error: str) -> None:
@@ -473,7 +406,7 @@ class Page(jobs.Tab):
 
         def work(token: jobs.Token) -> Run:
             system, short = maps.system_from(maps.patched(maps.sections_of(base, how), changes))
-            return _quick(system, short, token) or sb.simulate(system, short, progress=token.check)
+            return sb.simulate(system, short, progress=token.check)
 
         def done(run: Run | None, error: str) -> None:
             self.post(lambda: tell(run, error))
@@ -488,7 +421,7 @@ class Page(jobs.Tab):
                 values = maps.values_of(self.card.plane.parameters, run.system, run.integration)
                 words = ", ".join(f"{name} = {value:.5g}" for name, value in changes.items())
                 self.runs[which].notes = {}
-                self.runs[which].show(run, f"{words}, the first {run.integration.cycles} cycles", fresh=True)
+                self.runs[which].show(run, f"{words}, the first {run.integration.cycles} cycles")
                 self.card.marks = [(values, "")]
                 self.card._draw_marks()
 
@@ -527,9 +460,7 @@ class Page(jobs.Tab):
             return
         system, integration = self.shared.system, self.shared.integration
         if changes:
-            system, integration = maps.system_from(
-                maps.patched(maps.sections_of(system, integration), changes)
-            )
+            system, integration = maps.system_from(maps.patched(maps.sections_of(system, integration), changes))
         self.changes = dict(changes)
         self.card.use(system, integration, bool(changes))
         old = f"Changed: {changed_words(changes)}" if changes else ""

@@ -226,10 +226,7 @@ class BeamPanel(RunPanel):
         self.frames = models.ColumnDataSource({"t": empty, "force": empty}, name=self.named("frames"))
         self.rods = models.ColumnDataSource({"tip": empty, "force": empty}, name=self.named("rods"))
         self.amplitudes = models.ColumnDataSource({"q": empty})
-        self.modes, self.shapes = (
-            models.ColumnDataSource({"phi": empty}),
-            models.ColumnDataSource({"x": empty}),
-        )
+        self.modes, self.shapes = (models.ColumnDataSource({"phi": empty}), models.ColumnDataSource({"x": empty}))
         self.meta = models.ColumnDataSource({"modes": [0]}, name=self.named("beam-meta"))
         beam = models.ColumnDataSource(
             {"x": empty, "top": empty, "low": empty}, syncable=False, name=self.named("beam")
@@ -271,9 +268,7 @@ class BeamPanel(RunPanel):
             label="► Play", name=self.named("play"), width=90, stylesheets=sheets, syncable=False
         )
         rates = ["0.02", "0.1", "0.3", "1", "3", "10"]
-        speed = models.Select(
-            title="cycles per second", options=rates, value="1", width=120, stylesheets=sheets
-        )
+        speed = models.Select(title="cycles per second", options=rates, value="1", width=120, stylesheets=sheets)
         linger = models.Toggle(label="slow at impacts", active=False, width=120, stylesheets=sheets)
         scrub = models.Slider(
             title="", show_value=False, start=0.0, end=1.0, value=0.0, step=0.0005, sizing_mode="stretch_width",
@@ -289,14 +284,8 @@ class BeamPanel(RunPanel):
         self.scale = models.Select(title="", options=scales, value=scales[0], stylesheets=sheets, width=160)
         self.scale.on_change("value", lambda attr, old, new: self._rescale())
         self.plot.on_change("inner_width", lambda attr, old, new: self._rescale())
-        controls = pn.FlexBox(
-            *(pn.pane.Bokeh(item) for item in (toggle, linger, speed, self.scale)), margin=0
-        )
-        return [
-            self.wrap(self.plot),
-            pn.pane.Bokeh(scrub, sizing_mode="stretch_width", margin=(0, 10)),
-            controls,
-        ]
+        controls = pn.FlexBox(*(pn.pane.Bokeh(item) for item in (toggle, linger, speed, self.scale)), margin=0)
+        return [self.wrap(self.plot), pn.pane.Bokeh(scrub, sizing_mode="stretch_width", margin=(0, 10)), controls]
 
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
@@ -323,16 +312,12 @@ class BeamPanel(RunPanel):
         along = np.linspace(0.0, 1e3 * model.beam.length, _POSITIONS)
         self.modes.data = {"phi": (1e3 * _shapes(model, _POSITIONS)[:kept]).astype(np.float32).ravel()}
         self.shapes.data = {"x": along}
-        self.amplitudes.data = {
-            "q": dataset["modal_amplitude"].values[part, :kept].astype(np.float32).ravel()
-        }
+        self.amplitudes.data = {"q": dataset["modal_amplitude"].values[part, :kept].astype(np.float32).ravel()}
         forces = np.nan_to_num(forces)
         self.rods.data = {"tip": scale * tips.ravel(), "force": forces[:, : tips.shape[1]].ravel()}
         self.frames.data = {"t": x[part], "force": forces.max(axis=1, initial=0.0)}
         self.reach = 1.35 * scale * max(1.0, float(np.nanmax(np.abs(dataset["midspan_displacement"].values))))
-        if (
-            self.fresh
-        ):  # the browser draws when it is told of a change, which what comes with the figure is not
+        if self.fresh:  # the browser draws when it is told of a change, which what comes with the figure is not
             self.fresh = False
             self.cursor.later(self._rescale, 300)
         w = dataset["midspan_displacement"].values[inside]
@@ -448,9 +433,7 @@ class Energy(RunPanel):
         ends = {name: dataset[name].values[[0, -1]] for name in _CURVES if name in dataset}
         works = sum(float(each[1]) for name, each in ends.items() if name.endswith("_work"))
         if "energy_dissipated" in ends:
-            left = works - sum(
-                float(each[1] - each[0]) for name, each in ends.items() if not name.endswith("_work")
-            )
+            left = works - sum(float(each[1] - each[0]) for name, each in ends.items() if not name.endswith("_work"))
             scale = max(abs(works), float(ends["energy_dissipated"][1]), 1e-300)
             words = f"At the end the energy balance has an error of {left:.2g} J, {abs(left) / scale:.1g} of the work. "
         barrier = run.system.model.saddle_energy - run.system.model.well_energy
@@ -477,9 +460,7 @@ class Impacts(RunPanel):
 
     title = "Impacts"
 
-    def __init__(
-        self, look: style.Look, cursor: style.Cursor, closer: Callable[[float, float], None]
-    ) -> None:
+    def __init__(self, look: style.Look, cursor: style.Cursor, closer: Callable[[float, float], None]) -> None:
         super().__init__(look, cursor)
         self.closer = closer
 
@@ -743,9 +724,7 @@ class Spectrum(RunPanel):
     def build(self) -> list[Any]:
         """Return the models of this view."""
         look = self.look
-        self.sources = {
-            name: style.columns(x=[], y=[]) for name in ("midspan_displacement", "displacement_at_striker")
-        }
+        self.sources = {name: style.columns(x=[], y=[]) for name in ("midspan_displacement", "displacement_at_striker")}
         self.sources["midspan_displacement"].name = self.named("spectrum")
         plot = style.figure(
             look, height=420, used=230, title=" ", y_axis_type="log", y_axis_label=f"amplitude ({self.units[0]})",
@@ -756,9 +735,7 @@ class Spectrum(RunPanel):
             label, color, _, _ = _DISPLACEMENTS[name]
             plot.line("x", "y", source=source, color=getattr(look, color), legend_label=label, name=name)
         style.legend(plot, look)
-        self.drive = models.Span(
-            dimension="height", line_color=look.striker, line_dash="dashed", line_width=1.2
-        )
+        self.drive = models.Span(dimension="height", line_color=look.striker, line_dash="dashed", line_width=1.2)
         self.first = models.Span(dimension="height", line_color=look.faint, line_dash="dotted", location=1.0)
         plot.add_layout(self.drive)
         plot.add_layout(self.first)
@@ -774,17 +751,12 @@ class Spectrum(RunPanel):
         ratio = next((value for name, value in given.items() if name.endswith(".frequency_ratio")), None)
         length, _, shown = self.scales(run)
         self.drive.location, self.first.location = ratio and ratio * shown, shown
-        self.plot.title.text = (
-            f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the excitation, dotted: f₁"
-        )
+        self.plot.title.text = f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the excitation, dotted: f₁"
         most = 1e-12
         for name, source in self.sources.items():
             frequency, amplitude = amplitude_spectrum(time, run.dataset[name].values[inside])
             kept = (frequency > 0.0) & (frequency <= 40.0 * first)
-            source.data = {
-                "x": frequency[kept] / first * shown,
-                "y": np.maximum(length * amplitude[kept], 1e-12),
-            }
+            source.data = {"x": frequency[kept] / first * shown, "y": np.maximum(length * amplitude[kept], 1e-12)}
             most = max(most, length * float(amplitude[kept].max(initial=0.0)))
         self.plot.y_range.update(start=1e-7 * most, end=3.0 * most)
         self.plot.x_range.update(start=0.0, end=shown * max(12.0, 4.0 * (ratio or 1.0)))
@@ -830,8 +802,7 @@ class WaveformPanel(RunPanel):
         self.sources["midspan_displacement"].name = self.named("waveform")
         self.force = models.ColumnDataSource({"x": [], "y": []}, name=self.named("force"))
         self.further = [
-            models.ColumnDataSource({"x": [], "y": []}, name=self.named(name))
-            for name in ("strikers", "below")
+            models.ColumnDataSource({"x": [], "y": []}, name=self.named(name)) for name in ("strikers", "below")
         ]
         self.below = pn.widgets.Select(options={}, width=230, margin=(0, 10))
         self.below.param.watch(lambda _: self.cursor.later(self._draw, 1), "value")
@@ -944,9 +915,7 @@ class WaveformPanel(RunPanel):
             self.second.data = self.apart.data = {"x": [], "y": []}
             return []
         scales = [self.scales(run)[0] for run in (self.run, other)]
-        series = [
-            scale * run.dataset[name].values for scale, run in zip(scales, (self.run, other), strict=True)
-        ]
+        series = [scale * run.dataset[name].values for scale, run in zip(scales, (self.run, other), strict=True)]
         x, drawn = across(self.run)[0], envelope(across(other)[0], series[1], *self.span)
         self.second.data = _curve([drawn])
         x, apart = separation((x, series[0]), (across(other)[0], series[1]))
@@ -1102,21 +1071,18 @@ class RunView:
 
     def _head(self, kind: str, words: str, below: str = "") -> None:
         line = Markup("<br>{}").format(below) if below else ""
-        self.head.object = Markup('<span class="point">{}</span> {} {}{}').format(
-            self.name, kind, words, line
-        )
+        self.head.object = Markup('<span class="point">{}</span> {} {}{}').format(self.name, kind, words, line)
 
-    def show(self, run: Run, words: str, fresh: bool) -> None:
-        """Show a run; *fresh* if it is not the one before with more samples."""
+    def show(self, run: Run, words: str) -> None:
+        """Show a run."""
         self.run, self.old = run, False
         self.tabs.css_classes = []
         self._write_notes()
         self._answer(words)
-        if fresh:
-            first, last = across(run)[0][[0, -1]].tolist()
-            self._quiet = True
-            self.cursor.range.update(start=first, end=last, reset_start=first, reset_end=last)
-            self._quiet = False
+        first, last = across(run)[0][[0, -1]].tolist()
+        self._quiet = True
+        self.cursor.range.update(start=first, end=last, reset_start=first, reset_end=last)
+        self._quiet = False
         self._draw()
 
     def _answer(self, words: str) -> None:

@@ -47,9 +47,7 @@ class Shared:
         system, how = self.system, self.integration
         if system is not None:
             self.jobs.run(
-                lambda token: simulate(system, how.replace(cycles=1)).dataset,
-                lambda _, __: None,
-                Token(RUN_SECONDS),
+                lambda token: simulate(system, how.replace(cycles=1)).dataset, lambda _, __: None, Token(RUN_SECONDS)
             )
 
     def window(self, made: Window) -> Window:

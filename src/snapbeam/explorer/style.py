@@ -73,14 +73,10 @@ def look_of(theme: str, *, lecture: bool = False, physical: bool = False) -> Loo
 def sheet(look: Look) -> str:
     """The page's style sheet."""
     text = (Path(__file__).parent / "page.css").read_text(encoding="utf-8")
-    names = {
-        name: getattr(look, name) for name in ("page", "card", "text", "faint", "grid", "accent", "striker")
-    }
+    names = {name: getattr(look, name) for name in ("page", "card", "text", "faint", "grid", "accent", "striker")}
     variables = "".join(f"--sb-{name}: {value};" for name, value in names.items())
     variables += f"--sb-scale: {look.scale};"
-    return (
-        f":root, :host {{ {variables} color-scheme: {'dark' if look.name == 'dark' else 'light'}; }}\n{text}"
-    )
+    return f":root, :host {{ {variables} color-scheme: {'dark' if look.name == 'dark' else 'light'}; }}\n{text}"
 
 
 def focused(look: Look) -> str:
@@ -200,8 +196,7 @@ def _class_table() -> NDArray[np.uint8]:
     """Colours by class + 1, of shape (5, 4)."""
     order = sorted(CLASS_COLORS)
     return np.array(
-        [[int(CLASS_COLORS[kind][i : i + 2], 16) for i in (1, 3, 5)] + [255] for kind in order],
-        dtype=np.uint8,
+        [[int(CLASS_COLORS[kind][i : i + 2], 16) for i in (1, 3, 5)] + [255] for kind in order], dtype=np.uint8
     )
 
 
