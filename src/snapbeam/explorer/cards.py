@@ -411,8 +411,8 @@ class MapCard:
         """The card."""
         return pn.Column(
             pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder,
-            pn.Row(self.state, self.stop, sizing_mode="stretch_width", margin=0), self.key, self.hover,
-            self.typed, pn.FlexBox(self.auto, self.again, self.layers, align_items="center", margin=0),
+            self.state, self.key, self.hover, self.typed,
+            pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0),
             sizing_mode="stretch_width", css_classes=["card"],
         )  # fmt: skip
 

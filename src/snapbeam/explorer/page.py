@@ -43,9 +43,7 @@ def answer(card: MapCard, point: maps.Point, base: Any, how: Any, token: jobs.To
     """Compute a point of a card's map."""
     system, integration = point.system(base, how.replace(engine="auto", threads=None))
     jobs.check_run(system, integration)
-    times = jobs.sample_times(system, integration)
-    run = sb.simulate(system, integration, sample_times=times, progress=token.check)
-    _ = run.dataset  # made here and not on the page's thread, which others wait for
+    run = recorded(system, integration, token)
     chances, source = "", card.shared.source
     try:
         held = card.expected(point)
@@ -53,9 +51,17 @@ def answer(card: MapCard, point: maps.Point, base: Any, how: Any, token: jobs.To
         same, words = maps.compared(held, run.summary, str(source.attrs.get("engine", "native")))
     except InputError as error:  # the run stands, although its map cannot be read any more
         same, words = False, str(error)
-    if times is not None:
-        words += f"; recorded at {times.size} instants, the most that a page may ask for"
+    if jobs.sample_times(system, integration) is not None:
+        words += f"; recorded at {run.dataset.sizes['time']} instants, the most that a page may ask for"
     return Answer(run, words, same, chances)
+
+
+def recorded(system: System, integration: Integration, token: jobs.Token) -> Run:
+    """A run with no more samples than a page may have."""
+    times = jobs.sample_times(system, integration)
+    run = sb.simulate(system, integration, sample_times=times, progress=token.check)
+    _ = run.dataset  # made here and not on the page's thread, which others wait for
+    return run
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -134,7 +140,7 @@ class Page(jobs.Tab):
         if self.address.changes:
             self._take_changes(self.address.changes)
         early = self._early()
-        self.runs[0].stand()
+        self.runs[0].active.activate()
         self.layout = framed(self)
         self._version = shared.source.version
         early()
@@ -178,11 +184,7 @@ class Page(jobs.Tab):
             self._quiet = False
             self.write_address()  # the state to which Back returns
         self.card.control.wake()  # after the run, for which windows wait
-        self.later(self._at_rest, _AFTER)
-
-    def _at_rest(self) -> None:
-        """Build hidden parts after the page is loaded."""
-        self.runs[0].complete()
+        self.later(self.runs[0].complete, _AFTER)
 
     def system_card(self) -> SystemCard:
         """The card of the system, made when it is first needed."""
@@ -245,8 +247,6 @@ class Page(jobs.Tab):
             point = self.points[which]
             if values and (again or point is None or point.values != values):
                 self.ask(maps.Point(values), which)
-            elif not values and point is not None:
-                self._forget(which)
         self.target.value = "B" if address.b else "A"
         titles = [part.title for part in self.runs[0].parts]
         self.runs[0].tabs.active = titles.index(address.tab) if address.tab in titles else 0
@@ -269,17 +269,6 @@ class Page(jobs.Tab):
             self.card.restore(address)
             self._show_runs(address, again)
         self._quiet, self._written = False, self._search()
-
-    def _forget(self, which: int) -> None:
-        """Show no run any more."""
-        token = self._tokens[which]
-        if token is not None:
-            token.cancel()
-        self.points[which] = None
-        self.waiting.end(which)
-        self.runs[which].forget()
-        self._pair()
-        self._mark()
 
     def _look_for_more(self) -> None:
         """Show what was added to a checkpoint since the last look."""
@@ -331,7 +320,7 @@ class Page(jobs.Tab):
         self.shared.jobs.run(work, done, token)  # what follows is said while it is computed
         view.notes = {}
         mark = self.waiting.begin(which, lambda seconds: view.wait(words, seconds))
-        self.later(lambda: view.begin(words) if self.waiting.waits(which, mark) else None, _PATIENT)
+        self.later(lambda: view.wait(words) if self.waiting.waits(which, mark) else None, _PATIENT)
         with self._together():
             self._fill_fields(point)
             self.card.select(point)
@@ -406,7 +395,7 @@ class Page(jobs.Tab):
 
         def work(token: jobs.Token) -> Run:
             system, short = maps.system_from(maps.patched(maps.sections_of(base, how), changes))
-            return sb.simulate(system, short, progress=token.check)
+            return recorded(system, short, token)
 
         def done(run: Run | None, error: str) -> None:
             self.post(lambda: tell(run, error))

@@ -91,7 +91,7 @@ class ResultPage(Tab):
 
     def stand(self) -> None:
         """Draw the figure, and show the run of the file or of the stored state."""
-        self.view.stand()
+        self.view.active.activate()
         self.draw()
         if self.source.run is not None:
             self.view.show(self.source.run, "the run of the file")
@@ -177,7 +177,7 @@ class ResultPage(Tab):
         if self._token is not None:
             self._token.cancel()
         self._token = token = Token(RUN_SECONDS)
-        self.view.begin("")
+        self.view.wait("")
 
         def work(token: Token) -> tuple[Run, str] | None:
             found = start(self.source.skeleton, place)

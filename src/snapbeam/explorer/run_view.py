@@ -1035,14 +1035,10 @@ class RunView:
 
     # ------------------------------------------------------------------ what is shown
 
-    def begin(self, words: str) -> None:
-        """Say what is computed, over the run before."""
+    def wait(self, words: str, seconds: float = 0.0) -> None:
+        """Say what is computed, over the run before, and for how long it has been."""
         self._write_notes()
-        self._head(style.BUSY.format("computing"), words)
-
-    def wait(self, words: str, seconds: float) -> None:
-        """Say for how long it has been computed."""
-        self._head(style.BUSY.format(f"computing, {seconds:.0f} s"), words)
+        self._head(style.BUSY.format(f"computing, {seconds:.0f} s" if seconds else "computing"), words)
 
     def rename(self, words: str) -> None:
         """Write the point of the run that is shown with other digits."""
@@ -1112,10 +1108,6 @@ class RunView:
         self.active.activate()
         if self.run is not None:
             self.active.show(self.run, *self.window)
-
-    def stand(self) -> None:
-        """Build the view that is seen."""
-        self.active.activate()
 
     def complete(self) -> None:
         """Build the views that are not seen, one after the other, so that what is asked for meanwhile need not wait."""
