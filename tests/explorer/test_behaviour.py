@@ -148,6 +148,7 @@ def test_two_points_side_by_side(tab, served, small_map):
     page.wait(lambda: brief(near, float(velocity[3])) in page.head(1), "B beside A")
     page.wait(lambda: brief(float(velocity[3]), near) in page.head(0), "A in as many digits")
     assert page.data("map-mark", "align") == ["right", "left"]
+    page.wait(lambda: brief(near, float(velocity[3])) in page.text("hover"), "the digits of what is selected")
     page.wait(lambda: 0.0 < min(page.data("apart", "y"), default=0.0) < 1e-8, "a small separation")
     assert len(page.data("waveform-second", "x")) > 0
 

@@ -194,7 +194,7 @@ class WindowControl:
             self._token = None
             self.card.show_windows()
             if not words and window.waits:
-                words = f"window: {window.done} of {window.wanted} points computed; Compute view continues"
+                words = f"window: {window.done} of {window.wanted} points; Compute view continues"
             self.card.tell(words or f"window: all {window.wanted} points computed")
 
     def cancel(self, words: str) -> None:
@@ -627,13 +627,13 @@ class MapCard:
             return self.plane.at(*beside)
         return self.point(float(self.plane.x.at[beside[1]]), float(self.plane.y.at[beside[0]]))
 
-    def select(self, point: maps.Point | None) -> None:
-        """Let the readout show a point whenever the pointer is not over the map."""
+    def select(self, point: maps.Point | None, words: str) -> None:
+        """Let the readout show a point, in *words*, whenever the pointer is not over the map."""
         self._selected = Markup("&nbsp;")
         if point is not None:
             place = self.plane.place(point.values)
             held = {} if place is None else self._held(point, *place)
-            self._selected = Markup("Selected: {}").format(self._readout(point, held))
+            self._selected = Markup("Selected: {}").format(self._readout(words, held))
         self.hover.object = self._selected
 
     def _hovered(self, x: float | None, y: float | None) -> None:
@@ -641,7 +641,7 @@ class MapCard:
             self.hover.object = self._selected
             return
         point = self.point(x, y)
-        self.hover.object = self._readout(point, self._held(point, x, y))
+        self.hover.object = self._readout(point.words(), self._held(point, x, y))
 
     def _held(self, point: maps.Point, x: float, y: float) -> dict[str, Any]:
         """The class, the shown variable and two more of the cell at a location."""
@@ -662,8 +662,8 @@ class MapCard:
                 found[each] = values[place].item()
         return found
 
-    def _readout(self, point: maps.Point, held: dict[str, Any]) -> Markup:
-        parts = [point.words()]
+    def _readout(self, words: str, held: dict[str, Any]) -> Markup:
+        parts: list[str] = [words]
         if held.get("status") == RunStatus.NOT_RUN:
             parts.append(maps.NOT_COMPUTED)
             held = {}

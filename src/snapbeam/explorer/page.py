@@ -323,7 +323,7 @@ class Page(jobs.Tab):
         self.later(lambda: view.wait(words) if self.waiting.waits(which, mark) else None, _PATIENT)
         with self._together():
             self._fill_fields(point)
-            self.card.select(point)
+            self.card.select(point, words)
             self._mark()
             self.write_address()
 
@@ -488,7 +488,7 @@ class Page(jobs.Tab):
     def _follow(self) -> None:
         """Let the fields hold the point of the run that the next click replaces."""
         point = self.points[self.which]
-        self.card.select(point)
+        self.card.select(point, self._words(self.which))
         if point is not None:
             self._fill_fields(point)
 
