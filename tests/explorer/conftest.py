@@ -21,6 +21,7 @@ from snapbeam.model.parameter_file import Config
 pytest.importorskip("panel", reason="the explorer's extra is not installed: make explorer-deps")
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
 TOKENS: dict[str, str] = {}
 """Token of each server by its address; a page opened without a token gets it here."""
 PATIENCE = 180_000
@@ -146,9 +147,8 @@ class Tab:
     }"""
 
     def __init__(self, browser, url: str, **options) -> None:
-        self.context = browser.new_context(
-            viewport={"width": 1280, "height": 720}, accept_downloads=True, **options
-        )
+        still = {"viewport": {"width": 1280, "height": 720}, "reduced_motion": "reduce"}
+        self.context = browser.new_context(accept_downloads=True, **(still | options))
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
         self.errors: list[str] = []
@@ -173,6 +173,9 @@ class Tab:
             """() => { const d = window.Bokeh && Bokeh.documents[0]; const m = d && d.get_model_by_name('map');
                        return m && Bokeh.index.find_one(m) && Bokeh.index.find_one(m).frame.bbox.width > 10; }"""
         )
+        self.wait(lambda: self.head() not in ("", FIRST), "the first run")
+        limit = time.monotonic() + 2.0  # not every run has notes
+        self.wait(lambda: self.notes() or time.monotonic() > limit, "what is said of it")
 
     def js(self, code: str, argument=None):
         """Evaluate something in the page."""
@@ -192,7 +195,13 @@ class Tab:
 
     def click(self, x: float, y: float) -> None:
         """Click on the map."""
+        before, url = (self.head(0), self.head(1)), self.page.url
         self.page.mouse.click(*self.place(x, y))
+        limit = time.monotonic() + 2.0  # of a click on the point that is shown
+        self.wait(
+            lambda: (self.head(0), self.head(1)) != before or (self.page.url == url and time.monotonic() > limit),
+            "another run",
+        )
 
     _TEXT = """([name, which]) => {
       const found = [];

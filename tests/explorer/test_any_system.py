@@ -13,13 +13,7 @@ from snapbeam.model.parameter_file import config_from_mapping
 BEAM = {
     "length": 0.3, "thickness": 0.4e-3, "width": 20e-3, "density": 7850.0, "young_modulus": 200e9, "buckling_level": 0.7e-3,
 }  # fmt: skip
-PIEZO = {
-    "type": "piezo",
-    "moment_per_volt": -1.66e-4,
-    "capacitance": 7.665e-7,
-    "resistance": 1e4,
-    "patch_end": 0.25,
-}
+PIEZO = {"type": "piezo", "moment_per_volt": -1.66e-4, "capacitance": 7.665e-7, "resistance": 1e4, "patch_end": 0.25}
 ONE_MODE = {"model": {"modes": 1, "damping_ratio": 0.02}}
 FILES = {
     "harvester": ONE_MODE | {
@@ -62,8 +56,11 @@ def test_any_system_opens_with_its_axes_fields_and_views(name, axes):
     try:
         page = Page(shared, {})
         assert list(page.card.plane.names) == axes == list(page.fields)
+        own = {name: shared.system.parameters[name] for name in axes}
+        assert page.points[0].values == own, "opens with its own run"
+        assert [float(field.value) for field in page.fields.values()] == pytest.approx(list(own.values()), rel=1e-5)
         middle = [float(np.mean(axis.span)) for axis in (page.card.plane.x, page.card.plane.y)]
-        found = answer(page.card, page.card.point(*middle), page.card.system, HOW, Token(), lambda _: None)
+        found = answer(page.card, page.card.point(*middle), page.card.system, HOW, Token())
         assert found.same and found.run.summary.status is RunStatus.OK
         for part in page.runs[0].parts:
             part.activate()
@@ -98,9 +95,7 @@ def test_a_map_of_a_harvester_equals_its_runs():
                     "base_excitation.frequency_ratio": frequency, "harvester.resistance": resistance
                 })  # fmt: skip
                 held = {str(each): found[each].values[at, column] for each in found.data_vars}
-                assert compared(held, sb.simulate(own, how).summary, "native")[1].startswith(
-                    "bitwise identical"
-                )
+                assert compared(held, sb.simulate(own, how).summary, "native")[1].startswith("bitwise identical")
 
 
 def test_a_cell_that_is_not_computed_says_so():
@@ -118,10 +113,7 @@ def test_a_system_without_two_parameters_is_refused():
 def test_cells_of_an_unfinished_checkpoint_say_that_they_are_not_computed(tmp_path):
     pytest.importorskip("zarr")
     system, done = system_of("two strikers"), []
-    axes = {
-        "drive.frequency_ratio": np.linspace(0.8, 1.6, 12),
-        "drive.velocity_amplitude": np.linspace(0.1, 0.3, 12),
-    }
+    axes = {"drive.frequency_ratio": np.linspace(0.8, 1.6, 12), "drive.velocity_amplitude": np.linspace(0.1, 0.3, 12)}
 
     def stop_early(*report):
         done.append(report)

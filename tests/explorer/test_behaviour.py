@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam.explorer.maps import opened
+from snapbeam.explorer.maps import brief, opened
 
 
 def _turn(page, title):
@@ -35,12 +35,10 @@ def test_a_changed_system_says_what_is_old(tab, served, small_map, system):
     page.page.get_by_role("button", name="Use this system").click()
     page.wait(lambda: "map is old" in page.text("old-words"), "what is old")
     assert "%" not in page.text("key-box"), "nothing of the changed system is drawn yet"
-    assert "beam.thickness = 0.0005" in page.text("old-words")
+    assert "Beam: thickness 0.0005 m" in page.text("old-words")
     again = {"beam.thickness": 0.0005, "drive.frequency_ratio": x, "drive.velocity_amplitude": y}
     found = sb.simulate(system.replace(**again), sb.Integration(cycles=30)).summary
-    page.wait(
-        lambda: f"{found.zero_crossings} crossings, {found.impacts} impacts" in page.head(), "the same point"
-    )
+    page.wait(lambda: f"{found.zero_crossings} crossings, {found.impacts} impacts" in page.head(), "the same point")
     _turn(page, "Map")
     page.click(x, float(small_map["velocity_amplitude"][11]))
     changed = system.replace(**{
@@ -49,8 +47,7 @@ def test_a_changed_system_says_what_is_old(tab, served, small_map, system):
     })  # fmt: skip
     outcome = sb.simulate(changed, sb.Integration(cycles=30)).summary
     page.wait(
-        lambda: f"{outcome.zero_crossings} crossings, {outcome.impacts} impacts" in page.head(),
-        "the changed run",
+        lambda: f"{outcome.zero_crossings} crossings, {outcome.impacts} impacts" in page.head(), "the changed run"
     )
     assert outcome.response_class.label in page.head()
     assert "set=beam.thickness" in page.page.url
@@ -76,9 +73,7 @@ def test_two_tabs_do_not_disturb_each_other(tab, served, small_map):
     second.click(float(ratio[18]), float(velocity[14]))
     for page, at in ((first, (3, 3)), (second, (18, 14))):
         words = f"frequency ratio {ratio[at[0]]:.6g}, velocity amplitude {velocity[at[1]]:.6g}"
-        page.wait(
-            lambda page=page, words=words: words in page.head() and "bitwise identical" in page.notes(), words
-        )
+        page.wait(lambda page=page, words=words: words in page.head() and "bitwise identical" in page.notes(), words)
     second.close()
     first.click(float(ratio[4]), float(velocity[3]))
     first.wait(
@@ -117,9 +112,7 @@ def test_a_list_of_points_is_clicked_point_by_point(tab, serve, system, tmp_path
     assert f"beam thickness {float(found['beam_thickness'][4]):.6g}" in page.head()
     assert sb.ResponseClass(int(found["response_class"][4])).label in page.head()
     page.page.keyboard.press("ArrowRight")
-    page.wait(
-        lambda: "bitwise identical" in page.notes() and f"{ratio[4]:.6g}" not in page.head(), "another point"
-    )
+    page.wait(lambda: "bitwise identical" in page.notes() and f"{ratio[4]:.6g}" not in page.head(), "another point")
 
 
 def test_a_file_that_is_too_large_is_refused_in_words(tab, served):
@@ -140,16 +133,24 @@ def test_two_points_side_by_side(tab, served, small_map):
     page.wait(lambda: "bitwise identical" in page.notes(), "A")
     page.page.get_by_role("button", name="Two points").click()
     page.wait(
-        lambda: (
-            page.text("run-head", 1) != ""
-            or page.js("() => !!Bokeh.documents[0].get_model_by_name('waveform-B')")
-        ),
+        lambda: page.text("run-head", 1) != "" or page.js("() => !!Bokeh.documents[0].get_model_by_name('waveform-B')"),
         "B",
     )
     page.click(float(ratio[18]), float(velocity[14]))
     page.wait(lambda: "crossings" in page.head(1), "the run of B")
     assert f"{ratio[3]:.6g}" in page.head(0) and f"{ratio[18]:.6g}" in page.head(1)
     assert page.data("map-mark", "text") == ["A", "B"]
+    # two points that six digits do not tell apart: a letter on either side, both waveforms in one axis
+    near = float(velocity[3]) * (1.0 + 1e-10)
+    page.page.get_by_label("frequency ratio").fill(repr(float(ratio[3])))
+    page.page.get_by_label("velocity amplitude").fill(repr(near))
+    page.page.get_by_label("velocity amplitude").press("Enter")
+    page.wait(lambda: brief(near, float(velocity[3])) in page.head(1), "B beside A")
+    page.wait(lambda: brief(float(velocity[3]), near) in page.head(0), "A in as many digits")
+    assert page.data("map-mark", "align") == ["right", "left"]
+    page.wait(lambda: brief(near, float(velocity[3])) in page.text("hover"), "the digits of what is selected")
+    page.wait(lambda: 0.0 < min(page.data("apart", "y"), default=0.0) < 1e-8, "a small separation")
+    assert len(page.data("waveform-second", "x")) > 0
 
 
 @pytest.mark.slow
@@ -230,9 +231,7 @@ def test_a_checkpoint_is_read_again_only_when_it_has_grown(system, tmp_path):
 @pytest.mark.slow
 def test_a_map_of_a_million_points(tab, serve, system, tmp_path):
     x, y = np.linspace(0.4, 2.3, 1000), np.linspace(0.03, 0.5, 1000)
-    seed = sb.sweep(
-        system, {"frequency_ratio": x[:2], "velocity_amplitude": y[:2]}, sb.Integration(cycles=30)
-    )
+    seed = sb.sweep(system, {"frequency_ratio": x[:2], "velocity_amplitude": y[:2]}, sb.Integration(cycles=30))
     rng = np.random.default_rng(3)
     labels = {
         name: {"units": "1", "long_name": name, "parameter": f"drive.{name}"}
@@ -294,13 +293,10 @@ def test_what_is_taken_away_is_what_is_shown(tab, served, small_map, folder, tmp
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     again = sb.load(folder / "run.nc")
-    np.testing.assert_array_equal(
-        again.dataset["displacement_at_striker"], run.dataset["displacement_at_striker"]
-    )
+    np.testing.assert_array_equal(again.dataset["displacement_at_striker"], run.dataset["displacement_at_striker"])
     subprocess.run([sys.executable, "-c", lines], cwd=tmp_path, check=True, env=dict(os.environ))
     np.testing.assert_array_equal(
-        sb.load(tmp_path / "run.nc").dataset["displacement_at_striker"],
-        run.dataset["displacement_at_striker"],
+        sb.load(tmp_path / "run.nc").dataset["displacement_at_striker"], run.dataset["displacement_at_striker"]
     )
 
 
@@ -317,9 +313,7 @@ def test_the_beam_moving_is_exported(tab, served, small_map, tmp_path):
     assert _saved(page, "MP4", tmp_path).read_bytes()[4:8] == b"ftyp"
 
 
-def test_an_animation_reports_its_progress_is_cancelled_and_keeps_nobody_waiting(
-    tab, served, small_map, tmp_path
-):
+def test_an_animation_reports_its_progress_is_cancelled_and_keeps_nobody_waiting(tab, served, small_map, tmp_path):
     pytest.importorskip("imageio_ffmpeg")
     page = tab(served.url)
     page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13]))

@@ -89,23 +89,17 @@ def test_one_point_of_an_axis_may_stand_upward(one_mode):
 
 def test_probabilities_and_lifetimes_are_shown_and_told(one_mode, tmp_path):
     axes = {"frequency_ratio": np.linspace(0.8, 1.6, 3), "velocity_amplitude": np.linspace(0.1, 0.3, 2)}
-    spread = sb.uncertainty.ParameterUncertainty(
-        of={"velocity_amplitude": sb.uncertainty.Normal(0.05, relative=True)}
-    )
+    spread = sb.uncertainty.ParameterUncertainty(of={"velocity_amplitude": sb.uncertainty.Normal(0.05, relative=True)})
     allocation = sb.uncertainty.SamplingPlan(half_width=0.4, initial_runs=8, max_runs=8)
     found = sb.uncertainty.probability_map(one_mode, axes, spread, allocation, integration=SHORT)
-    lived = sb.dynamics.lifetime_map(
-        one_mode, axes, sb.Integration(cycles=80), initial_conditions=6, after=[10, 30]
-    )
+    lived = sb.dynamics.lifetime_map(one_mode, axes, sb.Integration(cycles=80), initial_conditions=6, after=[10, 30])
     both = xr.merge(
         [found, lived.drop_vars([name for name in lived.data_vars if name in found])], compat="override"
     ).assign_attrs(found.attrs)
     both.to_netcdf(tmp_path / "both.nc", engine="h5netcdf")
     for source in (opened(both), opened(tmp_path / "both.nc")):
         names = source.variables()
-        assert {"probability_snap", "lifetime", "end_probability_first", "snapping_probability_10"} <= set(
-            names
-        )
+        assert {"probability_snap", "lifetime", "end_probability_first", "snapping_probability_10"} <= set(names)
         assert not any(name.startswith("last_snap") for name in names), "that is a number of each start"
         assert not any("_low" in name or "_high" in name for name in names)
         plane = Plane.of(source, "frequency_ratio", "velocity_amplitude", {})
@@ -118,9 +112,7 @@ def test_probabilities_and_lifetimes_are_shown_and_told(one_mode, tmp_path):
         told = f"outcome: snap {float(at['probability']):.3g} ({low:.3g} to {high:.3g})"
         assert told in words
         # a run is not compared with what is no number of a run
-        outcome = sb.simulate(
-            *plane.at(1, 2).system(system_of(source.attrs, ""), integration_of(source.attrs))
-        )
+        outcome = sb.simulate(*plane.at(1, 2).system(system_of(source.attrs, ""), integration_of(source.attrs)))
         assert compared(held, outcome.summary, "native") == (True, "")
 
 

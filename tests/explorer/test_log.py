@@ -18,9 +18,7 @@ def _record(message, work):
     try:
         work()
     except Exception as error:
-        return logging.LogRecord(
-            "x", logging.ERROR, "", 1, message, (), (type(error), error, error.__traceback__)
-        )
+        return logging.LogRecord("x", logging.ERROR, "", 1, message, (), (type(error), error, error.__traceback__))
     raise AssertionError("work must fail")
 
 
@@ -35,7 +33,5 @@ def test_a_closed_tab_is_no_error_and_an_error_is_one():
     assert not _lives_on(_record("Task exception", lambda: _fail(WebSocketClosedError())))
     assert _lives_on(_record("error handling message", lambda: _fail(AssertionError("of this package"))))
     assert _lives_on(_record("error handling message", lambda: _fail(ValueError("x"))))
-    plain = logging.LogRecord(
-        "x", logging.WARNING, "", 1, "Failed sending message as connection was closed", (), None
-    )
+    plain = logging.LogRecord("x", logging.WARNING, "", 1, "Failed sending message as connection was closed", (), None)
     assert not _lives_on(plain)

@@ -40,12 +40,7 @@ def test_keys_go_from_point_to_point(tab, served, small_map):
     ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
     page.click(float(ratio[5]), float(velocity[5]))
     page.wait(lambda: "bitwise identical" in page.notes(), "the run")
-    for key, column, row in (
-        ("ArrowRight", 6, 5),
-        ("ArrowUp", 6, 6),
-        ("ArrowLeft", 5, 6),
-        ("ArrowDown", 5, 5),
-    ):
+    for key, column, row in (("ArrowRight", 6, 5), ("ArrowUp", 6, 6), ("ArrowLeft", 5, 6), ("ArrowDown", 5, 5)):
         page.page.keyboard.press(key)
         words = f"frequency ratio {ratio[column]:.6g}, velocity amplitude {velocity[row]:.6g}"
         page.wait(lambda words=words: words in page.head() and "crossing" in page.head(), f"{key} to {words}")
@@ -59,16 +54,14 @@ def test_numbers_are_typed_in_full(tab, served, system):
     page.page.get_by_label("frequency ratio").fill("1.2345678901234567")
     page.page.get_by_label("velocity amplitude").fill("0.31415926535897931")
     page.page.get_by_role("button", name="Run").click()
-    page.wait(lambda: "crossing" in page.head(), "the run")
+    page.wait(lambda: "1.23457" in page.head() and "crossing" in page.head(), "the run")
     exact = system.replace(
         **{"drive.frequency_ratio": 1.2345678901234567, "drive.velocity_amplitude": 0.31415926535897931}
     )
     run = sb.simulate(exact, sb.Integration(cycles=30))
     assert run.summary.response_class.label in page.head()
     assert f"{run.summary.zero_crossings} crossings, {run.summary.impacts} impacts" in page.head()
-    greyed = (
-        "() => Bokeh.documents[0]._all_models.values().some((m) => (m.css_classes || []).includes('stale'))"
-    )
+    greyed = "() => Bokeh.documents[0]._all_models.values().some((m) => (m.css_classes || []).includes('stale'))"
     assert not page.js(greyed)
     page.page.get_by_label("frequency ratio").fill("one")
     page.page.get_by_label("frequency ratio").press("Enter")
@@ -96,12 +89,10 @@ def test_back_and_forward_are_undo_and_redo(tab, served, small_map):
     page = tab(served.url)
     ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
     page.wait(lambda: "show=" in page.page.url, "the state to which Back returns")
+    opened = page.head()
     for column in (5, 15):
         page.click(float(ratio[column]), float(velocity[5]))
-        page.wait(
-            lambda column=column: f"{ratio[column]:.6g}" in page.head() and "crossings" in page.head(),
-            "a run",
-        )
+        page.wait(lambda column=column: f"{ratio[column]:.6g}" in page.head() and "crossings" in page.head(), "a run")
     page.page.locator('.bk-tab:has-text("Phase")').first.click()
     page.wait(lambda: "tab=Phase" in page.page.url, "the view in the address")
     zoomed = "() => Bokeh.documents[0].get_model_by_name('map').x_range.start"
@@ -116,12 +107,10 @@ def test_back_and_forward_are_undo_and_redo(tab, served, small_map):
     page.page.go_back()
     page.wait(lambda: f"{ratio[5]:.6g}" in page.head() and "crossings" in page.head(), "the first run")
     page.page.go_back()
-    page.wait(lambda: "Click on the map" in page.head() and page.data("map-mark", "x") == [], "no run")
+    page.wait(lambda: page.head() == opened, "the run that the page opened with")
     for _ in range(2):
         page.page.go_forward()
-    page.wait(
-        lambda: f"{ratio[15]:.6g}" in page.head() and "crossings" in page.head(), "the second run again"
-    )
+    page.wait(lambda: f"{ratio[15]:.6g}" in page.head() and "crossings" in page.head(), "the second run again")
     assert page.page.get_by_label("frequency ratio").input_value() == f"{ratio[15]:.6g}"
 
 
@@ -129,10 +118,7 @@ def test_links_survive_a_restart_of_the_server(serve, tmp_path):
     """The token is kept for the user, the port is fixed; a second server takes the next one."""
     servers = [serve("map.nc", "--port", "0", state=tmp_path) for _ in range(2)]
     assert servers[0].token == servers[1].token
-    assert (
-        servers[0].url.rpartition(":")[2].partition("/")[2]
-        == servers[1].url.rpartition(":")[2].partition("/")[2]
-    )
+    assert servers[0].url.rpartition(":")[2].partition("/")[2] == servers[1].url.rpartition(":")[2].partition("/")[2]
     kept = tmp_path / "snapbeam" / "explorer-token"
     assert kept.stat().st_mode & 0o077 == 0
 

@@ -6,13 +6,14 @@ import ast
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import snapbeam as sb
 
 pytest.importorskip("panel")
 
-from snapbeam.explorer.jobs import CYCLES, MODES, SAMPLES, Cancelled, Jobs, Token, check_run, samples_of
+from snapbeam.explorer.jobs import CYCLES, MODES, SAMPLES, Cancelled, Jobs, Token, check_run, sample_times
 
 ROOM = Path(sb.__file__).parent / "explorer"
 
@@ -51,8 +52,11 @@ def test_runs_beyond_the_limits_are_refused_by_name(system):
         check_run(system, sb.Integration(cycles=CYCLES + 1))
     with pytest.raises(sb.InputError, match=str(MODES)):
         check_run(system.replace(**{"model.modes": MODES + 1}), sb.Integration(cycles=1))
-    assert samples_of(system, sb.Integration(cycles=30)) is None
-    assert samples_of(system, sb.Integration(cycles=CYCLES)) == SAMPLES
+    assert sample_times(system, sb.Integration(cycles=30)) is None
+    times = sample_times(system, sb.Integration(cycles=CYCLES))
+    assert times.size == SAMPLES
+    frequency = system.striker.drive.frequency_ratio * system.model.reference_frequency
+    np.testing.assert_allclose(np.diff(times), CYCLES / frequency / (SAMPLES - 1), rtol=1e-6)
 
 
 def test_work_that_fails_says_so_and_the_next_is_done(jobs):

@@ -38,9 +38,7 @@ def made(name):
 
 def again(state: Address) -> Address:
     """The state that its own address describes."""
-    return Address.read(
-        {name: [each.encode() for each in values] for name, values in parse_qs(state.write()).items()}
-    )
+    return Address.read({name: [each.encode() for each in values] for name, values in parse_qs(state.write()).items()})
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -82,9 +80,7 @@ def test_random_states_come_back_from_their_addresses():
         assert patched(files[one], again(state).changes) == files[other]
 
 
-@pytest.mark.parametrize(
-    "text", ["beam", "a b.c:1", "beam.thickness:4e-4,imperfection:1", "[" * 3000, ".x:1"]
-)
+@pytest.mark.parametrize("text", ["beam", "a b.c:1", "beam.thickness:4e-4,imperfection:1", "[" * 3000, ".x:1"])
 def test_changes_that_are_none_are_told(text):
     read = Address.read({"set": [text.encode()]})
     assert read.changes == {} and read.words and len(read.words[0]) < 250
@@ -113,9 +109,7 @@ def test_changes_that_make_no_system_are_refused(text, system):
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
 def test_another_law_leaves_the_striker_and_the_other_contact():
     base, how = made("second striker")
-    page = SimpleNamespace(
-        shown_system=lambda: (base, how), post=lambda call: call(), look=look_of("default")
-    )
+    page = SimpleNamespace(shown_system=lambda: (base, how), post=lambda call: call(), look=look_of("default"))
     card = SystemCard(page)
     assert card.changed_fields() == {}
     card.law.value = "power"
@@ -186,8 +180,7 @@ def test_fields_show_the_system_at_the_point(tab, served, small_map, system):
     moved = system.replace(**{"drive.frequency_ratio": x, "drive.velocity_amplitude": 0.123})
     outcome = sb.simulate(moved, sb.Integration(cycles=30)).summary
     page.wait(
-        lambda: "amplitude 0.123" in page.head() and f"{outcome.impacts} impacts" in page.head(),
-        "the point moved",
+        lambda: "amplitude 0.123" in page.head() and f"{outcome.impacts} impacts" in page.head(), "the point moved"
     )
     assert page.text("old-words") == "" and "set=" not in page.page.url, "the map is not old"
 
@@ -221,13 +214,9 @@ def test_a_slice_is_in_the_address_and_stays_at_a_reload(tab, sliced):
     page.click(x, y)
     page.wait(lambda: "modes 1" in page.head() and "bitwise identical" in page.notes(), "the run of one mode")
     assert page.js(_SLIDE, 1)
+    page.wait(lambda: "modes 2" in page.head() and "bitwise identical" in page.notes(), "the point follows the slider")
     page.wait(
-        lambda: "modes 2" in page.head() and "bitwise identical" in page.notes(),
-        "the point follows the slider",
-    )
-    page.wait(
-        lambda: "cut=model.modes:2" in page.page.url and "model.modes:2" in page.page.url.split("at=")[1],
-        "address",
+        lambda: "cut=model.modes:2" in page.page.url and "model.modes:2" in page.page.url.split("at=")[1], "address"
     )
     seen, address = _cells(page), page.page.url
     assert seen != first

@@ -160,9 +160,7 @@ def _contrast(first: str, second: str) -> float:
     for text in (first, second):
         numbers = [float(each) for each in text[text.index("(") + 1 : -1].split(",")]
         assert len(numbers) == 3 or numbers[3] == 1.0, text
-        linear = [
-            c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in np.array(numbers[:3]) / 255.0
-        ]
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in np.array(numbers[:3]) / 255.0]
         found.append(float(np.dot(linear, (0.2126, 0.7152, 0.0722))) + 0.05)
     return max(found) / min(found)
 
@@ -207,10 +205,21 @@ def test_the_page_uses_the_height_of_the_window_and_the_width_of_a_phone(tab, se
         const view = model && Bokeh.index.find_one(model);
         return view ? view.el.getBoundingClientRect().height : 0; }"""
     page.wait(lambda: page.js(height, ["map"]) > 600, "a tall map")
-    page.wait(lambda: page.js(height, ["waveform-plot"]) > 450, "a tall waveform")
+    page.wait(lambda: page.js(height, ["waveform-plot"]) > 350, "a tall waveform")
+    page.wait(lambda: page.js(height, ["beam-small"]) > 200, "the beam below it")
     assert page.js("() => document.scrollingElement.scrollHeight <= window.innerHeight")
     page.page.set_viewport_size({"width": 390, "height": 844})
     page.wait(lambda: page.js("() => document.scrollingElement.scrollWidth") <= 390, "no horizontal scroll")
+    title, button = page.page.locator("h1"), page.page.get_by_role("button", name="Two points")
+    assert title.bounding_box()["y"] + title.bounding_box()["height"] <= button.bounding_box()["y"]
+    for name, shown in (("Beam", "beam-plot"), ("Numbers", "")):
+        _turn(page, name)
+        page.wait(
+            lambda shown=shown: page.js(height, [shown]) > 0 if shown else page.page.locator("table.numbers").count(),
+            name,
+        )
+        page.page.wait_for_timeout(300)
+        assert page.js("() => document.scrollingElement.scrollWidth") <= 390, name
     assert page.page.locator('meta[name="viewport"]').count() == 1
 
 
@@ -222,7 +231,5 @@ def test_the_readout_has_a_fixed_height_and_shows_the_selected_point(tab, served
     page.click(x, y)
     page.wait(lambda: f"{x:.6g}" in page.text("hover"), "the point below the pointer")
     page.page.mouse.move(5, 5)
-    page.wait(
-        lambda: "Selected: " in page.text("hover") and f"{x:.6g}" in page.text("hover"), "the selection"
-    )
+    page.wait(lambda: "Selected: " in page.text("hover") and f"{x:.6g}" in page.text("hover"), "the selection")
     assert below.bounding_box()["y"] == before

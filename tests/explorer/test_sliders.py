@@ -98,15 +98,10 @@ def test_a_page_read_from_the_address_of_another_shows_the_same(page):
         page.card.view.view = (left, left + 0.5, low, low + 0.2)
         page.runs[0].tabs.active = int(rng.integers(len(page.runs[0].parts)))
         page._adopt(
-            {
-                "beam.thickness": float(rng.uniform(3.9e-4, 4.1e-4)),
-                "integration.cycles": int(rng.integers(5, 9)),
-            }
+            {"beam.thickness": float(rng.uniform(3.9e-4, 4.1e-4)), "integration.cycles": int(rng.integers(5, 9))}
         )
         page.ask(page.card.point(float(left + 0.2), float(low + 0.1)))
-        given = {
-            name: [each.encode() for each in values] for name, values in parse_qs(page._search()).items()
-        }
+        given = {name: [each.encode() for each in values] for name, values in parse_qs(page._search()).items()}
         again = Page(page.shared, given)
         again._show_runs(again.address)
         assert _state(again) == _state(page)
@@ -164,10 +159,7 @@ def test_the_figure_of_the_map_is_that_of_the_view(page, monkeypatch):
     limits = []
     monkeypatch.setattr(
         "snapbeam.explorer.cards.save_figure",
-        lambda figure, path: (
-            limits.append((figure.axes[0].get_xlim(), figure.axes[0].get_ylim())),
-            path.touch(),
-        ),
+        lambda figure, path: (limits.append((figure.axes[0].get_xlim(), figure.axes[0].get_ylim())), path.touch()),
     )
     for name in ("response_class", "peak_force"):
         zoomed.card.show.value = name

@@ -10,6 +10,7 @@ from snapbeam.explorer.address import Address
 from snapbeam.explorer.maps import Plane, integration_of, opened, run_command, system_of
 from snapbeam.model.parameter_file import Config
 
+_FITS = "() => document.scrollingElement.scrollHeight <= window.innerHeight"
 _RANGES = """() => {
   const plot = Bokeh.documents[0].get_model_by_name('map');
   const pair = (range) => [range.start, range.end];
@@ -19,7 +20,10 @@ _RANGES = """() => {
 
 
 def test_further_axes_follow_the_view(tab, served, system) -> None:
-    page = tab(served.url)
+    page = tab(served.url, reduced_motion="no-preference")
+    place = "() => Bokeh.documents[0].get_model_by_name('scrub').value"
+    begun = page.js(place)
+    page.wait(lambda: page.js(place) != begun and page.data("beam", "top"), "the beam in motion")
     first = system.model.reference_frequency
     speed = 1e3 * system.scale.length * system.scale.omega
     whole = page.js(_RANGES)
@@ -44,6 +48,17 @@ def test_a_lecture_has_larger_type_and_keeps_the_view(tab, served, small_map) ->
     page.wait(lambda: page.js(size) > 1.3 * usual, "larger type")
     page.wait(lambda: page.head() == said, "the same run")
     assert "type=large" in page.page.url
+    page.page.get_by_role("button", name="Two points").click()
+    page.page.get_by_label("velocity amplitude").fill(repr(y * (1.0 + 1e-9)))
+    page.page.get_by_label("velocity amplitude").press("Enter")
+    page.wait(lambda: len(page.data("apart", "y")) > 0 and page.notes(1), "the separation of the two")
+    for width, height in ((1920, 1080), (1280, 800)):
+        page.page.set_viewport_size({"width": width, "height": height})
+        page.wait(lambda: page.js(_FITS), f"all of it on {width} by {height}")
+        tabs = page.page.locator('.bk-tab:has-text("Waveform"), .bk-tab:has-text("Numbers")')
+        boxes = [tabs.nth(at).bounding_box() for at in range(2)]
+        assert boxes[0]["y"] == boxes[1]["y"], "the tabs of a run in one row"
+    page.page.get_by_role("button", name="Two points").click()
     page.page.get_by_role("button", name="Desk").click()
     page.wait(lambda: page.js(size) == usual, "the usual type")
 

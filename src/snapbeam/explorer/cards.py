@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -27,6 +29,7 @@ from snapbeam.explorer.shared import Shared
 from snapbeam.model.parameter_axes import CHANGES_UNITS
 from snapbeam.model.parameter_file import Config, config_from_mapping
 from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters
+from snapbeam.model.quantity import split_name
 from snapbeam.plot.dataset import plot_dataset
 from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
 from snapbeam.plot.style import CLASS_COLORS, save_figure
@@ -49,7 +52,7 @@ _PUSH = 0.2
 _COARSE = 9.0
 """Pixels of a cell above which a view is worth computing again."""
 _WAIT = 10.0
-"""Seconds of a window that are computed without a question."""
+"""Seconds of a window that are computed unasked."""
 
 
 class WindowControl:
@@ -59,6 +62,8 @@ class WindowControl:
         self.card = card
         self._token: jobs.Token | None = None
         self._moved, self._pushed = 0, 0.0
+        self._asked: set[Any] = set()
+        """Keys of the windows that were asked for: they are computed to their end."""
         self._awake = False
         self._waiting = jobs.Waiting(card.later)
 
@@ -101,10 +106,10 @@ class WindowControl:
         ]
         return not self.card.view.is_whole and max(wide / inside[0], tall / inside[1]) > _COARSE
 
-    def compute_view(self, force: bool = False, seconds: float = _WAIT) -> None:
+    def compute_view(self, force: bool = False) -> None:
         """Compute what is seen where it becomes finer, from coarse to fine, in place of what was being computed.
 
-        It asks before a level that would end later than *seconds* after the beginning.
+        Unless *force* asks for all of it, it ends before a level that would take too long.
         """
         if self.card.system is None or not self.card.plane.can_zoom:
             self.card.tell("a window needs two axes of numbers, and a system" if force else "")
@@ -113,6 +118,9 @@ class WindowControl:
         if bounds is None:
             return
         key = (self.card.plane_key, bounds)
+        if force:
+            self._asked.add(key)
+        seconds = math.inf if key in self._asked else _WAIT
         self.cancel("")
         self.card.own.add(key)
         try:
@@ -123,28 +131,22 @@ class WindowControl:
             self.card.tell(str(error))
             return
         log = (self.card.plane.x.log, self.card.plane.y.log)
-        made = maps.planned(
-            system, integration, self.card.plane.names, bounds, log, self.card.view.pixels, key=key
-        )
+        made = maps.planned(system, integration, self.card.plane.names, bounds, log, self.card.view.pixels, key=key)
         window = self.card.shared.window(made)
         if window is made:
             others = [each for each in self.card.windows() if each is not made]
             strides = [each.stride.copy() for each in others]
-            made.known = maps.known_cells(
-                made, self.card.shown_plane, list(zip(others, strides, strict=True))
-            )
+            made.known = maps.known_cells(made, self.card.shown_plane, list(zip(others, strides, strict=True)))
         if window.finished or not window.wanted:  # by this page before, or by another
             self.card.show_windows()
             self.card.tell("" if window.finished or not force else "the map is as fine as the screen shows")
             return
         self._token = token = jobs.Token(jobs.WINDOW_SECONDS)
-        self.card.stop.visible, self.card.more.visible = True, False
+        self.card.stop.visible = True
         self.card.tell("computing this view")
         self._waiting.begin(0, self._still)
         self.card.shared.jobs.window(
-            lambda _: maps.compute(
-                window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds
-            ),
+            lambda _: maps.compute(window, self.card.shared.jobs, token, lambda w: self._grew(w, token), seconds),
             lambda _, words: self.card.post(lambda: self._ended(window, token, words)),
             token,
         )
@@ -191,19 +193,9 @@ class WindowControl:
             self.card.stop.visible = False
             self._token = None
             self.card.show_windows()
-            if not words and window.asks is not None:
-                points, seconds = window.asks
-                self.card.more.name = f"Compute {points} finer points (about {_duration(seconds)})"
-                self.card.more.visible = True
-                words = f"window: {window.done} of {window.wanted} points computed; finer cells wait for your answer"
+            if not words and window.waits:
+                words = f"window: {window.done} of {window.wanted} points; Compute view continues"
             self.card.tell(words or f"window: all {window.wanted} points computed")
-
-    def more(self) -> None:
-        """Compute the requested level."""
-        window = next((w for w in reversed(self.card.windows()) if w.asks is not None), None)
-        self.card.more.visible = False
-        asked = 0.0 if window is None or window.asks is None else window.asks[1]
-        self.compute_view(force=True, seconds=_WAIT + 1.5 * asked)
 
     def cancel(self, words: str) -> None:
         """Compute no window any more."""
@@ -212,7 +204,6 @@ class WindowControl:
             self._token = None
             self._waiting.end(0)
             self.card.stop.visible = False
-        self.card.more.visible = False
         if words:
             self.card.tell(f"{words}; what was computed is kept")
 
@@ -271,9 +262,7 @@ class MapCard:
         dims, names = source.dims, source.variables()
         sizes = {name: source.coordinate(name) for name in dims}
         longest = sorted(dims, key=lambda name: (sizes[name].dtype.kind != "f", -sizes[name].size))
-        best = (
-            sorted(longest[:2], key=dims.index) + longest[2:]
-        )  # the longest continuous axes, in the map's order
+        best = sorted(longest[:2], key=dims.index) + longest[2:]  # the longest continuous axes, in the map's order
         x = address.x if address.x in dims else next(name for name in best if name != address.y)
         y = address.y if address.y in dims and address.y != x else next(name for name in best if name != x)
         if (address.x and address.x not in dims) or (address.y and address.y not in dims):
@@ -294,23 +283,11 @@ class MapCard:
         self.auto = pn.widgets.Checkbox(name="compute the view automatically", value=True, align="center")
         hidden: dict[str, Any] = {"visible": False, "align": "center"}
         self.stop = style.button(
-            "Stop",
-            self.post,
-            lambda: self.control.cancel("stopped"),
-            button_type="warning",
-            width=70,
-            **hidden,
-        )
-        self.more = style.button(
-            "Finer", self.post, lambda: self.control.more(), button_type="primary", **hidden
+            "Stop", self.post, lambda: self.control.cancel("stopped"), button_type="warning", width=70, **hidden
         )
         self.again = style.button(
-            "Compute view",
-            self.post,
-            lambda: self.control.compute_view(force=True),
-            width=110,
-            align="center",
-        )
+            "Compute view", self.post, lambda: self.control.compute_view(force=True), width=110, align="center"
+        )  # fmt: skip
         self.layers = pn.widgets.CheckButtonGroup(
             options={
                 "interwell threshold": "threshold", "quasi-static threshold": "quasi",
@@ -318,13 +295,9 @@ class MapCard:
             },
             value=["windows"], button_type="default",
         )  # fmt: skip
-        self.hover = style.Html(
-            "\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4)
-        )
+        self.hover = style.Html("\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4))
         self._selected: Markup = Markup("&nbsp;")
-        self.state = style.Html(
-            "", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4)
-        )
+        self.state = style.Html("", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4))
         self.key = style.Html("", sizing_mode="stretch_width", margin=(0, 0, 0, 4), css_classes=["key-box"])
         for widget in (self.x, self.y):
             widget.param.watch(self._axes_changed, "value")
@@ -340,8 +313,7 @@ class MapCard:
     def _slider(self, name: str, address: Address) -> Any:
         points = self.source.coordinate(name)
         labels = {
-            f"{value:.6g}" if isinstance(value, float) else str(value): at
-            for at, value in enumerate(points.tolist())
+            f"{value:.6g}" if isinstance(value, float) else str(value): at for at, value in enumerate(points.tolist())
         }
         if len(labels) < points.size:
             labels = {repr(value): at for at, value in enumerate(points.tolist())}
@@ -364,10 +336,7 @@ class MapCard:
     def cut(self) -> dict[str, Any]:
         """The values of the axes that have a slider and are not shown, by dotted name."""
         skeleton, held = self.source.skeleton, self._fixed()
-        return {
-            maps.parameter_of(skeleton, name): self.source.coordinate(name)[at].item()
-            for name, at in held.items()
-        }
+        return {maps.parameter_of(skeleton, name): self.source.coordinate(name)[at].item() for name, at in held.items()}
 
     def restore(self, address: Address) -> None:
         """Show the axes, the variable, the cut and the part of the map of an address of this page."""
@@ -410,9 +379,7 @@ class MapCard:
 
     def _fixed(self) -> dict[str, int]:
         return {
-            name: int(slider.value)
-            for name, slider in self.sliders.items()
-            if name not in (self.x.value, self.y.value)
+            name: int(slider.value) for name, slider in self.sliders.items() if name not in (self.x.value, self.y.value)
         }
 
     # ------------------------------------------------------------------ the cut
@@ -444,8 +411,8 @@ class MapCard:
         """The card."""
         return pn.Column(
             pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder,
-            pn.Row(self.state, self.stop, self.more, sizing_mode="stretch_width", margin=0), self.key, self.hover,
-            self.typed, pn.FlexBox(self.auto, self.again, self.layers, align_items="center", margin=0),
+            self.state, self.key, self.hover, self.typed,
+            pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0),
             sizing_mode="stretch_width", css_classes=["card"],
         )  # fmt: skip
 
@@ -502,9 +469,7 @@ class MapCard:
             self.view.show(name, values, limits, title)
         self.view.fade(self.changed)
         self.show_windows()
-        words.append(
-            self.view.show_quasi_static("quasi" in layers, self.source.scalars() | self._fixed_short())
-        )
+        words.append(self.view.show_quasi_static("quasi" in layers, self.source.scalars() | self._fixed_short()))
         if "threshold" in layers and self.source.is_list:
             words.append("the threshold is that of the columns of a grid; these are points")
         wanted = "threshold" in layers and values is not None and not self.source.is_list
@@ -573,9 +538,7 @@ class MapCard:
             if kind is ResponseClass.UNKNOWN and int(kind) not in shares:
                 continue
             share = f" {100.0 * shares.get(int(kind), 0.0):.1f} %" if shares else ""
-            swatch = Markup(
-                '<span class="item"><span class="swatch" style="background:{}"></span>{}{}</span>'
-            )
+            swatch = Markup('<span class="item"><span class="swatch" style="background:{}"></span>{}{}</span>')
             items.append(swatch.format(CLASS_COLORS[kind], kind.label, share))
         if shares:
             part = "the map" if self.view.is_whole else "the view"
@@ -616,12 +579,29 @@ class MapCard:
         for window, stride in reversed(self._drawn):
             at = window.computed_at(x, y, stride) if window.covers(x, y) else None
             if at is not None:
-                values = dict(
-                    zip(window.names, (window.x[at[1]].item(), window.y[at[0]].item()), strict=True)
-                )
+                values = dict(zip(window.names, (window.x[at[1]].item(), window.y[at[0]].item()), strict=True))
                 held = {name: found[at].item() for name, found in window.values.items()}
                 return maps.Point(values | self.plane.fixed_values(), held)
         return self.plane.at(*self.plane.index(x, y))
+
+    def start(self) -> maps.Point:
+        """The point that is shown first: of a system its own, of a map one whose beam moves most, in the middle."""
+        names = self.plane.parameters
+        if self.system is not None and not self.source.skeleton.data_vars:
+            own = maps.values_of(names, self.system, self.integration)
+            if len(own) == len(names):
+                return maps.Point(own)
+        left, right, low, high = self.view.view
+        middle = self.plane.index(0.5 * (left + right), 0.5 * (low + high))
+        kinds = None
+        if "response_class" in self.source.numbers() and not self.changed:
+            with suppress(InputError):  # the file is gone; a run can be computed
+                kinds = self.plane.values("response_class")
+        if kinds is None:
+            return self.plane.at(*middle)
+        places = np.argwhere(kinds == kinds.max())
+        away = (places - np.array(middle)) / np.array(kinds.shape)
+        return self.plane.at(*places[np.argmin((away**2).sum(axis=1))].tolist())
 
     def expected(self, point: maps.Point) -> dict[str, Any]:
         """Results of the map at a point; empty if the point is not on the map, or the system has changed."""
@@ -647,13 +627,13 @@ class MapCard:
             return self.plane.at(*beside)
         return self.point(float(self.plane.x.at[beside[1]]), float(self.plane.y.at[beside[0]]))
 
-    def select(self, point: maps.Point | None) -> None:
-        """Let the readout show a point whenever the pointer is not over the map."""
+    def select(self, point: maps.Point | None, words: str) -> None:
+        """Let the readout show a point, in *words*, whenever the pointer is not over the map."""
         self._selected = Markup("&nbsp;")
         if point is not None:
             place = self.plane.place(point.values)
             held = {} if place is None else self._held(point, *place)
-            self._selected = Markup("Selected: {}").format(self._readout(point, held))
+            self._selected = Markup("Selected: {}").format(self._readout(words, held))
         self.hover.object = self._selected
 
     def _hovered(self, x: float | None, y: float | None) -> None:
@@ -661,7 +641,7 @@ class MapCard:
             self.hover.object = self._selected
             return
         point = self.point(x, y)
-        self.hover.object = self._readout(point, self._held(point, x, y))
+        self.hover.object = self._readout(point.words(), self._held(point, x, y))
 
     def _held(self, point: maps.Point, x: float, y: float) -> dict[str, Any]:
         """The class, the shown variable and two more of the cell at a location."""
@@ -682,8 +662,8 @@ class MapCard:
                 found[each] = values[place].item()
         return found
 
-    def _readout(self, point: maps.Point, held: dict[str, Any]) -> Markup:
-        parts = [point.words()]
+    def _readout(self, words: str, held: dict[str, Any]) -> Markup:
+        parts: list[str] = [words]
         if held.get("status") == RunStatus.NOT_RUN:
             parts.append(maps.NOT_COMPUTED)
             held = {}
@@ -861,10 +841,7 @@ class SystemCard:
                 if section == "contact" and self.system.contacts:
                     fields = [self.law, *fields]
                 if fields:
-                    parts += [
-                        style.Html(style.HEADING.format(title), margin=0),
-                        pn.FlexBox(*fields, margin=0),
-                    ]
+                    parts += [style.Html(style.HEADING.format(title), margin=0), pn.FlexBox(*fields, margin=0)]
             for part in parts:
                 style.styled(part, self.page.look)
             self.box.objects = parts
@@ -943,8 +920,14 @@ class SystemCard:
     def _open(self, config: Config) -> None:
         given = {f"{section}.{name}" for section, values in config.given.items() for name in values}
         given |= {PHYSICAL[name].parameter for name in given & PHYSICAL.keys()}
+        of_run = {
+            name: value
+            for name, value in config.given.get("integration", {}).items()
+            if hasattr(config.integration, name)
+        }
+        how = self.page.shared.integration.replace(**{name: getattr(config.integration, name) for name in of_run})
         try:
-            self.page.use(config.system, config.integration, given)
+            self.page.use(config.system, how, given)
         except InputError as error:
             self.refuse(str(error))
 
@@ -990,6 +973,25 @@ class SystemCard:
         found = [each.message for each in self.system.diagnostics()]
         doubts = Markup("").join(style.REFUSED.format(each) for each in found)
         self.facts.object = Markup('<table class="facts"><tr>{}</tr></table>{}').format(cells, doubts)
+
+
+def changed_words(changes: Mapping[str, Any]) -> str:
+    """Changed parameters in the words of their fields; of a section with lists, and of one that is gone, its title."""
+    found: dict[str, None] = {}
+    for name, value in changes.items():
+        section, key = split_name(name)
+        title = _SECTIONS.get(section.partition(".")[0], section.replace("_", " "))
+        if isinstance(value, (list, tuple, dict)):
+            found[title] = None
+        elif key:
+            row = parameters().get(name)
+            unit = "" if row is None or row.quantity.unit == "1" or value is None else f" {row.quantity.unit}"
+            text = "the default" if value is None else maps.brief(value)
+            found[f"{title}: {key.replace('_', ' ')} {text}{unit}"] = None
+        else:
+            found[f"default {title.lower()}" if section in _ALWAYS else f"no {title.lower()}"] = None
+    more = f" and {len(found) - 6} more" if len(found) > 6 else ""
+    return ", ".join(list(found)[:6]) + more
 
 
 def _group(row: Parameter) -> str:
@@ -1053,8 +1055,7 @@ class TakeCard:
             "Map as NetCDF": self._map_data, "Window as NetCDF": self._window_data,
         }  # fmt: skip
         self.buttons = {
-            name: style.button(name, page.post, partial(self._tried, work), width=145)
-            for name, work in buttons.items()
+            name: style.button(name, page.post, partial(self._tried, work), width=145) for name, work in buttons.items()
         }
         self.link = pn.widgets.Button(name="Copy the link", width=145)
         self.link.js_on_click(args={"button": self.link}, code=_COPY)
@@ -1082,7 +1083,7 @@ class TakeCard:
     def refresh(self) -> None:
         """Write the command and the lines of what is shown."""
         page = self.page
-        run, point, card = page.runs[page.which].run, page.points[page.which], page.card
+        run, point, card = page.runs[page.which].current, page.points[page.which], page.card
         part, texts = Markup('<h2>{}</h2><pre class="{}">{}</pre>'), []
         beside = " (with the system saved as system.toml beside it)"
         if run is not None and point is not None:
@@ -1097,10 +1098,16 @@ class TakeCard:
             texts.append(part.format("The same in Python", "python", lines))
         if card.windows():
             command = maps.map_command(card.windows()[-1], card.plane.fixed_values())
-            texts.append(
-                part.format(f"The command that makes the finest window{beside}", "map-command", command)
-            )
-        self.text.object = Markup("").join(texts) or style.NOTE.format("Click on a point of the map first.")
+            texts.append(part.format(f"The command that makes the finest window{beside}", "map-command", command))
+        old = page.runs[page.which].old
+        none = (
+            "The run is old: that of the present system is not computed."
+            if old
+            else "Click on a point of the map first."
+        )
+        self.text.object = Markup("").join(
+            ([] if run or not old else [style.REFUSED.format(none)]) + texts
+        ) or style.NOTE.format(none)
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
@@ -1114,9 +1121,7 @@ class TakeCard:
         except InputError as error:
             self.refuse(str(error))
 
-    def _make(
-        self, name: str, suffix: str, write: Callable[[Any], object], token: jobs.Token | None = None
-    ) -> None:
+    def _make(self, name: str, suffix: str, write: Callable[[Any], object], token: jobs.Token | None = None) -> None:
         """Make a file in the background and send it to the browser."""
         page, token = self.page, token or jobs.Token(_EXPORT_SECONDS)
         self.words.object = style.BUSY.format(f"making {name}{suffix}")
@@ -1143,10 +1148,12 @@ class TakeCard:
 
     def _run(self) -> Run:
         """The run that is shown; refused (InputError) if there is none."""
-        run = self.page.runs[self.page.which].run
-        if run is None:
+        view = self.page.runs[self.page.which]
+        if view.old:
+            raise InputError("the run is old: that of the present system is not computed")
+        if view.run is None:
             raise InputError("there is no run: click on a point of the map first")
-        return run
+        return view.run
 
     def _run_picture(self) -> None:
         """Give the figure of the view that is seen, of the part of the run that is seen."""
@@ -1244,9 +1251,7 @@ class TakeCard:
         data, (low, high) = self._run().dataset, self.page.runs[self.page.which].window
         part = data.isel(time=within(across(self._run())[0], low, high))
         self._make(
-            "velocity",
-            ".wav",
-            lambda path: write_sound(part["time"].values, part["midspan_velocity"].values, path),
+            "velocity", ".wav", lambda path: write_sound(part["time"].values, part["midspan_velocity"].values, path)
         )
 
     def _map_data(self) -> None:
@@ -1307,9 +1312,7 @@ def _uploaded_points(content: bytes, attrs: dict[str, Any]) -> Any:
         path = Path(folder) / "points.csv"
         path.write_bytes(content)
         level = attrs.get("beam_buckling_level")
-        return read_measured_points(
-            path, reference_frequency=attrs.get("reference_frequency"), buckling_level=level
-        )
+        return read_measured_points(path, reference_frequency=attrs.get("reference_frequency"), buckling_level=level)
 
 
 def draw(painter: Callable[[], Any], path: Any) -> None:
@@ -1334,11 +1337,7 @@ def window_dataset(window: maps.Window, *, blocks: bool = False) -> xr.Dataset:
     for name, values in window.values.items():
         row = STATISTICS[name]
         held = values.astype(np.float64) if values.dtype.kind == "f" else values.copy()
-        unknown = (
-            np.nan
-            if held.dtype.kind == "f"
-            else {"response_class": -1, "status": RunStatus.NOT_RUN}.get(name, 0)
-        )
+        unknown = np.nan if held.dtype.kind == "f" else {"response_class": -1, "status": RunStatus.NOT_RUN}.get(name, 0)
         held[window.stride == 0 if blocks else ~own] = unknown
         dataset[name] = (dims, held, {"units": row.unit, "long_name": row.long_name})
     labels = {"units": "1", "long_name": "whether the point was run"}

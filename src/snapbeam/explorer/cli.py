@@ -18,9 +18,7 @@ COMMANDS = {"explore": "snapbeam.explorer.cli:explore"}
 def explore(
     file: Annotated[
         Path | None,
-        typer.Argument(
-            help="NetCDF file or checkpoint of a map; by default the paper's beam.", metavar="[MAP]"
-        ),
+        typer.Argument(help="NetCDF file or checkpoint of a map; by default the paper's beam.", metavar="[MAP]"),
     ] = None,
     config: Annotated[
         Path | None,
@@ -28,14 +26,11 @@ def explore(
     ] = None,
     port: Annotated[
         int | None,
-        typer.Option(
-            help="Port; by default 8760 or the next free one; 0 for any free one.", min=0, max=65535
-        ),
+        typer.Option(help="Port; by default 8760 or the next free one; 0 for any free one.", min=0, max=65535),
     ] = None,
     address: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
     allow_remote: Annotated[
-        bool,
-        typer.Option("--allow-remote", help="Allow an address that other machines can reach."),
+        bool, typer.Option("--allow-remote", help="Allow an address that other machines can reach.")
     ] = False,
     token: Annotated[
         str | None,
@@ -43,9 +38,7 @@ def explore(
             help="Token in the address of the page; by default a stored one of this user, or a random one with --allow-remote."
         ),
     ] = None,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
-    ] = True,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
 ) -> None:
     """Open a map in the browser; click on a point to simulate it and to see the beam.
 

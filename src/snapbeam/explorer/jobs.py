@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import panel as pn
 from bokeh.models import ColumnDataSource, CustomJS
+from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam import CheckpointError, InputError, Integration, Run, RunStatus, System
@@ -177,11 +178,7 @@ def conditioned(run: Run, token: Token) -> str:
     """Words for it, computed of a neighbour of *run*."""
     system, integration = run.system, run.integration
     striker = system.striker
-    if (
-        striker is None
-        or not striker.drive.harmonic
-        or run.summary.status not in (RunStatus.OK, RunStatus.EARLY_STOP)
-    ):
+    if striker is None or not striker.drive.harmonic or run.summary.status not in (RunStatus.OK, RunStatus.EARLY_STOP):
         return ""
     cycles = integration.cycles_or_default
     if cycles > _MOST_CYCLES:
@@ -290,21 +287,20 @@ def check_run(system: System, integration: Integration) -> None:
     if system.model.modes > MODES:
         raise InputError(f"model.modes = {system.model.modes}: a page may ask for at most {MODES}")
     if integration.cycles_or_default > CYCLES:
-        raise InputError(
-            f"integration.cycles = {integration.cycles_or_default}: a page may ask for at most {CYCLES}"
-        )
+        raise InputError(f"integration.cycles = {integration.cycles_or_default}: a page may ask for at most {CYCLES}")
 
 
-def samples_of(system: System, integration: Integration) -> int | None:
-    """Samples to record a run with; None if it may have all that it is recorded with by itself."""
+def sample_times(system: System, integration: Integration) -> NDArray[np.float64] | None:
+    """Instants to record a run at; None if it may have all that it is recorded with by itself."""
     striker = system.striker
     if striker is None or not striker.drive.harmonic:
         return None
     ratio = float(striker.drive.frequency_ratio)  # type: ignore[attr-defined]
-    wanted = integration.cycles_or_default * max(1.0, 1.0 / ratio) * _FEWEST
-    row = 8 * (4 * system.model.modes + 20)
-    most = min(SAMPLES, SAMPLE_BYTES // row)
-    return None if wanted <= most else most
+    cycles = integration.cycles_or_default
+    most = min(SAMPLES, SAMPLE_BYTES // (8 * (4 * system.model.modes + 20)))
+    if cycles * max(1.0, 1.0 / ratio) * _FEWEST <= most:
+        return None
+    return np.linspace(0.0, cycles / (ratio * system.model.reference_frequency), most)
 
 
 # ----------------------------------------------------------------------------------------------------

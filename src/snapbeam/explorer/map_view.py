@@ -69,15 +69,13 @@ class MapView:
         self.dots = models.ColumnDataSource({"x": [], "y": [], "color": []})
         self.list = models.ColumnDataSource({"x": [], "y": [], "color": []}, name="map-list")
         for source, size, color, width in ((self.dots, 8, "#ffffff", 1.2), (self.list, 9, look.text, 0.5)):
-            self.plot.scatter(
-                "x", "y", color="color", source=source, size=size, line_color=color, line_width=width
-            )
-        self.mark = models.ColumnDataSource({"x": [], "y": [], "text": []}, name="map-mark")
+            self.plot.scatter("x", "y", color="color", source=source, size=size, line_color=color, line_width=width)
+        self.mark = models.ColumnDataSource({name: [] for name in ("x", "y", "text", "away", "align")}, name="map-mark")
         for color, width in (("#000000", 3.6), ("#ffffff", 1.6)):
             ring = {"size": 17, "marker": "circle_cross", "fill_color": None}
             self.plot.scatter("x", "y", source=self.mark, line_color=color, line_width=width, **ring)
         self.plot.text(
-            "x", "y", "text", source=self.mark, x_offset=10, y_offset=-6, text_color="#ffffff",
+            "x", "y", "text", source=self.mark, x_offset="away", y_offset=-6, text_align="align", text_color="#ffffff",
             text_outline_color="#000000", text_font_style="bold", text_font_size=look.font(14),
         )  # fmt: skip
         self.mapper = models.LinearColorMapper(
@@ -89,9 +87,7 @@ class MapView:
         )  # fmt: skip
         self.plot.add_layout(self.bar, "right")
         self.probe = models.ColumnDataSource({"x": [], "y": []}, name="map-probe", tags=[0])
-        self.plot.js_on_event(
-            "mousemove", models.CustomJS(args={"probe": self.probe}, code=_HOVER % _THROTTLE)
-        )
+        self.plot.js_on_event("mousemove", models.CustomJS(args={"probe": self.probe}, code=_HOVER % _THROTTLE))
         left = models.CustomJS(args={"probe": self.probe}, code="probe.data = {x: [], y: []};")
         self.plot.js_on_event("mouseleave", left)
         self.physical: dict[str, Any] = {}
@@ -118,18 +114,14 @@ class MapView:
                 self.physical[name] = made
                 scaled = models.ColumnDataSource({"factor": [factor]}, name=f"map-unit-{name}")
                 made.tags = [scaled]
-                code = (
-                    "const f = scaled.data.factor[0]; other.setv({start: own.start * f, end: own.end * f});"
-                )
+                code = "const f = scaled.data.factor[0]; other.setv({start: own.start * f, end: own.end * f});"
                 follow = models.CustomJS(args={"own": own, "other": other, "scaled": scaled}, code=code)
                 own.js_on_change("start", follow)
                 own.js_on_change("end", follow)
                 other.js_on_change("start", follow)
             self.physical[name].tags[0].data = {"factor": [factor]}
             self.physical[name].axis_label = label
-            getattr(self.plot, f"extra_{name}_ranges")["unit"].update(
-                start=own.start * factor, end=own.end * factor
-            )
+            getattr(self.plot, f"extra_{name}_ranges")["unit"].update(start=own.start * factor, end=own.end * factor)
 
     # ------------------------------------------------------------------ what was asked for
 
@@ -186,9 +178,7 @@ class MapView:
         self._scale(name, limits, title)
         seen = None if values is None else picture(values, self.x, self.y, self.view, self.pixels)
         columns = (
-            []
-            if seen is None
-            else [colors_of(name, seen.values, limits), seen.x, seen.y, seen.width, seen.height]
+            [] if seen is None else [colors_of(name, seen.values, limits), seen.x, seen.y, seen.width, seen.height]
         )
         self.base.data = {each: columns[at : at + 1] for at, each in enumerate(_IMAGE)}
 
@@ -226,27 +216,19 @@ class MapView:
         return drawn
 
     def show_list(
-        self,
-        x: NDArray[Any],
-        y: NDArray[Any],
-        name: str,
-        values: NDArray[Any],
-        limits: tuple[float, float],
-        title: str,
+        self, x: NDArray[Any], y: NDArray[Any], name: str, values: NDArray[Any], limits: tuple[float, float], title: str
     ) -> None:
         """Show a list of points as dots in the colours of a variable; those without a number are clear."""
         self._scale(name, limits, title)
         packed = colors_of(name, values[None, :], limits)[0].view(np.uint8).reshape(-1, 4)
-        self.list.data = {
-            "x": x,
-            "y": y,
-            "color": [f"#{r:02x}{g:02x}{b:02x}{a:02x}" for r, g, b, a in packed],
-        }
+        self.list.data = {"x": x, "y": y, "color": [f"#{r:02x}{g:02x}{b:02x}{a:02x}" for r, g, b, a in packed]}
 
     def show_marks(self, marks: list[tuple[float, float, str]]) -> None:
         """Mark the points whose runs are shown."""
         self.mark.data = {
             "x": [each[0] for each in marks], "y": [each[1] for each in marks], "text": [each[2] for each in marks],
+            "away": [-10 if each[2] == "A" else 10 for each in marks],  # A left and B right of what may be one place
+            "align": ["right" if each[2] == "A" else "left" for each in marks],
         }  # fmt: skip
 
     def show_quasi_static(self, visible: bool, fixed: dict[str, Any]) -> str:
@@ -265,9 +247,7 @@ class MapView:
         if "velocity_amplitude" in names:
             other = names[1 - names.index("velocity_amplitude")]
             along = across if names[1] == "velocity_amplitude" else np.linspace(*self.y.span, 402)[1:-1]
-            location, ratio = (
-                (along, fixed["frequency_ratio"]) if other == "location" else (fixed["location"], along)
-            )
+            location, ratio = (along, fixed["frequency_ratio"]) if other == "location" else (fixed["location"], along)
             height = np.asarray(quasi_static_threshold(location, ratio)) * np.ones_like(along)
             xy = (along, height) if names[1] == "velocity_amplitude" else (height, along)
         else:

@@ -94,9 +94,7 @@ def layers_of(skeleton: xr.Dataset) -> dict[str, MapLayer]:
         words, unit = str(item.attrs.get("long_name", name)), str(item.attrs.get("units", "1"))
         limit = str(name).endswith(("_low", "_high")) and str(name).rpartition("_")[0] in names
         if not further:
-            found[str(name)] = MapLayer(
-                str(name), {}, words, unit, shown=not limit and str(name) not in _HIDDEN
-            )
+            found[str(name)] = MapLayer(str(name), {}, words, unit, shown=not limit and str(name) not in _HIDDEN)
         elif len(further) == 1 and further[0] in skeleton.coords and item.sizes[further[0]] <= _ENTRIES:
             for at, entry in enumerate(skeleton[further[0]].values.tolist()):
                 label = _entry(further[0], entry)
@@ -108,11 +106,7 @@ def layers_of(skeleton: xr.Dataset) -> dict[str, MapLayer]:
     def place(name: str) -> tuple[bool, int, str]:
         # those of one of several strikers after those of all
         whole = name.partition("_contact_")[0] if name in sb.STATISTICS else name
-        return (
-            name != "response_class",
-            order.index(whole) if whole in order else -1,
-            name if whole != name else "",
-        )
+        return (name != "response_class", order.index(whole) if whole in order else -1, name if whole != name else "")
 
     return dict(sorted(found.items(), key=lambda each: place(each[0])))
 
@@ -127,9 +121,7 @@ def chances(layers: dict[str, MapLayer], held: dict[str, Any]) -> str:
     """Lifetimes and probabilities of a point in words, each with its interval; empty if there are none."""
     parts = []
     for name, layer in layers.items():
-        low, high = (
-            _partner(layers, layer, f"{layer.variable}_{ending}", held) for ending in ("low", "high")
-        )
+        low, high = (_partner(layers, layer, f"{layer.variable}_{ending}", held) for ending in ("low", "high"))
         if name not in held or low is None or high is None:
             continue
         value = held[name]
@@ -224,9 +216,7 @@ class Source:
 
     def scalars(self) -> dict[str, Any]:
         """Dimensions of one point, and coordinates that hold throughout, by name."""
-        found = {
-            str(name): item.values.item() for name, item in self.skeleton.coords.items() if item.size == 1
-        }
+        found = {str(name): item.values.item() for name, item in self.skeleton.coords.items() if item.size == 1}
         return found
 
     def variables(self) -> list[str]:
@@ -277,9 +267,7 @@ class Source:
         names = dict.fromkeys(layer.variable for layer in self.layers.values())
         part = self._read(self.skeleton[list(names)].isel(inside))
         return {
-            name: (
-                part[layer.variable].isel(layer.where) if layer.where else part[layer.variable]
-            ).values.item()
+            name: (part[layer.variable].isel(layer.where) if layer.where else part[layer.variable]).values.item()
             for name, layer in self.layers.items()
         }
 
@@ -336,9 +324,7 @@ class ResultSource(Source):
 class SystemSource(Source):
     """Axes over a system, without numbers."""
 
-    def __init__(
-        self, system: sb.System, axes: Mapping[str, Any], integration: sb.Integration, name: str
-    ) -> None:
+    def __init__(self, system: sb.System, axes: Mapping[str, Any], integration: sb.Integration, name: str) -> None:
         self.skeleton = axes_dataset(system, axes, integration)
         self.name = name
         self.strikers = len(system.contacts)
@@ -357,9 +343,7 @@ def _axes_of(skeleton: xr.Dataset) -> list[str]:
     if POINT in dims:
         over = [str(name) for name, item in skeleton.coords.items() if item.dims == (POINT,)]
         known = [
-            name
-            for name in over
-            if parameter_name(skeleton, name) is not None and skeleton[name].dtype.kind in "iuf"
+            name for name in over if parameter_name(skeleton, name) is not None and skeleton[name].dtype.kind in "iuf"
         ]
         found = [name for name in known if np.unique(skeleton[name].values).size > 1]
         spare = [name for name in known if name not in found]
@@ -397,9 +381,7 @@ def default_axes(system: sb.System) -> dict[str, Any]:
     ]
     rows.sort(key=lambda row: (not row.name.endswith("frequency_ratio"), "amplitude" not in row.name))
     if len(rows) < 2:
-        raise sb.InputError(
-            "system: has no two parameters of a run, such as an excitation, for the axes of a map"
-        )
+        raise sb.InputError("system: has no two parameters of a run, such as an excitation, for the axes of a map")
     axes = {}
     for row in rows[:2]:
         value = float(system.parameters[row.name]) or 1.0
@@ -444,9 +426,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-def opened(
-    what: Any, *, system: sb.System | None = None, integration: sb.Integration | None = None
-) -> Source:
+def opened(what: Any, *, system: sb.System | None = None, integration: sb.Integration | None = None) -> Source:
     """The source that was named.
 
     Parameters
@@ -515,24 +495,19 @@ class Point:
 
     def system(self, base: sb.System, integration: sb.Integration) -> tuple[sb.System, sb.Integration]:
         """System and solver settings of the run at this point."""
-        of_run = {
-            split_name(name)[1]: value
-            for name, value in self.values.items()
-            if name.startswith("integration.")
-        }
-        of_system = {
-            name: value for name, value in self.values.items() if not name.startswith("integration.")
-        }
+        of_run = {split_name(name)[1]: value for name, value in self.values.items() if name.startswith("integration.")}
+        of_system = {name: value for name, value in self.values.items() if not name.startswith("integration.")}
         physical = {name: of_system.pop(name) for name in list(of_system) if name in PHYSICAL}
         system = base.replace(**of_system)
         if physical:
             system = system.replace(**ratios_of(system, physical))
         return system, integration.replace(**of_run) if of_run else integration
 
-    def words(self) -> str:
-        """The point for a person, in few digits."""
+    def words(self, other: Point | None = None) -> str:
+        """The point for a person, in few digits, but all that tell it from an *other* one."""
         return ", ".join(
-            f"{lookup(name).short.replace('_', ' ')} {_brief(value)}" for name, value in self.values.items()
+            f"{lookup(name).short.replace('_', ' ')} {brief(value, other and other.values.get(name))}"
+            for name, value in self.values.items()
         )
 
 
@@ -540,13 +515,16 @@ def short_names(parameters: Iterable[str]) -> dict[str, str]:
     """Words for some parameters by their dotted names: without the section, if no other one has the same."""
     last = {name: name.rpartition(".")[2] for name in parameters}
     alone = [word for word in last.values() if list(last.values()).count(word) == 1]
-    return {
-        name: (word if word in alone else lookup(name).short).replace("_", " ") for name, word in last.items()
-    }
+    return {name: (word if word in alone else lookup(name).short).replace("_", " ") for name, word in last.items()}
 
 
-def _brief(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def brief(value: Any, other: Any = None) -> str:
+    """A value in six digits, or in as many as tell it from an *other* one."""
+    if not isinstance(value, float):
+        return str(value)
+    apart = isinstance(other, float) and other != value
+    digits = next((n for n in range(6, 17) if not apart or f"{value:.{n}g}" != f"{other:.{n}g}"), 17)
+    return f"{value:.{digits}g}"
 
 
 def system_of(attrs: Mapping[str, Any], name: str) -> sb.System:
@@ -638,15 +616,7 @@ _Array = NDArray[np.float64]
 _MOST = 1_000_000
 """Cells that are sent as they are."""
 _EVEN = 1e-6
-_SIGNS = {
-    r"\Omega": "Ω",
-    r"\omega": "ω",
-    r"\zeta": "ζ",
-    r"\rho": "ρ",
-    r"\phi": "φ",
-    r"\varphi": "φ",
-    r"\tau": "τ",
-}
+_SIGNS = {r"\Omega": "Ω", r"\omega": "ω", r"\zeta": "ζ", r"\rho": "ρ", r"\phi": "φ", r"\varphi": "φ", r"\tau": "τ"}
 
 
 def plain_symbol(text: str) -> str:
@@ -685,9 +655,7 @@ class Axis:
             })  # fmt: skip
         at, words = positions(skeleton, name)
         label = cls.words_of(source, name)
-        edges = (
-            edges_of(skeleton, name) if at.size > 1 else at[0] + np.array([-0.5, 0.5]) * max(abs(at[0]), 1.0)
-        )
+        edges = edges_of(skeleton, name) if at.size > 1 else at[0] + np.array([-0.5, 0.5]) * max(abs(at[0]), 1.0)
         log = words is None and is_geometric(at)
         return cls(name, label, source.coordinate(name), at, edges, words, log)
 
@@ -800,18 +768,14 @@ class _Cut:
     @property
     def names(self) -> tuple[str, str]:
         """Dotted names of the two axes."""
-        return parameter_of(self.source.skeleton, self.x.name), parameter_of(
-            self.source.skeleton, self.y.name
-        )
+        return parameter_of(self.source.skeleton, self.x.name), parameter_of(self.source.skeleton, self.y.name)
 
     @staticmethod
     def check(source: Source, x: str, y: str) -> None:
         """Refuse (InputError) names that are no two axes of a source."""
         for name in (x, y):
             if name not in source.dims:
-                raise sb.InputError(
-                    f"{name}: is no axis of this map, whose axes are {', '.join(source.dims)}"
-                )
+                raise sb.InputError(f"{name}: is no axis of this map, whose axes are {', '.join(source.dims)}")
         if x == y:
             raise sb.InputError(f"{x}: stands along both axes")
 
@@ -877,10 +841,7 @@ class Plane(_Cut):
     def beside(self, place: tuple[float, float], across: int, upward: int) -> tuple[int, int]:
         """Row and column of the point *across* and *upward* points from that at a place; the last one at an edge."""
         row, column = self.index(*place)
-        return (
-            int(np.clip(row + upward, 0, self.y.at.size - 1)),
-            int(np.clip(column + across, 0, self.x.at.size - 1)),
-        )
+        return (int(np.clip(row + upward, 0, self.y.at.size - 1)), int(np.clip(column + across, 0, self.x.at.size - 1)))
 
     @property
     def parameters(self) -> list[str]:
@@ -1100,8 +1061,8 @@ class Window:
     done: int = 0
     seconds: float = 0.0
     """Seconds that one point takes."""
-    asks: tuple[int, float] | None = None
-    """Points of the next level, and the seconds that they need, if they were not computed because of these."""
+    waits: bool = False
+    """True if the next level was not begun, because it would take too long."""
     version: int = 0
     finished: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
@@ -1120,10 +1081,7 @@ class Window:
     @property
     def edges(self) -> tuple[_Array, _Array]:
         """Scaled borders of the cells across and upward."""
-        (left, right), (low, high) = (
-            _scaled(self.bounds[:2], self.log[0]),
-            _scaled(self.bounds[2:], self.log[1]),
-        )
+        (left, right), (low, high) = (_scaled(self.bounds[:2], self.log[0]), _scaled(self.bounds[2:], self.log[1]))
         return np.linspace(left, right, self.x.size + 1), np.linspace(low, high, self.y.size + 1)
 
     @property
@@ -1146,9 +1104,7 @@ class Window:
         )
         return row, column
 
-    def computed_at(
-        self, x: float, y: float, stride_of: NDArray[np.int8] | None = None
-    ) -> tuple[int, int] | None:
+    def computed_at(self, x: float, y: float, stride_of: NDArray[np.int8] | None = None) -> tuple[int, int] | None:
         """Row and column of the point that stands for a place; None if there is none.
 
         *stride_of* is what ``stride`` was when the window was drawn: cells that have been computed since are not yet
@@ -1318,16 +1274,11 @@ def _blocks(size: int, stride: int) -> tuple[NDArray[np.int64], NDArray[np.int64
 
 
 def compute(
-    window: Window,
-    jobs: Jobs,
-    token: Token,
-    tell: Callable[[Window], None],
-    seconds: float = math.inf,
+    window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None], seconds: float = math.inf
 ) -> Window:
     """Fill a window where it is finer than other data; *tell* is called after every batch.
 
-    It stops before a level that would end later than *seconds* after the beginning, and ``window.asks`` holds what
-    that level needs.
+    It stops before a level that would end later than *seconds* after the beginning; ``window.waits`` is true then.
 
     Raises
     ------
@@ -1344,10 +1295,8 @@ def compute(
         window.lock.release()
 
 
-def _filled(
-    window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None], seconds: float
-) -> Window:
-    window.asks = None
+def _filled(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None], seconds: float) -> Window:
+    window.waits = False
     structural = [not _is_run(name) for name in window.names]
     paced, spent = (2, 0.0) if window.seconds else (0, 0.0)
     for stride in _STRIDES:
@@ -1364,7 +1313,7 @@ def _filled(
         while at < len(order):
             left = sum(1 for item in order[at:] if not _known(window, item[2], item[3]))
             if paced >= 2 and spent + left * window.seconds > seconds:
-                window.asks = (left, left * window.seconds)
+                window.waits = True
                 window.version += 1
                 return window
             batch = _FIRST if paced < 2 else int(np.clip(_BATCH_SECONDS / window.seconds, 1, _MOST_WINDOWS))
@@ -1404,9 +1353,7 @@ def _known(window: Window, row: int, column: int) -> bool:
     return bool(stride and _middle(row, stride) == row and _middle(column, stride) == column)
 
 
-def _structure_order(
-    todo: list[tuple[int, int, int, int]], structural: list[bool]
-) -> list[tuple[int, int, int, int]]:
+def _structure_order(todo: list[tuple[int, int, int, int]], structural: list[bool]) -> list[tuple[int, int, int, int]]:
     """Points of one structure after the other; without structures, scattered over the window."""
     if structural[0]:
         return sorted(todo, key=lambda item: item[3])
@@ -1424,9 +1371,7 @@ def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) 
     from snapbeam.util.datasets import xr
 
     rows, columns = np.array(points)[:, 2:].T
-    table = xr.Dataset(
-        {window.names[0]: ("point", window.x[columns]), window.names[1]: ("point", window.y[rows])}
-    )
+    table = xr.Dataset({window.names[0]: ("point", window.x[columns]), window.names[1]: ("point", window.y[rows])})
     spare = max(1, (os.cpu_count() or 2) - 1)  # a run that is clicked on needs a core
     found = sb.sweep(window.system, table, window.integration.replace(threads=spare), progress=token.check)
     return {str(name): item.values for name, item in found.data_vars.items() if item.dims == ("point",)}

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 from urllib.parse import parse_qs
 
-import numpy as np
 import panel as pn
 from bokeh.models import ColumnDataSource
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam import InputError, Integration, Run, RunStatus, System
+from snapbeam import InputError, Integration, Run, System
 from snapbeam.explorer import jobs, maps
 from snapbeam.explorer.address import Address, typed
-from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard
+from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard, changed_words
 from snapbeam.explorer.maps import chances as chances_of
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
@@ -26,11 +24,7 @@ from snapbeam.explorer.style import WRONG, Html, Look, framed, look_of, styled
 from snapbeam.model.parameters import PHYSICAL, lookup
 
 # ----------------------------------------------------------------------------------------------------
-# What a page computes of a point, beside the page: a first look at the run, the run, and how it compares.
-
-
-_QUICK = 4000
-"""Samples of a run that is shown at once; all others follow."""
+# What a page computes of a point, beside the page: the run, and how it compares.
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,18 +39,11 @@ class Answer:
     """Probabilities and lifetime of the point, where the map holds them."""
 
 
-def answer(
-    card: MapCard, point: maps.Point, base: Any, how: Any, token: jobs.Token, look: Callable[[Run], None]
-) -> Answer:
-    """Compute a point of a card's map; *look* is given the run at a few instants before it is recorded whole."""
+def answer(card: MapCard, point: maps.Point, base: Any, how: Any, token: jobs.Token) -> Answer:
+    """Compute a point of a card's map."""
     system, integration = point.system(base, how.replace(engine="auto", threads=None))
     jobs.check_run(system, integration)
-    quick = _quick(system, integration, token)
-    if quick is not None:
-        look(quick)
-    count = jobs.samples_of(system, integration)
-    times = None if count is None else _even_times(system, integration, count)
-    run = sb.simulate(system, integration, sample_times=times, progress=token.check)
+    run = recorded(system, integration, token)
     chances, source = "", card.shared.source
     try:
         held = card.expected(point)
@@ -64,27 +51,17 @@ def answer(
         same, words = maps.compared(held, run.summary, str(source.attrs.get("engine", "native")))
     except InputError as error:  # the run stands, although its map cannot be read any more
         same, words = False, str(error)
-    if times is not None:
-        words += f"; recorded at {times.size} instants, the most that a page may ask for"
+    if jobs.sample_times(system, integration) is not None:
+        words += f"; recorded at {run.dataset.sizes['time']} instants, the most that a page may ask for"
     return Answer(run, words, same, chances)
 
 
-def _quick(system: Any, integration: Any, token: jobs.Token) -> Run | None:
-    """The run at a few instants, all that its pictures need made; None where those instants cannot be known."""
-    if system.striker is None or not system.striker.drive.harmonic or integration.early_termination:
-        return None
-    times = _even_times(system, integration, _QUICK)
+def recorded(system: System, integration: Integration, token: jobs.Token) -> Run:
+    """A run with no more samples than a page may have."""
+    times = jobs.sample_times(system, integration)
     run = sb.simulate(system, integration, sample_times=times, progress=token.check)
-    if run.summary.status is not RunStatus.OK:
-        return None
     _ = run.dataset  # made here and not on the page's thread, which others wait for
     return run
-
-
-def _even_times(system: Any, integration: Any, count: int) -> NDArray[np.float64]:
-    """Instants evenly over a run with a sinusoidal drive."""
-    frequency = system.striker.drive.frequency_ratio * system.model.reference_frequency
-    return np.linspace(0.0, integration.cycles_or_default / frequency, count)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -96,12 +73,10 @@ _AFTER = 700
 """Milliseconds from the first picture of the page to the building of views that are not seen yet."""
 _PATIENT = 150
 """Milliseconds after which a run that is still computed is said to be."""
-_SENT = 40
-"""Milliseconds that what was drawn needs to be on its way to the browser."""
+_EARLY = 0.5
+"""Seconds for which a page that is not sent yet waits for its first run."""
 _DRAGGED = 30
 """Cycles of the run that is shown while a slider is dragged."""
-_LONGEST = 1.0
-"""Seconds for which the rest of a run waits until its first look has been sent."""
 
 
 class Page(jobs.Tab):
@@ -120,9 +95,7 @@ class Page(jobs.Tab):
         self.shared = shared
         self.address = Address.read(arguments)
         self.look: Look = look_of(
-            self.address.theme,
-            lecture=self.address.type == "large",
-            physical=self.address.units == "physical",
+            self.address.theme, lecture=self.address.type == "large", physical=self.address.units == "physical"
         )
         self.card = MapCard(self.look, shared, self.address, self.post, self.later)
         self.card.asked = self.ask
@@ -130,16 +103,14 @@ class Page(jobs.Tab):
         self.card.cut_moved = self._cut_moved
         self.waiting = jobs.Waiting(self.later)
         self.runs = [RunView(self.look, "A", self.post, self.later)]
-        self.runs[0].turned = self.write_address
+        self.runs[0].turned = self._turned
         self.points: list[maps.Point | None] = [None, None]
         self._tokens: list[jobs.Token | None] = [None, None]
         self._dragged: Mapping[str, Any] = {}
         self._dragging = False
         self.runs_box: Any = None
         self.compare = pn.widgets.Toggle(name="Two points", width=100, align="center")
-        self.target = pn.widgets.RadioButtonGroup(
-            options=["A", "B"], value="A", visible=False, align="center"
-        )
+        self.target = pn.widgets.RadioButtonGroup(options=["A", "B"], value="A", visible=False, align="center")
         self.compare.param.watch(lambda _: self.post(self._compared), "value")
         self.target.param.watch(lambda _: self.post(self._follow), "value")
         self.downloads = jobs.Downloads()
@@ -166,28 +137,54 @@ class Page(jobs.Tab):
         self.changes: dict[str, Any] = {}
         self._take: TakeCard | None = None
         self._system: SystemCard | None = None
-        self.layout = framed(self)
-        self._version = shared.source.version
         if self.address.changes:
             self._take_changes(self.address.changes)
+        early = self._early()
+        self.runs[0].active.activate()
+        self.layout = framed(self)
+        self._version = shared.source.version
+        early()
         pn.state.onload(self._stands)
+
+    def _early(self) -> Callable[[], None]:
+        """Begin the first run; what is returned shows it, if it is ready, in the page as it is sent."""
+        names, at = set(self.card.plane.parameters), self.address.at
+        base, how = self.card.system, self.card.integration
+        if base is None:
+            return lambda: None
+        known = names <= at.keys()
+        point = maps.Point({name: at[name] for name in at if name in names}) if known else self.card.start()
+        self.address, self.points[0] = replace(self.address, at=point.values), point
+        self._fill_fields(point)  # before somebody can type
+        found: list[Run] = []
+        ended, token = threading.Event(), jobs.Token(jobs.RUN_SECONDS)
+
+        def work(token: jobs.Token) -> None:
+            try:
+                found.append(answer(self.card, point, base, how, token).run)
+            finally:
+                ended.set()
+
+        def show() -> None:
+            ended.wait(_EARLY)
+            token.cancel()
+            for run in found:
+                self.runs[0].show(run, point.words())
+
+        self.shared.jobs.run(work, lambda _, __: None, token)
+        return show
 
     def _stands(self) -> None:
         """The map is on the screen: now for the rest."""
-        self.card.control.wake()
         if self.shared.source.growing and self.doc is not None:
             self._look_for_more()
             self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         with self._together():
-            self.runs[0].stand()
-            self._show_runs(self.address)  # changes made before the browser is connected may be lost
+            self._show_runs(self.address, again=True)  # changes made before the browser is connected may be lost
             self._quiet = False
             self.write_address()  # the state to which Back returns
-        self.later(self._at_rest, _AFTER)
-
-    def _at_rest(self) -> None:
-        """Build hidden parts after the page is loaded."""
-        self.runs[0].complete()
+        self.card.control.wake()  # after the run, for which windows wait
+        self.later(self.runs[0].complete, _AFTER)
 
     def system_card(self) -> SystemCard:
         """The card of the system, made when it is first needed."""
@@ -250,8 +247,6 @@ class Page(jobs.Tab):
             point = self.points[which]
             if values and (again or point is None or point.values != values):
                 self.ask(maps.Point(values), which)
-            elif not values and point is not None:
-                self._forget(which)
         self.target.value = "B" if address.b else "A"
         titles = [part.title for part in self.runs[0].parts]
         self.runs[0].tabs.active = titles.index(address.tab) if address.tab in titles else 0
@@ -274,16 +269,6 @@ class Page(jobs.Tab):
             self.card.restore(address)
             self._show_runs(address, again)
         self._quiet, self._written = False, self._search()
-
-    def _forget(self, which: int) -> None:
-        """Show no run any more."""
-        token = self._tokens[which]
-        if token is not None:
-            token.cancel()
-        self.points[which] = None
-        self.waiting.end(which)
-        self.runs[which].forget()
-        self._mark()
 
     def _look_for_more(self) -> None:
         """Show what was added to a checkpoint since the last look."""
@@ -313,7 +298,7 @@ class Page(jobs.Tab):
     def ask(self, point: maps.Point, which: int | None = None) -> None:
         """Compute the run of a point; earlier requests are cancelled."""
         which = self.which if which is None else which
-        view, words = self.runs[which], point.words()
+        view = self.runs[which]
         if self.card.system is None:
             self._fill_fields(point)
             view.fail(self.shared.why_not)
@@ -323,12 +308,11 @@ class Page(jobs.Tab):
             before.cancel()
         self._tokens[which] = token = jobs.Token(jobs.RUN_SECONDS)
         self.points[which] = point
+        words = self._words(which)
         base, how = self.card.system, self.card.integration
 
         def work(token: jobs.Token) -> Answer:
-            return answer(
-                self.card, point, base, how, token, lambda run: self._first(which, point, token, run)
-            )
+            return answer(self.card, point, base, how, token)
 
         def done(found: Answer | None, error: str) -> None:
             self.post(lambda: self._done(which, point, token, found, error))
@@ -336,12 +320,36 @@ class Page(jobs.Tab):
         self.shared.jobs.run(work, done, token)  # what follows is said while it is computed
         view.notes = {}
         mark = self.waiting.begin(which, lambda seconds: view.wait(words, seconds))
-        self.later(lambda: view.begin(words) if self.waiting.waits(which, mark) else None, _PATIENT)
+        self.later(lambda: view.wait(words) if self.waiting.waits(which, mark) else None, _PATIENT)
         with self._together():
             self._fill_fields(point)
-            self.card.select(point)
+            self.card.select(point, words)
             self._mark()
             self.write_address()
+
+    def _words(self, which: int) -> str:
+        """A point in words, with all digits in which it differs from the other one."""
+        point, other = self.points[which], self.points[1 - which]
+        return "" if point is None else point.words(other if self.compare.value else None)
+
+    def _turned(self) -> None:
+        """Another view of A: B shows the same, or is drawn over A's waveform."""
+        self._pair()
+        self.write_address()
+
+    def _pair(self) -> None:
+        """Draw both waveforms in one axis, and the other views of B below those of A."""
+        first, second = self.runs[0], self.runs[-1]
+        two = self.compare.value and len(self.runs) > 1
+        first.waveform.beside(second.current if two else None)
+        if two:
+            second.tabs.visible = first.tabs.active > 0
+            second.tabs.active = first.tabs.active
+            for which, view in enumerate(self.runs):
+                if self.points[which] is not None:
+                    view.rename(self._words(which))
+        below = ["two" if first.tabs.active else "over"] if two else []
+        self.runs_box.css_classes = ["right", *below]
 
     def _cut_moved(self, cut: dict[str, Any]) -> None:
         """Let the point that the fields hold follow the sliders."""
@@ -349,39 +357,23 @@ class Page(jobs.Tab):
         if point is not None and point.values | cut != point.values:
             self.ask(maps.Point(point.values | cut))
 
-    def _first(self, which: int, point: maps.Point, token: jobs.Token, run: Run) -> None:
-        """Show a first look, asked on a thread of the server, and wait until it is on its way to the browser."""
-        sent = threading.Event()
-        self.post(lambda: self._look(which, point, token, run, sent))
-        sent.wait(_LONGEST)  # Python does one thing at a time
-
-    def _look(
-        self, which: int, point: maps.Point, token: jobs.Token, run: Run, sent: threading.Event
-    ) -> None:
-        if not token.cancelled and self.points[which] is point:
-            self.waiting.end(which)
-            self.runs[which].show(run, point.words(), fresh=True)
-        self.later(sent.set, _SENT)
-
-    def _done(
-        self, which: int, point: maps.Point, token: jobs.Token, found: Answer | None, error: str
-    ) -> None:
+    def _done(self, which: int, point: maps.Point, token: jobs.Token, found: Answer | None, error: str) -> None:
         if token.cancelled or self.points[which] is not point:
             return
         self.waiting.end(which)
         view = self.runs[which]
         if found is None:
-            view.fail(f"{point.words()}: {error}")
+            view.fail(f"{self._words(which)}: {error}")
+            self._pair()
             return
-        run, shown = found.run, view.run
-        fresh = shown is None or shown.system.hash != run.system.hash
-        view.show(run, point.words(), fresh=fresh)
+        view.show(found.run, self._words(which))
+        self._pair()
         view.say("map", found.words, bad=not found.same)
         view.say("chances", found.chances)
         view.say("conditioning", "")
         if self._take is not None:
             self._take.refresh()
-        self._condition(which, point, run, token)
+        self._condition(which, point, found.run, token)
 
     def _condition(self, which: int, point: maps.Point, run: Run, token: jobs.Token) -> None:
         def done(words: str | None, error: str) -> None:
@@ -403,7 +395,7 @@ class Page(jobs.Tab):
 
         def work(token: jobs.Token) -> Run:
             system, short = maps.system_from(maps.patched(maps.sections_of(base, how), changes))
-            return _quick(system, short, token) or sb.simulate(system, short, progress=token.check)
+            return recorded(system, short, token)
 
         def done(run: Run | None, error: str) -> None:
             self.post(lambda: tell(run, error))
@@ -418,7 +410,7 @@ class Page(jobs.Tab):
                 values = maps.values_of(self.card.plane.parameters, run.system, run.integration)
                 words = ", ".join(f"{name} = {value:.5g}" for name, value in changes.items())
                 self.runs[which].notes = {}
-                self.runs[which].show(run, f"{words}, the first {run.integration.cycles} cycles", fresh=True)
+                self.runs[which].show(run, f"{words}, the first {run.integration.cycles} cycles")
                 self.card.marks = [(values, "")]
                 self.card._draw_marks()
 
@@ -445,7 +437,10 @@ class Page(jobs.Tab):
         for which in sorted({0, 1}, key=lambda each: each == self.which):
             point = self.points[which]
             if point is not None:
+                self.runs[which].outdate()
                 self.ask(maps.Point(point.values), which)
+        if self._take is not None:
+            self._take.refresh()
         self.write_address()
 
     def _adopt(self, changes: Mapping[str, Any]) -> None:
@@ -454,15 +449,12 @@ class Page(jobs.Tab):
             return
         system, integration = self.shared.system, self.shared.integration
         if changes:
-            system, integration = maps.system_from(
-                maps.patched(maps.sections_of(system, integration), changes)
-            )
+            system, integration = maps.system_from(maps.patched(maps.sections_of(system, integration), changes))
         self.changes = dict(changes)
         self.card.use(system, integration, bool(changes))
-        names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(changes.items())[:6])
-        old = f"The map is old: it is of the system before. Changed: {names}" if changes else ""
-        if not self.shared.source.skeleton.data_vars:
-            old = f"Changed: {names}" if changes else ""
+        old = f"Changed: {changed_words(changes)}" if changes else ""
+        if old and self.shared.source.skeleton.data_vars:
+            old = f"The map is old: it is of the system before. {old}"
         self.old.object = Markup('<p class="old" role="status">{}</p>').format(old) if old else ""
         if self._system is not None:
             self._system.fill()
@@ -484,7 +476,7 @@ class Page(jobs.Tab):
             self.later(self.runs[1].complete, _AFTER)
         if len(self.runs) > 1:
             self.runs[1].layout.visible = self.compare.value
-            self.runs_box.css_classes = ["right", "two"] if self.compare.value else ["right"]
+        self._pair()
         if self.compare.value:
             self.target.value = "B"
         self._mark()
@@ -496,16 +488,17 @@ class Page(jobs.Tab):
     def _follow(self) -> None:
         """Let the fields hold the point of the run that the next click replaces."""
         point = self.points[self.which]
-        self.card.select(point)
+        self.card.select(point, self._words(self.which))
         if point is not None:
             self._fill_fields(point)
 
     def _fill_fields(self, point: maps.Point) -> None:
         if set(point.values) - set(self.fields):
             self._make_fields()
+        other = self.points[1 - self.which] if self.compare.value else None
         for name, value in point.values.items():
             if name in self.fields:
-                text = f"{value:.6g}" if isinstance(value, float) else str(value)
+                text = maps.brief(value, other and other.values.get(name))
                 typed_so = str(self.fields[name].value_input or self.fields[name].value)
                 if isinstance(value, float) and typed_so.strip() and _same(typed_so, value):
                     text = typed_so
@@ -579,7 +572,3 @@ def _same(text: str, value: float) -> bool:
         return float(text) == value
     except ValueError:
         return False
-
-
-def _brief(value: Any) -> str:
-    return "none" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)

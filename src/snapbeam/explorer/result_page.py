@@ -47,9 +47,7 @@ class ResultPage(Tab):
         assert isinstance(shared.source, ResultSource)
         self.shared, self.source = shared, shared.source
         address = Address.read(arguments)
-        self.look = look_of(
-            address.theme, lecture=address.type == "large", physical=address.units == "physical"
-        )
+        self.look = look_of(address.theme, lecture=address.type == "large", physical=address.units == "physical")
         names = list(self.source.figures)
         self.shown = pn.widgets.Select(
             options={name.replace("_", " "): name for name in names}, width=240,
@@ -70,14 +68,10 @@ class ResultPage(Tab):
         self.plot.on_event(Tap, lambda event: self.tapped(event.x, event.y))
         self.axes: Any = None
         self.view = RunView(self.look, "A", self.post, self.later)
-        self.view.tabs.active = int(
-            "multiplier_real" in self.source.skeleton
-        )  # an orbit in its phase portrait
+        self.view.tabs.active = int("multiplier_real" in self.source.skeleton)  # an orbit in its phase portrait
         self._token: Token | None = None
         pn.config.raw_css = [sheet(self.look)]
-        title = Markup('<h1>snapbeam <span class="faint">{}: {}</span></h1>').format(
-            self.source.name, self.source.kind
-        )
+        title = Markup('<h1>snapbeam <span class="faint">{}: {}</span></h1>').format(self.source.name, self.source.kind)
         left = pn.Column(
             pn.FlexBox(self.shown, save, self.kind, margin=0, align_items="center"), pn.pane.Bokeh(self.plot, sizing_mode="stretch_width"),
             self.words, Html(self._facts(), sizing_mode="stretch_width"),
@@ -86,9 +80,7 @@ class ResultPage(Tab):
         parts = [left]
         if self.source.run is not None or start_of(self.source.skeleton) is not None:
             parts.append(pn.FlexBox(self.view.layout, margin=0, css_classes=["right"]))
-        body = pn.FlexBox(
-            *parts, margin=0, sizing_mode="stretch_width", flex_wrap="wrap", css_classes=["body"]
-        )
+        body = pn.FlexBox(*parts, margin=0, sizing_mode="stretch_width", flex_wrap="wrap", css_classes=["body"])
         self.layout = pn.Column(
             Html(title, margin=0), body, sizing_mode="stretch_width", margin=0, css_classes=["whole"]
         )
@@ -99,10 +91,10 @@ class ResultPage(Tab):
 
     def stand(self) -> None:
         """Draw the figure, and show the run of the file or of the stored state."""
-        self.view.stand()
+        self.view.active.activate()
         self.draw()
         if self.source.run is not None:
-            self.view.show(self.source.run, "the run of the file", fresh=True)
+            self.view.show(self.source.run, "the run of the file")
         elif start_of(self.source.skeleton) is not None:
             self.ask(None)
         self.later(self.view.complete, 700)
@@ -185,7 +177,7 @@ class ResultPage(Tab):
         if self._token is not None:
             self._token.cancel()
         self._token = token = Token(RUN_SECONDS)
-        self.view.begin("")
+        self.view.wait("")
 
         def work(token: Token) -> tuple[Run, str] | None:
             found = start(self.source.skeleton, place)
@@ -207,7 +199,7 @@ class ResultPage(Tab):
             elif found is None:
                 self.view.forget(_CLICK)
             else:
-                self.view.show(*found, fresh=True)
+                self.view.show(*found)
 
         self.shared.jobs.run(work, done, token)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import panel as pn
 from bokeh import models
+from bokeh.core.properties import value as constant
 from bokeh.transform import linear_cmap
 from markupsafe import Markup
 from numpy.typing import NDArray
@@ -157,7 +158,8 @@ for (let k = 0; k < K; k++) {
   S_.color.push(rods.data.force[a * K + k] > 0 ? m.hot[0] : m.cold[0]);
 }
 striker.data = S_;
-words.text = "τ = " + u.toFixed(3) + (f > 0 ? "   in contact, " + f.toPrecision(3) + " N" : "");
+const said = "τ = " + u.toFixed(3) + (f > 0 ? "   in contact, " + f.toPrecision(3) + " N" : "");
+for (const label of words) { label.text = said; }
 """
 _PLAY = """
 const on = toggle.active;
@@ -166,6 +168,7 @@ if (!on) { return; }
 let last = performance.now();
 const step = (now) => {
   if (!toggle.active) { return; }
+  if (now - last < 28) { window.requestAnimationFrame(step); return; }  // a beam needs no more than 30 pictures a second
   const F = frames.data, n = F.t.length;
   if (n > 1) {
     let t = place.data.t[0], a = 0, b = n - 1;
@@ -173,14 +176,20 @@ const step = (now) => {
     while (b - a > 1) { const c = (a + b) >> 1; if (F.t[c] <= t) { a = c; } else { b = c; } }
     const slow = (linger.active && F.force[a] > 0) ? 0.04 : 1.0;
     t += parseFloat(speed.value) * slow * Math.min(now - last, 100) / 1000;
-    last = now;
     place.data = {t: [t]};
     scrub.value = Math.min(Math.max((t - F.t[0]) / (F.t[n - 1] - F.t[0]), 0), 1);
   }
+  last = now;
   window.requestAnimationFrame(step);
 };
 window.requestAnimationFrame(step);
 """
+_BEGIN = """
+if (toggle.tags.length || frames.data.t.length < 2) { return; }
+toggle.tags = [1];
+toggle.active = !window.matchMedia('(prefers-reduced-motion: reduce)').matches;
+"""
+"""The first run of a page is played at once."""
 _SCRUB = """
 const F = frames.data;
 if (!toggle.active && F.t.length > 1) {
@@ -211,50 +220,55 @@ class BeamPanel(RunPanel):
         self.begin = 0.0
         """Start of the playback: half a cycle before the first snap-through."""
         self.fresh = True
+        self.has_shape = True
         self.count = 0
         empty: list[float] = []
         self.frames = models.ColumnDataSource({"t": empty, "force": empty}, name=self.named("frames"))
         self.rods = models.ColumnDataSource({"tip": empty, "force": empty}, name=self.named("rods"))
         self.amplitudes = models.ColumnDataSource({"q": empty})
-        self.modes, self.shapes = (
-            models.ColumnDataSource({"phi": empty}),
-            models.ColumnDataSource({"x": empty}),
-        )
+        self.modes, self.shapes = (models.ColumnDataSource({"phi": empty}), models.ColumnDataSource({"x": empty}))
         self.meta = models.ColumnDataSource({"modes": [0]}, name=self.named("beam-meta"))
         beam = models.ColumnDataSource(
             {"x": empty, "top": empty, "low": empty}, syncable=False, name=self.named("beam")
         )
         striker = models.ColumnDataSource({"x": empty, "y": empty, "color": empty}, syncable=False)
-        self.plot = style.figure(
-            look, name=self.named("beam-plot"), height=330, used=330, title=" ",
-            x_axis_label="position (mm)", y_axis_label="displacement (mm)",
-            x_range=models.Range1d(0.0, 1.0), y_range=models.Range1d(-1.0, 1.0), tools="pan,wheel_zoom,reset",
-        )  # fmt: skip
-        self.plot.patches("x", "y", source=striker, fill_color="color", line_color=None)
-        self.plot.varea("x", "low", "top", source=beam, fill_color=look.beam)
-        for edge in ("top", "low"):
-            self.plot.line("x", edge, source=beam, line_color=look.beam, line_width=2.5)
         self.supports = models.ColumnDataSource(
             {"left": empty, "right": empty, "low": empty, "top": empty}, name=self.named("supports")
         )
-        self.plot.quad(
-            "left", "right", "low", "top", source=self.supports, fill_color=look.grid, line_color=look.faint,
-            hatch_pattern="/", hatch_color=look.faint,
+        ranges: dict[str, Any] = {"x_range": models.Range1d(0.0, 1.0), "y_range": models.Range1d(-1.0, 1.0)}
+        self.plot = style.figure(
+            look, name=self.named("beam-plot"), height=330, used=330, title=" ", tools="pan,wheel_zoom,reset",
+            x_axis_label="position (mm)", y_axis_label="displacement (mm)", **ranges,
         )  # fmt: skip
-        words = models.Label(
-            x=10, y=8, x_units="screen", y_units="screen", text="", text_color=look.text, text_font_size=look.font(12), syncable=False
+        self.small = style.figure(
+            look, name=self.named("beam-small"), height=130, used=255, share=0.3, tools="", y_axis_label="w (mm)",
+            **style.BELOW, **ranges,
         )  # fmt: skip
-        self.plot.add_layout(words)
+        """The same below the waveform."""
+        words = []
+        for plot in (self.plot, self.small):
+            plot.patches("x", "y", source=striker, fill_color="color", line_color=None)
+            plot.varea("x", "low", "top", source=beam, fill_color=look.beam)
+            for edge in ("top", "low"):
+                plot.line("x", edge, source=beam, line_color=look.beam, line_width=2.5)
+            plot.quad(
+                "left", "right", "low", "top", source=self.supports, fill_color=look.grid, line_color=look.faint,
+                hatch_pattern="/", hatch_color=look.faint,
+            )  # fmt: skip
+            words.append(models.Label(
+                x=10, y=8, x_units="screen", y_units="screen", text="", text_color=look.text, text_font_size=look.font(12), syncable=False
+            ))  # fmt: skip
+            plot.add_layout(words[-1])
         self.cursor.follow(
             _DRAW, self.meta, frames=self.frames, shapes=self.shapes, amplitudes=self.amplitudes, modes=self.modes,
             meta=self.meta, beam=beam, striker=striker, rods=self.rods, words=words,
         )  # fmt: skip
         sheets = [style.sheet(look), _CONTROLS]
-        toggle = models.Toggle(label="► Play", name=self.named("play"), width=90, stylesheets=sheets)
-        rates = ["0.02", "0.1", "0.3", "1", "3", "10"]
-        speed = models.Select(
-            title="cycles per second", options=rates, value="1", width=120, stylesheets=sheets
+        self.play = toggle = models.Toggle(
+            label="► Play", name=self.named("play"), width=90, stylesheets=sheets, syncable=False
         )
+        rates = ["0.02", "0.1", "0.3", "1", "3", "10"]
+        speed = models.Select(title="cycles per second", options=rates, value="1", width=120, stylesheets=sheets)
         linger = models.Toggle(label="slow at impacts", active=False, width=120, stylesheets=sheets)
         scrub = models.Slider(
             title="", show_value=False, start=0.0, end=1.0, value=0.0, step=0.0005, sizing_mode="stretch_width",
@@ -263,23 +277,22 @@ class BeamPanel(RunPanel):
         shared = {"toggle": toggle, "frames": self.frames, "place": self.cursor.place}
         playing = shared | {"speed": speed, "linger": linger, "scrub": scrub, "meta": self.meta}
         toggle.js_on_change("active", models.CustomJS(args=playing, code=_PLAY))
+        if not self.cursor.suffix:
+            self.meta.js_on_change("data", models.CustomJS(args=shared, code=_BEGIN))
         scrub.js_on_change("value", models.CustomJS(args=shared, code=_SCRUB))
         scales = ["exaggerated to fit", "true proportions", "10 times", "100 times"]
         self.scale = models.Select(title="", options=scales, value=scales[0], stylesheets=sheets, width=160)
         self.scale.on_change("value", lambda attr, old, new: self._rescale())
         self.plot.on_change("inner_width", lambda attr, old, new: self._rescale())
-        controls = pn.Row(*(pn.pane.Bokeh(item) for item in (toggle, linger, speed, self.scale)), margin=0)
-        return [
-            self.wrap(self.plot),
-            pn.pane.Bokeh(scrub, sizing_mode="stretch_width", margin=(0, 10)),
-            controls,
-        ]
+        controls = pn.FlexBox(*(pn.pane.Bokeh(item) for item in (toggle, linger, speed, self.scale)), margin=0)
+        return [self.wrap(self.plot), pn.pane.Bokeh(scrub, sizing_mode="stretch_width", margin=(0, 10)), controls]
 
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
         self.run = run
         dataset, model = run.dataset, run.system.model
-        if "modal_amplitude" not in dataset or model.beam is None:
+        self.has_shape = "modal_amplitude" in dataset and model.beam is not None
+        if not self.has_shape or model.beam is None:
             self.plot.title.text = "A structure given by matrices has no shape to draw"
             return
         x, _ = across(run)
@@ -299,16 +312,12 @@ class BeamPanel(RunPanel):
         along = np.linspace(0.0, 1e3 * model.beam.length, _POSITIONS)
         self.modes.data = {"phi": (1e3 * _shapes(model, _POSITIONS)[:kept]).astype(np.float32).ravel()}
         self.shapes.data = {"x": along}
-        self.amplitudes.data = {
-            "q": dataset["modal_amplitude"].values[part, :kept].astype(np.float32).ravel()
-        }
+        self.amplitudes.data = {"q": dataset["modal_amplitude"].values[part, :kept].astype(np.float32).ravel()}
         forces = np.nan_to_num(forces)
         self.rods.data = {"tip": scale * tips.ravel(), "force": forces[:, : tips.shape[1]].ravel()}
         self.frames.data = {"t": x[part], "force": forces.max(axis=1, initial=0.0)}
         self.reach = 1.35 * scale * max(1.0, float(np.nanmax(np.abs(dataset["midspan_displacement"].values))))
-        if (
-            self.fresh
-        ):  # the browser draws when it is told of a change, which what comes with the figure is not
+        if self.fresh:  # the browser draws when it is told of a change, which what comes with the figure is not
             self.fresh = False
             self.cursor.later(self._rescale, 300)
         w = dataset["midspan_displacement"].values[inside]
@@ -424,9 +433,7 @@ class Energy(RunPanel):
         ends = {name: dataset[name].values[[0, -1]] for name in _CURVES if name in dataset}
         works = sum(float(each[1]) for name, each in ends.items() if name.endswith("_work"))
         if "energy_dissipated" in ends:
-            left = works - sum(
-                float(each[1] - each[0]) for name, each in ends.items() if not name.endswith("_work")
-            )
+            left = works - sum(float(each[1] - each[0]) for name, each in ends.items() if not name.endswith("_work"))
             scale = max(abs(works), float(ends["energy_dissipated"][1]), 1e-300)
             words = f"At the end the energy balance has an error of {left:.2g} J, {abs(left) / scale:.1g} of the work. "
         barrier = run.system.model.saddle_energy - run.system.model.well_energy
@@ -453,9 +460,7 @@ class Impacts(RunPanel):
 
     title = "Impacts"
 
-    def __init__(
-        self, look: style.Look, cursor: style.Cursor, closer: Callable[[float, float], None]
-    ) -> None:
+    def __init__(self, look: style.Look, cursor: style.Cursor, closer: Callable[[float, float], None]) -> None:
         super().__init__(look, cursor)
         self.closer = closer
 
@@ -719,9 +724,7 @@ class Spectrum(RunPanel):
     def build(self) -> list[Any]:
         """Return the models of this view."""
         look = self.look
-        self.sources = {
-            name: style.columns(x=[], y=[]) for name in ("midspan_displacement", "displacement_at_striker")
-        }
+        self.sources = {name: style.columns(x=[], y=[]) for name in ("midspan_displacement", "displacement_at_striker")}
         self.sources["midspan_displacement"].name = self.named("spectrum")
         plot = style.figure(
             look, height=420, used=230, title=" ", y_axis_type="log", y_axis_label=f"amplitude ({self.units[0]})",
@@ -732,9 +735,7 @@ class Spectrum(RunPanel):
             label, color, _, _ = _DISPLACEMENTS[name]
             plot.line("x", "y", source=source, color=getattr(look, color), legend_label=label, name=name)
         style.legend(plot, look)
-        self.drive = models.Span(
-            dimension="height", line_color=look.striker, line_dash="dashed", line_width=1.2
-        )
+        self.drive = models.Span(dimension="height", line_color=look.striker, line_dash="dashed", line_width=1.2)
         self.first = models.Span(dimension="height", line_color=look.faint, line_dash="dotted", location=1.0)
         plot.add_layout(self.drive)
         plot.add_layout(self.first)
@@ -750,17 +751,12 @@ class Spectrum(RunPanel):
         ratio = next((value for name, value in given.items() if name.endswith(".frequency_ratio")), None)
         length, _, shown = self.scales(run)
         self.drive.location, self.first.location = ratio and ratio * shown, shown
-        self.plot.title.text = (
-            f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the excitation, dotted: f₁"
-        )
+        self.plot.title.text = f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the excitation, dotted: f₁"
         most = 1e-12
         for name, source in self.sources.items():
             frequency, amplitude = amplitude_spectrum(time, run.dataset[name].values[inside])
             kept = (frequency > 0.0) & (frequency <= 40.0 * first)
-            source.data = {
-                "x": frequency[kept] / first * shown,
-                "y": np.maximum(length * amplitude[kept], 1e-12),
-            }
+            source.data = {"x": frequency[kept] / first * shown, "y": np.maximum(length * amplitude[kept], 1e-12)}
             most = max(most, length * float(amplitude[kept].max(initial=0.0)))
         self.plot.y_range.update(start=1e-7 * most, end=3.0 * most)
         self.plot.x_range.update(start=0.0, end=shown * max(12.0, 4.0 * (ratio or 1.0)))
@@ -790,22 +786,28 @@ class WaveformPanel(RunPanel):
 
     title = "Waveform"
 
+    def __init__(self, look: style.Look, cursor: style.Cursor, beam: BeamPanel) -> None:
+        super().__init__(look, cursor)
+        self.beam = beam
+        self.other: Run | None = None
+        """Run that is drawn over this one, with the separation of the two."""
+        self.run: Run | None = None
+
     def build(self) -> list[Any]:
         """Return the models of this view."""
         look = self.look
-        self.run: Run | None = None
+        self.beam.activate()
         self.span = (0.0, 1.0)
         self.sources = {name: style.columns(x=[], y=[]) for name in _DISPLACEMENTS}
         self.sources["midspan_displacement"].name = self.named("waveform")
         self.force = models.ColumnDataSource({"x": [], "y": []}, name=self.named("force"))
         self.further = [
-            models.ColumnDataSource({"x": [], "y": []}, name=self.named(name))
-            for name in ("strikers", "below")
+            models.ColumnDataSource({"x": [], "y": []}, name=self.named(name)) for name in ("strikers", "below")
         ]
         self.below = pn.widgets.Select(options={}, width=230, margin=(0, 10))
         self.below.param.watch(lambda _: self.cursor.later(self._draw, 1), "value")
         top = self.over_time(
-            name=self.named("waveform-plot"), height=265, used=250, share=0.6, y_axis_label=f"displacement w ({self.units[0]})",
+            name=self.named("waveform-plot"), height=195, used=255, share=0.46, y_axis_label=f"displacement w ({self.units[0]})",
             y_range=(-1.5, 1.5), output_backend="canvas",
         )  # fmt: skip
         for name, (label, color, width, dash) in _DISPLACEMENTS.items():
@@ -813,17 +815,35 @@ class WaveformPanel(RunPanel):
                 "x", "y", source=self.sources[name], color=getattr(look, color), line_width=width, line_dash=dash,
                 legend_label=label,
             )  # fmt: skip
-        low = self.over_time(height=165, used=250, share=0.4, y_range=(0.0, 1.0), output_backend="canvas")
+        self.second, self.apart = style.columns(x=[], y=[]), style.columns(x=[], y=[])
+        self.second.name, self.apart.name = self.named("waveform-second"), self.named("apart")
+        drawn = top.line("x", "y", source=self.second, color=look.second, line_width=1.4)
+        below: dict[str, Any] = style.BELOW | {"height": 110, "used": 255, "share": 0.24}
+        low = self.over_time(y_range=(0.0, 1.0), **below)
+        log = self.over_time(
+            y_range=(1e-12, 1.0), y_axis_type="log", x_axis_label="cycles of excitation τ",
+            y_axis_label=f"|Δw| ({self.units[0]})", **below | {"share": 0.28},
+        )  # fmt: skip
+        self.decades = models.FixedTicker(ticks=[])
+        log.yaxis.ticker = self.decades
+        log.line("x", "y", source=self.apart, color=look.second, line_width=1.4)
         low.line("x", "y", source=self.force, color=look.beam, line_width=1.2)
         for plot, source in zip((top, low), self.further, strict=True):
             plot.multi_line("x", "y", source=source, color=look.second, line_width=1.2, line_dash="dotdash")
         self.others = top.renderers[-1]
         style.legend(top, look)
-        top.legend[0].items.append(
-            models.LegendItem(label="other strikers", renderers=[self.others], visible=False)
-        )
-        self.low, self.top = low, top
-        return [self.wrap(top), self.below, self.wrap(low)]
+        for label, renderer in (("beam B, centre", drawn), ("other strikers", self.others)):
+            item = models.LegendItem(label=label, renderers=[renderer], visible=False)
+            top.legend[0].items.append(item)
+        self.low, self.top, self.log = low, top, log
+        self.alone = [
+            self.wrap(low),
+            pn.Row(self.below, pn.pane.Bokeh(self.beam.play), margin=0),
+            self.wrap(self.beam.small),
+        ]
+        self.paired = self.wrap(log)
+        self.paired.visible = False
+        return [self.wrap(top), *self.alone, self.paired]
 
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
@@ -837,11 +857,24 @@ class WaveformPanel(RunPanel):
         if options != self.below.options:
             held = self.below.value if self.below.value in names else names[0]
             self.below.param.update(options=options, value=held)
+        self.beam.show(run, low, high)
         self._draw()
+
+    def beside(self, other: Run | None) -> None:
+        """Draw another run over this one, and their separation; None for this one alone."""
+        if other is not self.other:
+            self.other = other
+            if self.built:
+                self._draw()
 
     def _draw(self) -> None:
         if self.run is None:
             return
+        pair = self.other is not None
+        for part in self.alone:
+            part.visible = not pair
+        self.alone[-1].visible = not pair and self.beam.has_shape
+        self.paired.visible = pair
         data = self.run.dataset
         x, label = across(self.run)
         scale = self.scales(self.run)[0]
@@ -850,17 +883,20 @@ class WaveformPanel(RunPanel):
         struck = "striker_displacement" in data or "midspan_displacement" not in data
         for (name, source), entry in zip(self.sources.items(), self.top.legend[0].items, strict=False):
             there = name in data and (struck or name != "displacement_at_striker")
+            there &= not pair or name == "midspan_displacement"
             entry.visible = there
             series = scale * _columns_of(data, name).T if there else ()
             own = [envelope(x, each, *self.span) for each in series]
             source.data = _curve(own)
             shown += [y for _, y in own]
         more: Any = ()
-        if "striker_displacements" in data:
+        if "striker_displacements" in data and not pair:
             more = scale * _columns_of(data, "striker_displacements").T[1:]
         own = [envelope(x, each, *self.span) for each in more]
         self.further[0].data = _curves(own)
         self.top.legend[0].items[-1].visible = bool(own)
+        self.top.legend[0].items[1].label = constant("beam A, centre" if pair else "beam, centre")
+        own += self._pair()
         style.fit(self.top, *shown, *(y for _, y in own))
         item = data[self.below.value]
         factor, unit = scale_of(item.values, str(item.attrs.get("units", "1")).removesuffix("1"))
@@ -869,6 +905,45 @@ class WaveformPanel(RunPanel):
         words = str(self.below.value).replace("_", " ")
         self.low.yaxis.axis_label = f"{words} ({unit})" if unit else words
         style.fit(self.low, *(np.append(y, 0.0) for _, y in own))
+
+    def _pair(self) -> list[tuple[_Array, _Array]]:
+        """Draw the other run and the separation; return its curve."""
+        assert self.run is not None
+        other, name = self.other, "midspan_displacement"
+        self.top.legend[0].items[-2].visible = other is not None and name in other.dataset
+        if other is None or name not in other.dataset or name not in self.run.dataset:
+            self.second.data = self.apart.data = {"x": [], "y": []}
+            return []
+        scales = [self.scales(run)[0] for run in (self.run, other)]
+        series = [scale * run.dataset[name].values for scale, run in zip(scales, (self.run, other), strict=True)]
+        x, drawn = across(self.run)[0], envelope(across(other)[0], series[1], *self.span)
+        self.second.data = _curve([drawn])
+        x, apart = separation((x, series[0]), (across(other)[0], series[1]))
+        seen = envelope(x, apart, *self.span) if x.size else (x, apart)
+        self.apart.data = _curve([seen])
+        if seen[1].size:
+            least, most = float(seen[1].min()), float(seen[1].max())
+            self.log.y_range.update(start=0.5 * least, end=2.0 * most)
+            low, high = int(np.floor(np.log10(least))), int(np.ceil(np.log10(most)))
+            self.decades.ticks = [10.0**at for at in range(high, low - 1, -max(-(-(high - low) // 4), 1))]
+        self.log.title.text = "" if x.size else "The two runs are equal to the last digit"
+        return [drawn]
+
+
+def separation(first: tuple[_Array, _Array], second: tuple[_Array, _Array]) -> tuple[_Array, _Array]:
+    """Instants of two series, and how far apart they are there, without those at which they are equal.
+
+    Only instants that both series have count, because an interpolation has larger errors than a small separation; if the
+    series have hardly any in common, the second is interpolated.
+    """
+    x, here, there = np.intersect1d(first[0], second[0], assume_unique=False, return_indices=True)
+    if 2 * x.size >= min(first[0].size, second[0].size):
+        apart = np.abs(first[1][here] - second[1][there])
+    else:
+        x = first[0][first[0] <= second[0][-1]]
+        apart = np.abs(first[1][: x.size] - np.interp(x, *second))
+    kept = apart > 0.0  # NaN is no distance either
+    return x[kept], apart[kept]
 
 
 def _curve(curves: list[tuple[_Array, _Array]]) -> dict[str, Any]:
@@ -915,11 +990,16 @@ class RunView:
     def __init__(self, look: style.Look, name: str, post: style.Post, later: style.Later) -> None:
         self.look, self.name, self.later = look, name, later
         self.run: Run | None = None
+        self.old = False
+        """True if the run that is drawn is not that of the point and the system of the page."""
+        self._words = ""
         self.cursor = style.Cursor(look, "" if name == "A" else f"-{name}", later)
+        beam = BeamPanel(look, self.cursor)
+        self.waveform = WaveformPanel(look, self.cursor, beam)
         self.parts = [
-            WaveformPanel(look, self.cursor), Phase(look, self.cursor), Spectrum(look, self.cursor),
+            self.waveform, Phase(look, self.cursor), Spectrum(look, self.cursor),
             Modal(look, self.cursor), Energy(look, self.cursor), Impacts(look, self.cursor, self._closer),
-            BeamPanel(look, self.cursor), Numbers(look, self.cursor),
+            beam, Numbers(look, self.cursor),
         ]  # fmt: skip
         wide = {"sizing_mode": "stretch_width", "margin": (0, 0, 2, 0)}
         self.head = style.Html(style.FAINT.format(FIRST), css_classes=["run-head"], **wide)
@@ -943,6 +1023,11 @@ class RunView:
         return self.parts[self.tabs.active]
 
     @property
+    def current(self) -> Run | None:
+        """The run that is shown; None if there is none, or it is old."""
+        return None if self.old else self.run
+
+    @property
     def picture(self) -> str:
         """The figure of the view that is seen, or the first one where the run has none of it."""
         name = str(self.active.picture)
@@ -950,39 +1035,56 @@ class RunView:
 
     # ------------------------------------------------------------------ what is shown
 
-    def begin(self, words: str) -> None:
-        """Say what is computed, over the run before."""
+    def wait(self, words: str, seconds: float = 0.0) -> None:
+        """Say what is computed, over the run before, and for how long it has been."""
         self._write_notes()
-        self._head(style.BUSY.format("computing"), words)
+        self._head(style.BUSY.format(f"computing, {seconds:.0f} s" if seconds else "computing"), words)
 
-    def wait(self, words: str, seconds: float) -> None:
-        """Say for how long it has been computed."""
-        self._head(style.BUSY.format(f"computing, {seconds:.0f} s"), words)
+    def rename(self, words: str) -> None:
+        """Write the point of the run that is shown with other digits."""
+        if self.run is not None and not self.old and words != self._words:
+            self._answer(words)
+
+    def outdate(self) -> None:
+        """Say that the run is of a system before, until that of the present one is computed."""
+        if self.run is not None and not self.old:
+            self.tabs.css_classes, self.old = ["stale"], True
+            self._head(_BAD.format("old"), "this run is of the system before")
 
     def fail(self, words: str) -> None:
         """Say why there is no run; the pictures of the run before are greyed."""
         self.forget()
-        self.tabs.css_classes = ["stale"]
+        self.tabs.css_classes, self.old = ["stale"], True
         self._head(_BAD.format("no run"), words)
 
     def forget(self, words: str = FIRST) -> None:
         """Show no run, and *words* on how to ask for one; the pictures of the run before are greyed."""
         self.notes = {}
         self._write_notes()
-        self.tabs.css_classes = ["stale"] if self.run is not None else []
+        self.old = self.run is not None
+        self.tabs.css_classes = ["stale"] if self.old else []
         self.head.object = style.FAINT.format(words)
 
     def _head(self, kind: str, words: str, below: str = "") -> None:
         line = Markup("<br>{}").format(below) if below else ""
-        self.head.object = Markup('<span class="point">{}</span> {} {}{}').format(
-            self.name, kind, words, line
-        )
+        self.head.object = Markup('<span class="point">{}</span> {} {}{}').format(self.name, kind, words, line)
 
-    def show(self, run: Run, words: str, fresh: bool) -> None:
-        """Show a run; *fresh* if it is not the one before with more samples."""
-        self.run = run
+    def show(self, run: Run, words: str) -> None:
+        """Show a run."""
+        self.run, self.old = run, False
         self.tabs.css_classes = []
         self._write_notes()
+        self._answer(words)
+        first, last = across(run)[0][[0, -1]].tolist()
+        self._quiet = True
+        self.cursor.range.update(start=first, end=last, reset_start=first, reset_end=last)
+        self._quiet = False
+        self._draw()
+
+    def _answer(self, words: str) -> None:
+        """Write the class of the run, its point and its counts."""
+        assert self.run is not None
+        run, self._words = self.run, words
         answer = run.summary
         if answer.status in (RunStatus.OK, RunStatus.EARLY_STOP):
             well = "upper" if answer.final_well > 0 else "lower"
@@ -993,12 +1095,6 @@ class RunView:
         else:
             why = _BAD.format(f"{answer.status.name}: {answer.status.advice}")
             self._head(style.class_chip(ResponseClass.UNKNOWN), words, why)
-        if fresh:
-            first, last = across(run)[0][[0, -1]].tolist()
-            self._quiet = True
-            self.cursor.range.update(start=first, end=last, reset_start=first, reset_end=last)
-            self._quiet = False
-        self._draw()
 
     def say(self, about: str, words: str, bad: bool = False) -> None:
         """Put a line under the class, one for each thing that it is about."""
@@ -1012,10 +1108,6 @@ class RunView:
         self.active.activate()
         if self.run is not None:
             self.active.show(self.run, *self.window)
-
-    def stand(self) -> None:
-        """Build the view that is seen."""
-        self.active.activate()
 
     def complete(self) -> None:
         """Build the views that are not seen, one after the other, so that what is asked for meanwhile need not wait."""

@@ -98,9 +98,7 @@ class Gate(Router):
     token : str
     """
 
-    def __init__(
-        self, application: Any, shared: Shared, hosts: tuple[str, ...], prefix: str, token: str
-    ) -> None:
+    def __init__(self, application: Any, shared: Shared, hosts: tuple[str, ...], prefix: str, token: str) -> None:
         self._application, self._shared, self._hosts = application, shared, hosts
         self._prefix, self._token = prefix, token
         self._key = sha256(b"cookie " + token.encode()).hexdigest()
@@ -232,9 +230,7 @@ def make_server(
     taken = (_next_port(address) if port is None else port) or _free_port(address)
     names = tuple(name.lower() for name in names if ":" not in name)
     hosts = names if taken == 80 else tuple(f"{name}:{taken}" for name in names)
-    prefix = (
-        f"/{sha256(token.encode()).hexdigest()[:16]}"  # other servers of this machine never get its cookie
-    )
+    prefix = f"/{sha256(token.encode()).hexdigest()[:16]}"  # other servers of this machine never get its cookie
     try:
         server = pn.io.server.get_server(
             {"/": _factory(shared)}, port=taken, address=address, websocket_origin=list(hosts), show=False,
@@ -375,7 +371,9 @@ def _shared(what: Any, system: System | None, integration: Integration | None) -
     settings.resources = "server"  # whatever a page is made of comes from this machine
     pn.extension()
     file = Path(what) if isinstance(what, (str, Path)) else None
-    return Shared(opened(what, system=system, integration=integration), file)
+    shared = Shared(opened(what, system=system, integration=integration), file)
+    shared.warm()
+    return shared
 
 
 def explore(what: Any = None, *, integration: Integration | None = None, height: int = 900) -> Explorer:

@@ -7,8 +7,8 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
-from snapbeam import InputError, Integration, System
-from snapbeam.explorer.jobs import Jobs
+from snapbeam import InputError, Integration, System, simulate
+from snapbeam.explorer.jobs import RUN_SECONDS, Jobs, Token
 from snapbeam.explorer.maps import Source, Window, integration_of, system_of
 
 _WINDOWS = 48
@@ -41,6 +41,14 @@ class Shared:
             self.integration = integration_of(source.attrs)
         except (InputError, ValueError) as error:
             self.why_not = str(error)
+
+    def warm(self) -> None:
+        """Load what a first run needs, while the browser starts."""
+        system, how = self.system, self.integration
+        if system is not None:
+            self.jobs.run(
+                lambda token: simulate(system, how.replace(cycles=1)).dataset, lambda _, __: None, Token(RUN_SECONDS)
+            )
 
     def window(self, made: Window) -> Window:
         """The window that was computed for the same question, or *made*, kept from now on."""

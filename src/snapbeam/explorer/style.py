@@ -73,14 +73,10 @@ def look_of(theme: str, *, lecture: bool = False, physical: bool = False) -> Loo
 def sheet(look: Look) -> str:
     """The page's style sheet."""
     text = (Path(__file__).parent / "page.css").read_text(encoding="utf-8")
-    names = {
-        name: getattr(look, name) for name in ("page", "card", "text", "faint", "grid", "accent", "striker")
-    }
+    names = {name: getattr(look, name) for name in ("page", "card", "text", "faint", "grid", "accent", "striker")}
     variables = "".join(f"--sb-{name}: {value};" for name, value in names.items())
     variables += f"--sb-scale: {look.scale};"
-    return (
-        f":root, :host {{ {variables} color-scheme: {'dark' if look.name == 'dark' else 'light'}; }}\n{text}"
-    )
+    return f":root, :host {{ {variables} color-scheme: {'dark' if look.name == 'dark' else 'light'}; }}\n{text}"
 
 
 def focused(look: Look) -> str:
@@ -117,12 +113,16 @@ def figure(look: Look, *, used: int = 0, share: float = 1.0, **options: Any) -> 
     plot.grid.grid_line_color = look.grid
     plot.stylesheets = plot.toolbar.stylesheets = [focused(look)]
     if used:
-        tall = f"max(calc(var(--sb-share, 1) * {plot.height}px), calc(var(--sb-share, 1) * {share:g} * (100vh - {used}px)))"
+        tall = f"max(calc(var(--sb-least, 1) * {plot.height}px), calc(var(--sb-share, 1) * {share:g} * (100vh - {used}px - var(--sb-more, 0px))))"
         high = f"@media (min-width: 1000px) {{ :host {{ min-height: {tall} !important; }} }}"
         plot.stylesheets = [*plot.stylesheets, high]
     plot.toolbar.update(logo=None, autohide=False)
     plot.title.update(text_color=look.text, text_font_size=look.font(12), text_font_style="normal")
     return plot
+
+
+BELOW: dict[str, Any] = {"toolbar_location": None, "min_border_right": 36, "output_backend": "canvas"}
+"""Of a low figure below another one, whose tools serve both and whose frame is as wide."""
 
 
 def style_axis(axis: Any, look: Look) -> None:
@@ -196,8 +196,7 @@ def _class_table() -> NDArray[np.uint8]:
     """Colours by class + 1, of shape (5, 4)."""
     order = sorted(CLASS_COLORS)
     return np.array(
-        [[int(CLASS_COLORS[kind][i : i + 2], 16) for i in (1, 3, 5)] + [255] for kind in order],
-        dtype=np.uint8,
+        [[int(CLASS_COLORS[kind][i : i + 2], 16) for i in (1, 3, 5)] + [255] for kind in order], dtype=np.uint8
     )
 
 
@@ -380,7 +379,7 @@ def framed(page: Page) -> Any:
     look, shared = page.look, page.shared
     pn.config.raw_css = [sheet(look)]
     words = Markup('<h1>snapbeam <span class="faint">{}</span></h1>').format(shared.source.name)
-    title = Html(words, margin=0, sizing_mode="stretch_width")
+    title = Html(words, margin=0, sizing_mode="stretch_width", css_classes=["title"])
     dark = pn.widgets.Button(name="Dark" if look.name == "default" else "Light", align="center")
     dark.js_on_click(code=_TURN % {"name": "theme", "value": "dark"})
     lecture = pn.widgets.Button(name="Lecture" if look.scale == 1.0 else "Desk", align="center")

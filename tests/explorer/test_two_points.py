@@ -1,0 +1,68 @@
+"""What tells two points, two runs and two systems apart, in words and numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from snapbeam.explorer.maps import Point, brief
+
+
+@pytest.mark.parametrize(
+    ("value", "other", "text"),
+    [
+        (0.3, 0.3000000003, "0.3"),
+        (0.3000000003, 0.3, "0.3000000003"),
+        (1.23456789, None, "1.23457"),
+        (1.23456789, 2.0, "1.23457"),
+        (1.23456789, 1.23456789, "1.23457"),
+        (float(np.nextafter(0.1, 1.0)), 0.1, "0.10000000000000002"),
+        (60, 61, "60"),
+    ],
+)
+def test_a_value_has_the_digits_that_tell_it_from_another(value, other, text):
+    assert brief(value, other) == text
+    if other is not None and other != value:
+        assert brief(other, value) != text
+
+
+def test_a_point_in_words_beside_another():
+    near = {"drive.frequency_ratio": 1.21, "drive.velocity_amplitude": 0.16}
+    far = near | {"drive.velocity_amplitude": 0.160000001}
+    assert Point(far).words(Point(near)) == "frequency ratio 1.21, velocity amplitude 0.160000001"
+    assert Point(far).words() == "frequency ratio 1.21, velocity amplitude 0.16"
+
+
+def test_the_separation_is_that_at_common_instants():
+    pytest.importorskip("panel")
+    from snapbeam.explorer.run_view import separation
+
+    grid = np.linspace(0.0, 5.0, 501)
+    extra = np.sort(np.append(grid, [0.123, 2.7182]))
+    small = 1e-13 * np.expm1(grid)
+    x, apart = separation((grid, np.sin(grid) + small), (extra, np.sin(extra)))
+    np.testing.assert_array_less(np.abs(apart - small[np.isin(grid, x)]), 3e-16)
+    assert 0.0 not in apart and np.isin(x, grid).all()
+    # nothing in common: the second is interpolated, as far as both reach
+    other = np.linspace(0.0, 3.0, 4001) + 1e-5
+    x, apart = separation((grid, np.sin(grid)), (other, np.sin(other) + 0.25))
+    np.testing.assert_allclose(apart, 0.25, atol=1e-4)
+    assert x[-1] <= other[-1]
+    x, apart = separation((grid, np.sin(grid)), (grid, np.sin(grid)))
+    assert x.size == apart.size == 0
+
+
+def test_changes_are_told_in_the_words_of_the_fields():
+    pytest.importorskip("panel")
+    from snapbeam.explorer.cards import changed_words
+
+    changes = {
+        "beam.thickness": 0.0005, "model.modes": 1, "integration": None, "contact": None, "imperfection.shape": [0.0, 0.1],
+        "drive.phase": None,
+    }  # fmt: skip
+    words = changed_words(changes)
+    assert words == (
+        "Beam: thickness 0.0005 m, Reduced model: modes 1, default integration, no contact, Imperfection, Drive: phase the default"
+    )
+    many = changed_words({f"model.name_{at}": at for at in range(9)})
+    assert many.endswith("and 3 more") and "none" not in words + many
