@@ -205,6 +205,18 @@ def test_derivatives_by_parameters(part: str, name: str) -> None:
     np.testing.assert_allclose(found * value, expected[0, 0], rtol=0.0, atol=1e-6 * np.abs(expected).max())
 
 
+def test_runs_go_on_beside_one_that_failed() -> None:
+    """A state beyond a magnet is lost and stays lost; the others are as alone."""
+    flow = Stroboscope(system_of(1, forces=[sb.MagneticForce(strength=2e-9, gap=8e-4, location=0.4)]), sb.Integration())
+    rows = np.array([[-1.0, 0.0], [0.9, 3.0], [-0.8, 0.1]])
+    came = flow.advance(rows, 2)
+    assert np.isfinite(came.states).all(axis=1).tolist() == [True, False, True]
+    after = flow.advance(came, 3, every=True)
+    assert after.every is not None and np.isnan(after.every[1]).all()
+    alone = flow.advance(flow.advance(rows[[0, 2]], 2), 3)
+    np.testing.assert_array_equal(after.states[[0, 2]], alone.states)
+
+
 @pytest.mark.parametrize("side", ["below", "above"])
 def test_linear_modes_are_those_of_the_well_where_the_beam_rests(side: str) -> None:
     """An uneven beam has other modes in its upper well: states of the map and tangents are those of runs."""
