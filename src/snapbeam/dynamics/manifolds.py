@@ -174,7 +174,7 @@ def _next_level(
     while ages.size <= room:
         if clock.is_over:
             return "max_seconds"
-        lost = np.isnan(states).any(axis=1)
+        lost = np.asarray(np.isnan(states).any(axis=1))
         # what lies beyond the length that is wanted is not sought
         known = states[: int(np.argmax(lost)) if lost.any() else None]
         reached = np.linalg.norm(np.diff(known, axis=0), axis=1).cumsum() > length
@@ -189,7 +189,7 @@ def _next_level(
             # the segments join: the inverse image of the first point is next to the last one
             near = before[-1:] if lost.all() else _between(ages[sought], ages[~lost], states[~lost])
             states[sought] = segment.image(before[sought], np.broadcast_to(near, before[sought].shape))
-            still = np.isnan(states).any(axis=1)
+            still = np.asarray(np.isnan(states).any(axis=1))
             if still.any() and not segment.inverse:
                 return "a run failed"
             if still.all():
