@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Any
 
@@ -202,6 +203,47 @@ def test_derivatives_by_parameters(part: str, name: str) -> None:
     expected, error = differences(advance_rows, np.ones((1, 1)), np.ones((1, 1, 1)))
     assert error.max() < 1e-6
     np.testing.assert_allclose(found * value, expected[0, 0], rtol=0.0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_runs_go_on_beside_one_that_failed() -> None:
+    """A state beyond a magnet is lost and stays lost; the others are as alone."""
+    flow = Stroboscope(system_of(1, forces=[sb.MagneticForce(strength=2e-9, gap=8e-4, location=0.4)]), sb.Integration())
+    rows = np.array([[-1.0, 0.0], [0.9, 3.0], [-0.8, 0.1]])
+    came = flow.advance(rows, 2)
+    assert np.isfinite(came.states).all(axis=1).tolist() == [True, False, True]
+    after = flow.advance(came, 3, every=True)
+    assert after.every is not None and np.isnan(after.every[1]).all()
+    alone = flow.advance(flow.advance(rows[[0, 2]], 2), 3)
+    np.testing.assert_array_equal(after.states[[0, 2]], alone.states)
+
+
+@pytest.mark.parametrize("side", ["below", "above"])
+def test_linear_modes_are_those_of_the_well_where_the_beam_rests(side: str) -> None:
+    """An uneven beam has other modes in its upper well: states of the map and tangents are those of runs."""
+    uneven = sb.Imperfection(midspan_amplitude=8e-6, antisymmetric_amplitude=5e-6, uniform_load=0.05)
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3, damping_ratio=0.02, imperfection=uneven)
+    system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, sb.Striker(drive=SINE, side=side, location=0.42))])
+    assert np.abs(model.mirrored.linear_modes - model.linear_modes).max() > 1e-2 * np.abs(model.linear_modes).max()
+    flow = Stroboscope(system, PRECISE)
+    begun = system.start_state
+    came = sb.advance(system, begun, 2, integration=PRECISE)
+    assert flow.advance(flow.coordinates(), 2).states[0] == pytest.approx(flow.space.of(came.flat())[0], abs=1e-12)
+    change = np.random.default_rng(3).normal(size=(2, 3)) * flow.space.scales[[0, 3]][:, None]
+    moved = sb.advance(system, begun, 2, [change], integration=PRECISE).tangent
+    ends = [
+        sb.advance(
+            system,
+            dataclasses.replace(
+                begun, amplitude=begun.amplitude + h * change[0], velocity=begun.velocity + h * change[1],
+                striker_position=np.array(flow._striker_position), modal=None,
+            ),
+            2, integration=PRECISE,
+        )
+        for h in (1e-6, -1e-6)
+    ]  # fmt: skip
+    expected = (flow.space.of(ends[0].flat()) - flow.space.of(ends[1].flat()))[0] / 2e-6
+    assert moved is not None
+    assert moved[0].ravel() / flow.space.scales == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
 
 
 @pytest.mark.slow

@@ -191,6 +191,30 @@ def test_a_manifold_that_is_stopped_keeps_its_points(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.slow
+def test_stable_manifold_of_a_struck_beam() -> None:
+    """It is complete, ends at its length, and the map takes its points to the curve again."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.05)
+    shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.03)
+    saddle = sb.dynamics.periodic_orbit(
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)]), [0.0, 0.0]
+    )
+    curve = sb.dynamics.invariant_manifold(saddle, "stable", max_arclength=2.5)
+    assert curve.attrs["termination_reason"] == "max_arclength; max_arclength"
+    for side in (-1, 1):
+        age, states = (curve[name].values[curve["side"].values == side] for name in ("age", "state"))
+        length = np.linalg.norm(np.diff(states, axis=0), axis=1).cumsum()
+        assert length[-2] <= 2.5 + 1e-12 and length[-1] >= 2.5 and (np.diff(age) > 0.0).all()
+        late = age >= 1.0
+        came = saddle.flow.advance(states[late], saddle.period).states
+        # the nearest point of a chord
+        chords = np.diff(states, axis=0)
+        away = came[:, None] - states[:-1]
+        part = np.clip((away * chords).sum(axis=2) / (chords**2).sum(axis=1), 0.0, 1.0)
+        apart = np.linalg.norm(away - part[..., None] * chords, axis=2).min(axis=1)
+        assert apart.max() < curve.attrs["chord_error"]
+
+
+@pytest.mark.slow
 def test_newtons_law_has_no_inverse() -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.05)
     shaker = sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.005)

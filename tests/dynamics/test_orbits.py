@@ -216,3 +216,12 @@ def test_what_does_not_converge_says_why() -> None:
         sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03), [0.1, 0.2, 0.3])
     with pytest.raises(sb.InputError, match="period = 0"):
         sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03), period=0)
+
+
+def test_as_many_iterations_as_are_needed() -> None:
+    """An orbit that is reached in the last iteration is found; one iteration less is too few."""
+    needed = sb.dynamics.periodic_orbit(henon(), [0.3, 0.1]).iterations
+    assert needed > 2
+    assert sb.dynamics.periodic_orbit(henon(), [0.3, 0.1], iterations=needed).iterations == needed
+    with pytest.raises(sb.dynamics.OrbitNotFoundError, match="no convergence"):
+        sb.dynamics.periodic_orbit(henon(), [0.3, 0.1], iterations=needed - 1)

@@ -118,7 +118,7 @@ class Coordinates:
         """Coordinates of the solver's states, one by one, so that none depends on the others; shape (runs, periods, d)."""
         structure = ensemble.structure
         first = np.where((well_sign < 0)[..., None], q + structure.shift, q)
-        modes, beam = self.system.model.linear_modes.T, slice(self.modes)
+        modes, beam = structure.model.linear_modes.T, slice(self.modes)
         amplitude = structure.equilibrium + (first[..., None, beam] @ modes)[..., 0, :]
         velocity = (p[..., None, beam] @ modes)[..., 0, :]
         found = {

@@ -41,6 +41,12 @@ _CLOSEST = 1e-3
 """Distance of neighbours, over the maximum one, below which the curve may turn by any angle."""
 _POINTS = 20_000
 """Maximum number of points of a branch."""
+_PARTS = 10
+"""Parts of the chord between a point that is known and one whose inverse image is not found."""
+_REACH = 6
+"""Neighbours of a known point whose inverse images are sought from it."""
+_MOST_PARTS = 16
+"""Parts into which a chord is divided at once, at most."""
 _FINEST = 1e-12
 """Difference of ages below which no point is inserted."""
 _SHARE = 2**22
@@ -103,25 +109,25 @@ class _Segment(NamedTuple):
         if not self.inverse:
             return self.flow.advance(states, self.periods).states
         x, left = near.copy(), np.arange(len(states))
-        found = np.full_like(x, np.nan)
-        for count in range(_NEWTON):
-            different, same = np.unique(x[left], axis=0, return_inverse=True)
-            eye = np.tile(np.eye(x.shape[1]), (len(different), 1, 1))
-            came = self.flow.advance(different, self.periods, tangents=eye)
+        found, size = np.full_like(x, np.nan), np.full(len(states), np.inf)
+        eye = np.eye(x.shape[1])
+        for _ in range(_NEWTON):
+            came = self.flow.advance(x[left], self.periods, tangents=np.tile(eye, (left.size, 1, 1)))
             assert came.tangents is not None
-            apart, slopes = states[left] - came.states[same], came.tangents[same].transpose(0, 2, 1)
-            met = np.asarray(np.abs(apart).max(axis=1) < _SAME)
+            apart, slopes = states[left] - came.states, came.tangents.transpose(0, 2, 1)
+            now = np.abs(apart).max(axis=1)
+            met = now < _SAME
             found[left[met]] = x[left[met]]
-            going = ~met & np.isfinite(slopes).all(axis=(1, 2))
+            # a step that brings the image no nearer leads away: those are sought later from nearer states
+            going = ~met & (now < size[left]) & np.isfinite(slopes).all(axis=(1, 2))
             going[going] = np.linalg.matrix_rank(slopes[going]) == x.shape[1]
-            left, step = left[going], np.linalg.solve(slopes[going], apart[going][..., None])[..., 0]
-            if not count:
-                # by the linear map; the others are sought later from nearer states
-                near_enough = np.linalg.norm(step, axis=1) < _LONGEST
-                left, step = left[near_enough], step[near_enough]
+            step = np.linalg.solve(slopes[going], apart[going][..., None])[..., 0]
+            near_enough = np.linalg.norm(step, axis=1) < _LONGEST
+            size[left] = now
+            left = left[going][near_enough]
             if not left.size:
                 break
-            x[left] += step
+            x[left] += step[near_enough]
         return found
 
 
@@ -131,12 +137,15 @@ def _grow(
     """Age and state of the points of a branch, and the reason for its end."""
     ages = np.linspace(0.0, 1.0, _BEGUN)
     levels = [(ages, segment.begin(ages))]
+    length = np.zeros(1)
     while True:
-        found = _next_level(segment, levels, max_distance, max_turn, max_points, clock)
+        left = max_arclength - float(length[-1])
+        found = _next_level(segment, levels, left, max_distance, max_turn, max_points, clock)
         if not isinstance(found, str):
             levels.append(found)
-        last = float(len(levels) - 1)
-        age = np.concatenate([*(k + own[:-1] for k, (own, _) in enumerate(levels)), [last + 1.0]])
+        age = np.concatenate(
+            [*(k + own[:-1] for k, (own, _) in enumerate(levels)), len(levels) - 1 + levels[-1][0][-1:]]
+        )
         states = np.concatenate([*(known[:-1] for _, known in levels), levels[-1][1][-1:]])
         length = np.linalg.norm(np.diff(states, axis=0), axis=1).cumsum()
         end = 1 + int(np.searchsorted(length, max_arclength))
@@ -150,49 +159,77 @@ _Levels = list[tuple[_Array, _Array]]
 
 
 def _next_level(
-    segment: _Segment, levels: _Levels, max_distance: float, max_turn: float, max_points: int, clock: _Clock
+    segment: _Segment,
+    levels: _Levels,
+    length: float,
+    max_distance: float,
+    max_turn: float,
+    max_points: int,
+    clock: _Clock,
 ) -> tuple[_Array, _Array] | str:
-    """Ages and states of the image of the last level, with points inserted, or the reason why there is none."""
+    """Ages and states of the image of the last level up to a length, points inserted, or the reason why there is none."""
     room = max_points - sum(len(own) for own, _ in levels)
     ages, before = levels[-1]
-    # the segments join: the inverse image of the first point is next to the last one
-    states = segment.image(before, np.repeat(before[-1:], len(before), axis=0))
+    states = np.full_like(before, np.nan)
     while ages.size <= room:
         if clock.is_over:
             return "max_seconds"
         lost = np.asarray(np.isnan(states).any(axis=1))
-        if lost.any() and not segment.inverse:
-            return "a run failed"
+        # what lies beyond the length that is wanted is not sought
+        known = states[: int(np.argmax(lost)) if lost.any() else None]
+        reached = np.linalg.norm(np.diff(known, axis=0), axis=1).cumsum() > length
+        if reached.any():
+            end = 2 + int(np.argmax(reached))
+            ages, before, states, lost = ages[:end], before[:end], states[:end], lost[:end]
         if lost.any():
-            known, sought = np.flatnonzero(~lost), np.flatnonzero(lost)
-            if not known.size:
+            sought = np.flatnonzero(lost)
+            if segment.inverse and not lost.all():
+                # far from what is known Newton's method fails
+                sought = sought[np.abs(sought[:, None] - np.flatnonzero(~lost)).min(axis=1) <= _REACH]
+            # the segments join: the inverse image of the first point is next to the last one
+            near = before[-1:] if lost.all() else _between(ages[sought], ages[~lost], states[~lost])
+            states[sought] = segment.image(before[sought], np.broadcast_to(near, before[sought].shape))
+            still = np.asarray(np.isnan(states).any(axis=1))
+            if still.any() and not segment.inverse:
+                return "a run failed"
+            if still.all():
                 return "the inverse map does not converge"
-            nearest = known[np.abs(sought[:, None] - known).argmin(axis=1)]
-            states[sought] = segment.image(before[sought], states[nearest])
-            if np.isfinite(states[sought]).all(axis=1).any():
+            if still.sum() < lost.sum():
                 continue
-            places = np.flatnonzero(lost[1:] != lost[:-1])
-            if (np.diff(ages)[places] < _FINEST).any():
-                return "the inverse map does not converge"
+            places = np.flatnonzero(still[1:] != still[:-1])
+            parts, words = np.full(places.size, _PARTS), "the inverse map does not converge"
         else:
-            places = _gaps(ages, states, max_distance, max_turn)
-            if (np.diff(ages)[places] < _FINEST).any():
-                return "the map jumps, or the curve bends too sharply for max_distance and max_turn"
+            places, parts = _gaps(ages, states, max_distance, max_turn)
+            words = "the map jumps, or the curve bends too sharply for max_distance and max_turn"
             if not places.size:
                 return ages, states
-        between = 0.5 * (ages[places] + ages[places + 1])
-        inserted = segment.begin(between)
+        if (np.diff(ages)[places] < _FINEST).any():
+            return words
+        at = np.repeat(places, parts - 1)
+        part = np.concatenate([np.arange(1, count) / count for count in parts])
+        new = ages[at] + part * (ages[at + 1] - ages[at])
+        inserted = segment.begin(new)
         for own, images in levels[1:]:
-            inserted = segment.image(inserted, images[np.searchsorted(own, between) - 1])
-        near = np.where(lost[places, None], states[places + 1], states[places])
-        ages = np.insert(ages, places + 1, between)
-        before = np.insert(before, places + 1, inserted, axis=0)
-        states = np.insert(states, places + 1, segment.image(inserted, near), axis=0)
+            inserted = segment.image(inserted, _between(new, own, images))
+        ages, before = np.insert(ages, at + 1, new), np.insert(before, at + 1, inserted, axis=0)
+        states = np.insert(states, at + 1, np.nan, axis=0)
     return "max_points"
 
 
-def _gaps(ages: _Array, states: _Array, max_distance: float, max_turn: float) -> NDArray[np.intp]:
-    """Places after which a point must be inserted."""
+def _between(wanted: _Array, ages: _Array, states: _Array) -> _Array:
+    """States at ages by straight lines between known ones, and on beyond the last."""
+    found = np.stack([np.interp(wanted, ages, column) for column in states.T], axis=1)
+    if ages.size > 1:
+        chord = states[-1] - states[-2]
+        beyond = np.maximum(wanted - ages[-1], 0.0) / (ages[-1] - ages[-2])
+        found += np.minimum(beyond, _LONGEST / max(float(np.linalg.norm(chord)), _SAME))[:, None] * chord
+    return found
+
+
+def _gaps(
+    ages: _Array, states: _Array, max_distance: float, max_turn: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Places after which points must be inserted, and into how many parts they divide the chord there."""
     chords = np.diff(states, axis=0)
     size = np.linalg.norm(chords, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -202,7 +239,8 @@ def _gaps(ages: _Array, states: _Array, max_distance: float, max_turn: float) ->
     longer = size[1:] > size[:-1]
     missing[1:] |= sharp & longer
     missing[:-1] |= sharp & ~longer
-    return np.flatnonzero(missing)
+    places = np.flatnonzero(missing)
+    return places, np.clip(np.ceil(size[places] / max_distance), 2, _MOST_PARTS).astype(np.intp)
 
 
 @checked
@@ -238,8 +276,8 @@ def invariant_manifold(
     max_points : int
         Maximum number of points of each branch.
     max_seconds : float, optional
-        Time after which both branches end as they are, s; no limit by default.  A stable manifold takes minutes, since each of its
-        points is sought by Newton's method.
+        Time after which both branches end as they are, s; no limit by default.  Points of a stable manifold take longer, since each is
+        sought by Newton's method.
     progress : callable, optional
         Called as ``progress(share)`` with the share of the length; True writes a line with the time left to standard error.
 

@@ -163,11 +163,13 @@ def newton(
     else:
         r, slope = residual(x), first
     size = float(np.abs(r).max())
-    for count in range(iterations):
+    for count in range(iterations + 1):
         if not np.isfinite(size):
             raise OrbitNotFoundError("a run failed on the way; begin nearer to the orbit")
         if size <= tolerance and not (deflate and _near(x, deflate)):
             return Shot(x, size, count)
+        if count == iterations:
+            break
         try:
             step: NDArray[Any] = np.linalg.solve(slope, -r)
         except np.linalg.LinAlgError:

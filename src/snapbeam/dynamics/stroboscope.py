@@ -252,9 +252,8 @@ class Stroboscope:
 
         def after(index: int) -> State:
             q, p = (np.where(failed[:, None], 0.0, values[:, index]) for values in (seen.q, seen.p))
-            found = states_of(
-                ensemble, q, p, seen.well_sign[:, index], seen.contact_ticks[:, index], ensemble.runs["end"]
-            )
+            well_sign = np.where(failed, 1.0, seen.well_sign[:, index])
+            found = states_of(ensemble, q, p, well_sign, seen.contact_ticks[:, index], ensemble.runs["end"])
             # after a period every motion is where it began
             return replace(found, phase=ensemble.runs["phase"].copy(), statistics={"status": passed})
 

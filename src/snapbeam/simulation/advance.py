@@ -134,7 +134,7 @@ def advance(
 
 def _tangents(system: System, begun: State, span: float, tangents: _Array, integration: Integration) -> _Array:
     """Tangents of shape (runs, k, 2, N) some periods on, period by period: their own steps are finer than those of the motion."""
-    modes, how = system.model.linear_modes, integration.replace(early_termination=False)
+    how = integration.replace(early_termination=False)
     while span > 0.0:
         part = min(span, 1.0)
         ensemble = make_ensemble(system, how, start=begun, periods=part)
@@ -142,7 +142,7 @@ def _tangents(system: System, begun: State, span: float, tangents: _Array, integ
         pairs = [ensemble.structure.to_modal(rest + each, each) for each in np.eye(begun.modes)]
         q, p = (tangents[:, :, i] @ np.array([pair[i] for pair in pairs]) for i in (0, 1))
         moved = np.stack(native.tangents(ensemble, q, p, integration.threads), axis=2)
-        tangents, span = moved[..., : begun.modes] @ modes.T, span - part
+        tangents, span = ensemble.structure.velocities(moved), span - part
         if span > 0.0:
             begun = advance(system, begun, part, integration=integration)
     return tangents
