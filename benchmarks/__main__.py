@@ -25,9 +25,7 @@ _PARTS = {
 def main() -> None:
     """Run the parts asked for."""
     parts = [*_PARTS, "peers"]
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks", description="snapbeam beside other integrators"
-    )
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="snapbeam beside other integrators")
     parser.add_argument("part", nargs="*", help=f"any of {', '.join(parts)}; by default all but the last")
     parser.add_argument("--quick", action="store_true", help="few repeats, short runs: does everything work")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/bench"), metavar="FOLDER")

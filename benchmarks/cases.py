@@ -17,15 +17,7 @@ from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.step_size import Plan, choose_base_step
 
-__all__ = [
-    "CONTACT",
-    "ERROR_CYCLES",
-    "POINTS",
-    "REQUEST_POINTS",
-    "Case",
-    "model_of",
-    "reference_plan",
-]
+__all__ = ["CONTACT", "ERROR_CYCLES", "POINTS", "REQUEST_POINTS", "Case", "model_of", "reference_plan"]
 
 _Array = NDArray[np.float64]
 
@@ -41,9 +33,7 @@ _SAMPLES_PER_CYCLE = 20
 @cache
 def model_of(modes: int) -> sb.ReducedModel:
     """The paper's beam, reduced."""
-    return sb.ReducedModel.from_beam(
-        default_values.BEAM, modes=modes, damping_ratio=default_values.DAMPING_RATIO
-    )
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=default_values.DAMPING_RATIO)
 
 
 @dataclass(frozen=True)
@@ -69,9 +59,7 @@ class Case:
     def shaker(self) -> sb.Shaker:
         """The drive."""
         return sb.Shaker(
-            frequency_ratio=self.frequency_ratio,
-            velocity_amplitude=self.velocity_amplitude,
-            location=self.location,
+            frequency_ratio=self.frequency_ratio, velocity_amplitude=self.velocity_amplitude, location=self.location
         )
 
     @property
@@ -106,9 +94,7 @@ class Case:
         )
         return sb.System(self.model, contacts=[sb.Contact(CONTACT, shaker)])
 
-    def ensemble(
-        self, plan: Plan, cycles: int, *, factor: float = 1.0, early_termination: bool = False
-    ) -> Ensemble:
+    def ensemble(self, plan: Plan, cycles: int, *, factor: float = 1.0, early_termination: bool = False) -> Ensemble:
         """This run, for an engine."""
         integration = sb.Integration(cycles=cycles, early_termination=early_termination)
         return make_ensemble(self.system(factor), integration, plan=plan)

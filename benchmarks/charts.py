@@ -91,15 +91,10 @@ def requests_chart(data: dict[str, Any], path: Path) -> None:
                     markerfacecolor=face,
                     label=f"N = {modes}" if face == color else None,
                 )
-        ends = np.array(
-            [min(r["tolerance"] for r in data["records"]), max(r["tolerance"] for r in data["records"])]
-        )
+        ends = np.array([min(r["tolerance"] for r in data["records"]), max(r["tolerance"] for r in data["records"])])
         ax.plot(ends, ends, color="#000000", label="error = request")
         ax.set(
-            xscale="log",
-            yscale="log",
-            xlabel="requested tolerance (b)",
-            ylabel="error measured up to the horizon (b)",
+            xscale="log", yscale="log", xlabel="requested tolerance (b)", ylabel="error measured up to the horizon (b)"
         )
         ax.grid(True, color="#E4E4E4", linewidth=0.4)
         ax.legend(loc="lower right")
@@ -112,9 +107,7 @@ def scaling_chart(data: dict[str, Any], path: Path) -> None:
         figure = new_figure("double", 70.0)
         left, right = figure.subplots(1, 2)
         runs, modes = data["runs"], data["modes"]
-        left.plot(
-            [r["runs"] for r in runs], [r["microseconds"] for r in runs], "o-", color="#000000", markersize=4
-        )
+        left.plot([r["runs"] for r in runs], [r["microseconds"] for r in runs], "o-", color="#000000", markersize=4)
         left.set(xscale="log", xlabel="runs", ylabel=r"time per run ($\mathrm{\mu}$s)")
         left.set_ylim(0.0, 1.4 * max(r["microseconds"] for r in runs))
         count = [r["modes"] for r in modes]

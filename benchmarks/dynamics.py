@@ -74,9 +74,7 @@ def _diagram(share: float) -> Cost:
     system = _system(8, 1.4, 0.01)
     sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", values[:2], periods=(2, 4))
     seconds, _ = _seconds(lambda: sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", values))
-    return Cost(
-        f"diagram of {_VALUES} amplitudes, up and down, N = 8", values.size, _VALUES, seconds, 0.0, 60.0
-    )
+    return Cost(f"diagram of {_VALUES} amplitudes, up and down, N = 8", values.size, _VALUES, seconds, 0.0, 60.0)
 
 
 def _branch(share: float) -> Cost:
@@ -85,9 +83,7 @@ def _branch(share: float) -> Cost:
     orbit = sb.dynamics.periodic_orbit(system, period=2, transient=2000)
     most = round(_ORBITS * share)
     seconds, branch = _seconds(
-        lambda: sb.dynamics.continuation(
-            orbit, "velocity_amplitude", (0.005, 0.6), max_points=most, max_step=2e-4
-        )
+        lambda: sb.dynamics.continuation(orbit, "velocity_amplitude", (0.005, 0.6), max_points=most, max_step=2e-4)
     )
     return Cost(f"branch of {_ORBITS} orbits, N = 32", len(branch.orbits), _ORBITS, seconds, 0.0, 60.0)
 
@@ -99,9 +95,7 @@ def _basins(share: float) -> Cost:
     plane = {"amplitude[1]": np.linspace(-1.6, 1.6, side), "velocity[1]": np.linspace(-1.0, 1.0, side)}
     sb.dynamics.basins_of_attraction(found, {name: values[:2] for name, values in plane.items()}, periods=2)
     seconds, _ = _seconds(lambda: sb.dynamics.basins_of_attraction(found, plane, periods=200))
-    return Cost(
-        f"basins of {_SIDE} x {_SIDE} states, N = 1, 200 cycles", side**2, _SIDE**2, seconds, 0.0, 120.0
-    )
+    return Cost(f"basins of {_SIDE} x {_SIDE} states, N = 1, 200 cycles", side**2, _SIDE**2, seconds, 0.0, 120.0)
 
 
 def _lifetimes(share: float) -> Cost:
@@ -115,15 +109,10 @@ def _lifetimes(share: float) -> Cost:
     times = []
     for k in range(count):
         point = xr.Dataset(
-            {
-                "frequency_ratio": ("point", ratio[k : k + 1]),
-                "velocity_amplitude": ("point", velocity[k : k + 1]),
-            }
+            {"frequency_ratio": ("point", ratio[k : k + 1]), "velocity_amplitude": ("point", velocity[k : k + 1])}
         )
         times.append(
-            _seconds(lambda at=point: sb.dynamics.lifetime_map(system, at, how, initial_conditions=_STARTS))[
-                0
-            ]
+            _seconds(lambda at=point: sb.dynamics.lifetime_map(system, at, how, initial_conditions=_STARTS))[0]
         )
     cpu = np.array([each.cpu for each in times])
     error = float(np.std(cpu, ddof=1)) * count**0.5
@@ -135,10 +124,7 @@ def _lifetimes(share: float) -> Cost:
 def run(folder: Path, quick: bool) -> None:
     """Measure, and write ``dynamics``."""
     shares = (0.05, 0.05, 0.04, 0.002) if quick else (1.0, 1.0, 1.0, 0.1)
-    costs = [
-        measure(share)
-        for measure, share in zip((_diagram, _branch, _basins, _lifetimes), shares, strict=True)
-    ]
+    costs = [measure(share) for measure, share in zip((_diagram, _branch, _basins, _lifetimes), shares, strict=True)]
     rows = []
     for cost in costs:
         error = f" ± {cost.error * cost.whole / cost.done:.2g}" if cost.error else ""
@@ -164,20 +150,12 @@ def run(folder: Path, quick: bool) -> None:
     )
     found = ways(*((20, 50, 2) if quick else (400, 200, 5)))
     text += table(
-        (
-            "oscillator under restitution, orbits of one impact in a period",
-            "µs of processor time a period",
-            "error",
-        ),
+        ("oscillator under restitution, orbits of one impact in a period", "µs of processor time a period", "error"),
         [[way.name, f"{1e6 * way.cpu / way.periods:.3g}", f"{way.error:.1g}"] for way in found],
     )
-    text += (
-        "\nDynamicalSystems.jl takes the last way in compiled code; no time of it for impacts is published.\n"
-    )
+    text += "\nDynamicalSystems.jl takes the last way in compiled code; no time of it for impacts is published.\n"
     data = {
-        "costs": [
-            cost._asdict() | {"seconds": cost.seconds._asdict(), "scaled": cost.scaled} for cost in costs
-        ],
+        "costs": [cost._asdict() | {"seconds": cost.seconds._asdict(), "scaled": cost.scaled} for cost in costs],
         "impacts": [way._asdict() for way in found],
     }
     save(folder, "dynamics", quick, data, text)

@@ -37,8 +37,7 @@ def ensemble_of(
 ) -> Ensemble:
     """The runs of *points* at level standard."""
     system = sb.System(
-        model_of(modes),
-        contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))],
+        model_of(modes), contacts=[sb.Contact(CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))]
     )
     columns = {
         "drive.frequency_ratio": points["frequency_ratio"],
@@ -67,14 +66,7 @@ def run(folder: Path, quick: bool) -> None:
         for r in records
     ]
     text = table(
-        (
-            "modes",
-            "early termination",
-            "runs",
-            "ms per run and core",
-            "runs that ended early",
-            "simulated time saved",
-        ),
+        ("modes", "early termination", "runs", "ms per run and core", "runs that ended early", "simulated time saved"),
         rows,
     )
     save(folder, "ensemble", quick, data, text)

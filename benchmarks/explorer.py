@@ -111,10 +111,7 @@ def measured(browser: str, modes: int, cycles: int, clicks: int, paints: int) ->
                 finally:
                     process.terminate()
                     process.wait()
-                found[name] = {
-                    "first paint, ms": _summary(first),
-                    "click to waveform, ms": _summary(times[2:]),
-                }
+                found[name] = {"first paint, ms": _summary(first), "click to waveform, ms": _summary(times[2:])}
                 if command is own:
                     found[name]["first click, ms"] = round(times[0], 1)
                     found[name] |= more
@@ -195,9 +192,7 @@ def _frames(browser: Any, url: str, dataset: Any, frames: int = 8) -> list[float
     page.wait_for_function("() => Bokeh.documents[0].get_model_by_name('waveform')")
     page.evaluate(_WATCH)
     page.mouse.click(
-        *page.evaluate(
-            _PLACE, [float(dataset[name][3]) for name in ("frequency_ratio", "velocity_amplitude")]
-        )
+        *page.evaluate(_PLACE, [float(dataset[name][3]) for name in ("frequency_ratio", "velocity_amplitude")])
     )
     page.wait_for_function("() => window.shown.length > 0")
     page.locator('.bk-tab:has-text("System")').first.click()

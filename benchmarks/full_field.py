@@ -33,9 +33,7 @@ def recording(noise: float, seed: int = 1) -> tuple[NDArray[np.uint16], _Array]:
     fine = (np.arange(HEIGHT * FINE) + 0.5) / FINE - 0.5
     frames = np.empty((COUNT, HEIGHT, WIDTH), dtype=np.uint16)
     for k, shift in enumerate(truth):
-        moved = np.stack(
-            [np.interp(fine - each, fine, pattern[:, j]) for j, each in enumerate(shift)], axis=1
-        )
+        moved = np.stack([np.interp(fine - each, fine, pattern[:, j]) for j, each in enumerate(shift)], axis=1)
         light = moved.reshape(HEIGHT, FINE, WIDTH).mean(1) + noise * rng.standard_normal((HEIGHT, WIDTH))
         frames[k] = np.clip(np.round(4095 * light), 0, 4095)
     return frames, truth

@@ -56,9 +56,7 @@ def flow_of(ratio: float) -> Stroboscope:
     """The oscillator, of natural frequency 1 and mass 1, struck at rest by a wall sin(ratio t)."""
     model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=ratio)
-    system = sb.System(
-        model, contacts=[sb.Contact(sb.Restitution(RESTITUTION), sb.Striker(drive=drive, gap=0.0))]
-    )
+    system = sb.System(model, contacts=[sb.Contact(sb.Restitution(RESTITUTION), sb.Striker(drive=drive, gap=0.0))])
     return Stroboscope(system, phase=PHASE)
 
 
@@ -72,13 +70,7 @@ def by_events(ratio: float, state: _Array, periods: int) -> _Array:
     t, end, y = 0.0, periods * 2.0 * math.pi / ratio, np.array(state)
     while t < end:
         found: Any = solve_ivp(
-            lambda _, y: (y[1], -y[0]),
-            (t, end),
-            y,
-            method="DOP853",
-            events=gap,
-            rtol=_TOLERANCE,
-            atol=_TOLERANCE,
+            lambda _, y: (y[1], -y[0]), (t, end), y, method="DOP853", events=gap, rtol=_TOLERANCE, atol=_TOLERANCE
         )
         t, y = float(found.t[-1]), found.y[:, -1]
         if found.status == 1:
@@ -136,10 +128,7 @@ def ways(orbits: int, periods: int, by_scipy: int) -> list[Way]:
     in_closed_form(1.7, *states[0], 1, RESTITUTION)
     begun = time.process_time()
     closed = np.array(
-        [
-            in_closed_form(float(r), *state, periods, RESTITUTION)
-            for r, state in zip(ratios, states, strict=True)
-        ]
+        [in_closed_form(float(r), *state, periods, RESTITUTION) for r, state in zip(ratios, states, strict=True)]
     )
     bound = time.process_time() - begun
     chosen = np.linspace(0, orbits - 1, by_scipy).astype(int)

@@ -72,14 +72,7 @@ def _words(records: list[dict[str, Any]]) -> str:
                     f"{sum(r['error'] <= promised for r in others)} of {len(others)}",
                 ]
             )
-    heads = (
-        "modes",
-        "level",
-        "median e5",
-        "within 1e-3 or 1e-8",
-        "two largest",
-        "ill-conditioned within the limit",
-    )
+    heads = ("modes", "level", "median e5", "within 1e-3 or 1e-8", "two largest", "ill-conditioned within the limit")
     count = len({r["point"] for r in records})
     return table(heads, rows) + (
         f"\n{count} points: those of the requests, and random ones. Well-conditioned are those at which the response "

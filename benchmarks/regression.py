@@ -100,11 +100,7 @@ def compare(
                 tree: {kind: min(each[kind] for each in results) for kind in ("time", "step")}
                 for tree, results in found.items()
             }
-            yield (
-                case,
-                least[_ROOT]["time"] / least[other]["time"],
-                least[_ROOT]["step"] / least[other]["step"],
-            )
+            yield (case, least[_ROOT]["time"] / least[other]["time"], least[_ROOT]["step"] / least[other]["step"])
 
 
 def main() -> None:
@@ -113,9 +109,7 @@ def main() -> None:
         prog="python -m benchmarks.regression", description="processor time over that of a commit"
     )
     parser.add_argument("commit")
-    parser.add_argument(
-        "case", nargs="*", default=DEFAULT, help="names of `systems`; 'all'; default: eight cases"
-    )
+    parser.add_argument("case", nargs="*", default=DEFAULT, help="names of `systems`; 'all'; default: eight cases")
     parser.add_argument("--processes", type=int, default=4, help="of each tree and case (4)")
     parser.add_argument("--quick", action="store_true", help="short runs: does everything work")
     arguments = parser.parse_args()

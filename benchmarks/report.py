@@ -38,9 +38,7 @@ def save(folder: Path, name: str, quick: bool, data: dict[str, Any], text: str) 
     words = text + "\n" + describe(facts, quick)
     folder.mkdir(parents=True, exist_ok=True)
     with atomic_path(folder / f"{name}.json") as temporary:
-        temporary.write_text(
-            json.dumps({"machine": facts, "quick": quick} | data, indent=1) + "\n", encoding="utf-8"
-        )
+        temporary.write_text(json.dumps({"machine": facts, "quick": quick} | data, indent=1) + "\n", encoding="utf-8")
     with atomic_path(folder / f"{name}.inc") as temporary:
         temporary.write_text(words, encoding="utf-8")
     print(f"\n## {name}\n\n{words}", flush=True)

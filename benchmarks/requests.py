@@ -36,9 +36,7 @@ def run(folder: Path, quick: bool) -> None:
             cells: list[object] = [modes, case.label]
             for tolerance in tolerances:
                 r = next(
-                    r
-                    for r in records
-                    if (r["modes"], r["point"], r["tolerance"]) == (modes, case.label, tolerance)
+                    r for r in records if (r["modes"], r["point"], r["tolerance"]) == (modes, case.label, tolerance)
                 )
                 short = "" if r["horizon"] > 0.999 else f" to {r['horizon'] * ERROR_CYCLES:.1f} cycles"
                 cells.append(f"{r['error']:.0e}{short}{'' if r['reached'] else ' (short)'}")

@@ -33,19 +33,9 @@ def run(folder: Path, quick: bool) -> None:
     )
     text += f"\nN = 1, {_CYCLES} cycles a run, random points of the plane of Fig. 6, all cores.\n\n"
     text += table(
-        (
-            "modes",
-            "ms per 200 cycles",
-            "flight step, us",
-            "ns per kick",
-        ),
+        ("modes", "ms per 200 cycles", "flight step, us", "ns per kick"),
         [
-            [
-                r["modes"],
-                f"{r['milliseconds']:.3g}",
-                f"{1e6 * r['step']:.3g}",
-                f"{r['nanoseconds_per_kick']:.3g}",
-            ]
+            [r["modes"], f"{r['milliseconds']:.3g}", f"{1e6 * r['step']:.3g}", f"{r['nanoseconds_per_kick']:.3g}"]
             for r in modes
         ],
     )

@@ -29,9 +29,7 @@ COIL = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resis
 Parts = Mapping[str, Any]
 
 
-def _model(
-    beam: sb.Beam = default_values.BEAM, imperfection: sb.Imperfection | None = None
-) -> sb.ReducedModel:
+def _model(beam: sb.Beam = default_values.BEAM, imperfection: sb.Imperfection | None = None) -> sb.ReducedModel:
     return sb.ReducedModel.from_beam(beam, modes=_MODES, imperfection=imperfection)
 
 
@@ -114,9 +112,7 @@ def run(folder: Path, quick: bool) -> None:
         drift = abs(after[0] / before[0] - 1.0)
         records.append({"model": name, "time": own[0] / base[0], "step": own[1] / base[1], "drift": drift})
         before = after
-    rows = [
-        [r["model"], f"{r['time']:.2f}", f"{r['step']:.2f}", f"{100.0 * r['drift']:.0f} %"] for r in records
-    ]
+    rows = [[r["model"], f"{r['time']:.2f}", f"{r['step']:.2f}", f"{100.0 * r['drift']:.0f} %"] for r in records]
     head = (
         "model",
         "time per simulated second over the paper's",

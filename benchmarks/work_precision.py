@@ -42,9 +42,7 @@ def run(folder: Path, quick: bool, peers: Sequence[str] = PEERS) -> None:
     work_precision_chart(data, folder / "work_precision.png")
 
 
-def _record(
-    case: Case, method: str, setting: str, error: float, timing: Any, factor: float
-) -> dict[str, Any]:
+def _record(case: Case, method: str, setting: str, error: float, timing: Any, factor: float) -> dict[str, Any]:
     record = {
         "point": case.label,
         "method": method,
@@ -66,10 +64,7 @@ def _snapbeam(case: Case, quick: bool) -> list[dict[str, Any]]:
     for level, factor in settings:
         plan = case.default_plan(level).scaled(factor)
         ensemble = case.ensemble(plan, _CYCLES)
-        timing = measure(
-            lambda ensemble=ensemble: native.run_ensemble(ensemble, 1),
-            1 if quick else 5,
-        )
+        timing = measure(lambda ensemble=ensemble: native.run_ensemble(ensemble, 1), 1 if quick else 5)
         setting = f"{1e6 * plan.step:.3g} us" + (", default" if factor == 1.0 else "")
         error = case.error(case.displacement(plan))
         records.append(_record(case, f"snapbeam {level}", setting, error, timing, 1.0))
@@ -107,11 +102,7 @@ def _fastest(records: list[dict[str, Any]], point: str, method: str) -> dict[str
 
 
 def _tables(records: list[dict[str, Any]], conditioning: dict[str, Any]) -> str:
-    ours = {
-        r["point"]: r
-        for r in records
-        if r["method"] == "snapbeam standard" and r["setting"].endswith("default")
-    }
+    ours = {r["point"]: r for r in records if r["method"] == "snapbeam standard" and r["setting"].endswith("default")}
     rows: list[list[object]] = []
     for method in dict.fromkeys(r["method"] for r in records):
         for point, own in ours.items():

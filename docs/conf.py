@@ -42,10 +42,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["_build", "_ext", "_generated", "data"]
-exclude_patterns += [
-    "sg_execution_times.rst",
-    "gallery/sg_execution_times.rst",
-]  # load scripts from elsewhere
+exclude_patterns += ["sg_execution_times.rst", "gallery/sg_execution_times.rst"]  # load scripts from elsewhere
 exclude_patterns += [f"gallery/**/*.{kind}" for kind in ("ipynb", "py", "json")]
 templates_path: list[str] = []
 
@@ -129,8 +126,7 @@ PyXrefMixin.make_xrefs = link_errors_only
 
 _PREAMBLES = {
     page.stem: (
-        re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-        or [""]
+        re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL) or [""]
     )[0]
     for page in Path(__file__).parent.glob("api_*.md")
 }
@@ -255,10 +251,7 @@ def summarise_validation(app: Any) -> None:
     for line in (DATA / "validation.md").read_text(encoding="utf-8").splitlines()[2:]:
         source, _, _, _, difference, remark = (cell.strip() for cell in line.split("|")[1:-1])
         rows.setdefault(source, []).append((abs(float(difference.removeprefix("below "))), remark))
-    lines = [
-        "| source | quantities | maximum difference | remark on the maximum |",
-        "| --- | --- | --- | --- |",
-    ]
+    lines = ["| source | quantities | maximum difference | remark on the maximum |", "| --- | --- | --- | --- |"]
     for source, found in rows.items():
         difference, remark = max(found)
         lines.append(
@@ -275,8 +268,7 @@ def link_gallery(app: Any, name: str, source: list[str]) -> None:
 _HERE = Path(__file__).parent
 (_HERE / "_generated" / "static").mkdir(parents=True, exist_ok=True)
 shutil.copyfile(
-    Path(_MATHJAX.origin).parent / "static" / "mathjax" / "tex-svg.js",
-    _HERE / "_generated" / "static" / "mathjax.js",
+    Path(_MATHJAX.origin).parent / "static" / "mathjax" / "tex-svg.js", _HERE / "_generated" / "static" / "mathjax.js"
 )
 
 

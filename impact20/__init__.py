@@ -113,17 +113,7 @@ def case_of(table: dict[str, Any]) -> Case:
     given.setdefault("damping", [0.0] * size)
     given.setdefault("speed", [0.0] * size)
     given.setdefault("start", [0.0] * size)
-    for key in (
-        "stiffness",
-        "damping",
-        "start",
-        "speed",
-        "output",
-        "gradient",
-        "coupling",
-        "load",
-        "harmonic",
-    ):
+    for key in ("stiffness", "damping", "start", "speed", "output", "gradient", "coupling", "load", "harmonic"):
         if key in given:
             given[key] = vector(given[key])
     if "pulse" in given:

@@ -102,9 +102,7 @@ def search(module: Any, problem: Problem, case: Case, budget: float) -> dict[str
         ahead = ahead[1::2]
     skipped: set[str] = set()
     for setting in ahead:
-        method = json.dumps(
-            {key: value for key, value in setting.items() if key not in ("tolerance", "step")}
-        )
+        method = json.dumps({key: value for key, value in setting.items() if key not in ("tolerance", "step")})
         if method in skipped:
             continue
         if time.process_time() - begin > budget:
@@ -123,10 +121,7 @@ def search(module: Any, problem: Problem, case: Case, budget: float) -> dict[str
             reason = reason or f"a run takes more than {10 * budget + 60:.0f} s"
             skipped.add(method)
         except Exception as failure:  # a solver that fails at one tolerance may succeed at another
-            reason = (
-                reason
-                or f"{type(failure).__name__}: {str(failure).splitlines()[0][:100] if str(failure) else ''}"
-            )
+            reason = reason or f"{type(failure).__name__}: {str(failure).splitlines()[0][:100] if str(failure) else ''}"
         finally:
             signal.alarm(0)
     return {"rows": rows} if rows else {"reason": reason or "no setting finished"}
@@ -155,15 +150,11 @@ def processor() -> str:
 def main() -> None:
     """Run and write JSON, table and figure."""
     parser = argparse.ArgumentParser(prog="python -m impact20", description=__doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help="six problems and a small budget: a minute or two"
-    )
+    parser.add_argument("--quick", action="store_true", help="six problems and a small budget: a minute or two")
     parser.add_argument("--only", nargs="+", choices=list(REGISTER), metavar="SOLVER", default=list(REGISTER))
     parser.add_argument("--problems", nargs="+", choices=names(), metavar="NAME")
     parser.add_argument("--out", type=Path, default=FOLDER / "results")
-    parser.add_argument(
-        "--budget", type=float, help="processor seconds for the search of one solver on one case"
-    )
+    parser.add_argument("--budget", type=float, help="processor seconds for the search of one solver on one case")
     given = parser.parse_args()
     wanted = given.problems or (list(QUICK) if given.quick else names())
     budget = given.budget or (2.0 if given.quick else BUDGET)

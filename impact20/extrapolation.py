@@ -70,9 +70,7 @@ class Motion:
         if tip.law == "kelvin_voigt":
             return Real(tip.stiffness) * d + Real(tip.damping) * rate
         d = max(d, Real(0))
-        power = (
-            d if tip.exponent == 1.0 else d * np.sqrt(d) if tip.exponent == 1.5 else d ** Real(tip.exponent)
-        )
+        power = d if tip.exponent == 1.0 else d * np.sqrt(d) if tip.exponent == 1.5 else d ** Real(tip.exponent)
         return Real(tip.stiffness) * power * (1 + Real(tip.factor) * rate)
 
     def slope(self, t: Any, u: Any) -> Any:
@@ -147,12 +145,7 @@ def _first_end(motion: Motion, t: Any, u: Any, h: Any, end: Any, first: Any) -> 
             middle = end
         else:
             q = s - 1
-            middle = (
-                (1 + 2 * s) * q * q * u
-                + s * q * q * h * first
-                + s * s * (3 - 2 * s) * end
-                + s * s * q * h * last
-            )
+            middle = (1 + 2 * s) * q * q * u + s * q * q * h * first + s * s * (3 - 2 * s) * end + s * s * q * h * last
         for j in range(len(motion.closed)):
             if motion.indicator(j, t + s * h, middle) < 0:
                 before = motion.indicator(j, t, u)
@@ -228,9 +221,7 @@ def solve(case: Case) -> Outcome:
         found = _first_end(motion, t, u, h_now, end, first) if motion.closed else None
         if found is None:
             t, u = (stops[at] if short else t + h_now), end
-            motion.leaving = [
-                left and motion.approach(j, t, u)[0] > 0 for j, left in enumerate(motion.leaving)
-            ]
+            motion.leaving = [left and motion.approach(j, t, u)[0] > 0 for j, left in enumerate(motion.leaving)]
             if short:
                 if stops[at] in times:
                     values[stops[at]] = output @ u[:n]
@@ -274,9 +265,7 @@ def solve(case: Case) -> Outcome:
                 low, high = t, until
                 for _ in range(80):
                     middle = (low + high) / 2
-                    low, high = (
-                        (middle, high) if motion.pressing(j, middle, held(middle)) >= 0 else (low, middle)
-                    )
+                    low, high = (middle, high) if motion.pressing(j, middle, held(middle)) >= 0 else (low, middle)
                 t, u = high, held(high)
                 break
             t = until

@@ -136,15 +136,9 @@ def solve(case: Case, rtol: float = 1e-13, atol: float = 1e-15) -> tuple[Array, 
             grid = np.linspace(t, times[-1], 20001)
             signs = np.array([reaction(when) for when in grid])
             below = np.flatnonzero(signs < 0)
-            until = (
-                times[-1]
-                if not below.size
-                else brentq(reaction, grid[below[0] - 1], grid[below[0]], xtol=1e-15)
-            )
+            until = times[-1] if not below.size else brentq(reaction, grid[below[0] - 1], grid[below[0]], xtol=1e-15)
             while at < case.samples and times[at] <= until:
-                values[at] = (tip.amplitude * sin(tip.frequency * times[at] + tip.phase) - tip.gap) / tip.row[
-                    0
-                ]
+                values[at] = (tip.amplitude * sin(tip.frequency * times[at] + tip.phase) - tip.gap) / tip.row[0]
                 at += 1
             t = until
             angle = tip.frequency * t + tip.phase

@@ -41,9 +41,7 @@ def buckled_beam(modes: int) -> dict[str, Any]:
             wave.append((i + 1) * pi / length)
         else:  # the (i/2)-th root of tan z = z, z = k L/2
             n = i // 2
-            root = brentq(
-                lambda z: np.sin(z) - z * np.cos(z), n * pi + 1e-9, (n + 0.5) * pi, xtol=1e-15, rtol=1e-15
-            )
+            root = brentq(lambda z: np.sin(z) - z * np.cos(z), n * pi + 1e-9, (n + 0.5) * pi, xtol=1e-15, rtol=1e-15)
             wave.append(2 * root / length)
     k = np.array(wave)
     odd = np.arange(1, modes + 1) % 2 == 1
@@ -111,9 +109,7 @@ def clamped_beam_and_sphere(modes: int = 16, ratio: float = 0.2) -> dict[str, An
     roots = []
     for i in range(1, modes + 1):
         middle = (i + 0.5) * pi
-        roots.append(
-            brentq(lambda z: np.cos(z) - 1 / np.cosh(z), middle - 0.1, middle + 0.1, xtol=1e-15, rtol=1e-15)
-        )
+        roots.append(brentq(lambda z: np.cos(z) - 1 / np.cosh(z), middle - 0.1, middle + 0.1, xtol=1e-15, rtol=1e-15))
     z = np.array(roots)
     s = (np.cosh(z) - np.cos(z)) / (np.sinh(z) - np.sin(z))
     # sinh and cosh of large arguments cancel: exponentials of -zx and z(x - 1), with 1 - s and 1 + s written out.
@@ -126,10 +122,7 @@ def clamped_beam_and_sphere(modes: int = 16, ratio: float = 0.2) -> dict[str, An
     omega = (z / z[0]) ** 2
     row, centre = shape(0.4), shape(0.5)
     return {
-        "structure": {
-            "stiffness": [*(omega**2).tolist(), 0.0],
-            "damping": [*(2 * DAMPING * omega).tolist(), 0.0],
-        },
+        "structure": {"stiffness": [*(omega**2).tolist(), 0.0], "damping": [*(2 * DAMPING * omega).tolist(), 0.0]},
         # The penetration is the sphere's displacement less the beam's: d = x_s/sqrt(ratio) - phi . q = -row . x.
         "rows": {
             "contact": [*row.tolist(), -1 / sqrt(ratio)],

@@ -23,9 +23,7 @@ def table(content: dict[str, Any], target: float) -> str:
     lines = ["| problem, case | " + " | ".join(solvers) + " |", "|---|" + "---:|" * len(solvers)]
     for name in names():
         cases = {case for solver in solvers for case in content["results"][solver].get(name, {})}
-        order = [
-            case for solver in solvers[:1] for case in content["results"][solver].get(name, {})
-        ] or sorted(cases)
+        order = [case for solver in solvers[:1] for case in content["results"][solver].get(name, {})] or sorted(cases)
         for case in order:
             cells, times = [], {}
             for solver in solvers:
@@ -115,9 +113,7 @@ def figure(content: dict[str, Any], target: Path) -> None:
 def write_report(folder: Path) -> None:
     """Write table.md and work_precision.png beside results.json."""
     content = json.loads((folder / "results.json").read_text(encoding="utf-8"))
-    versions = ", ".join(
-        f"{name} {v}" for name, v in content["versions"].items() if not v.startswith("not installed")
-    )
+    versions = ", ".join(f"{name} {v}" for name, v in content["versions"].items() if not v.startswith("not installed"))
     text = [
         f"Processor {content['processor']}, one core; Python {content['python']}, NumPy {content['numpy']}; {versions}.\n",
         "Processor time in milliseconds of the cheapest setting whose error is at most the target and that misses no impact; in",

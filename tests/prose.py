@@ -88,10 +88,7 @@ def help_texts() -> Iterator[tuple[str, str]]:
 
 def headings() -> Iterator[tuple[str, str]]:
     """Place and text of the headings of the tables that programs print."""
-    for path in [
-        *sorted((ROOT / "docs" / "data").glob("*.md")),
-        *sorted((ROOT / "docs" / "images").glob("*.inc")),
-    ]:
+    for path in [*sorted((ROOT / "docs" / "data").glob("*.md")), *sorted((ROOT / "docs" / "images").glob("*.inc"))]:
         lines = path.read_text(encoding="utf-8").splitlines()
         for row, rule in itertools.pairwise(lines):
             if re.fullmatch(r"\|[-:| ]+\|", rule) and row.startswith("|"):
@@ -151,14 +148,10 @@ def main(names: list[str]) -> None:
         ROOT / "CHANGELOG.md",
     ]  # fmt: skip
     print(f"{'page':32}{'words':>7}{'sentences':>11}{'long':>6}{'What':>6}{'banned':>8}{'you, we':>9}")
-    rows = [
-        (path.name, report(path.name, prose(path.read_text(encoding="utf-8")), bool(names))) for path in pages
-    ]
+    rows = [(path.name, report(path.name, prose(path.read_text(encoding="utf-8")), bool(names))) for path in pages]
     if rows:
         rows.append(("all pages", tuple(map(sum, zip(*(row for _, row in rows), strict=True)))))
-    rows += [
-        (name, report(name, text, bool(names))) for name, text in others.items() if not names or name in names
-    ]
+    rows += [(name, report(name, text, bool(names))) for name, text in others.items() if not names or name in names]
     for name, (words, count, long, what, banned, address) in rows:
         print(f"{name:32}{words:7}{count:11}{long:6}{what:6}{banned:8}{address:9}")
 

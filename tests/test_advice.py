@@ -104,9 +104,7 @@ ADVICE: list[tuple[Callable[[], Any], str, list[Callable[[], Any]]]] = [
             lambda: require_excitation(
                 system(
                     forces=[
-                        sb.ExternalForce(
-                            location=0.5, history=sb.HarmonicForce(amplitude=1e-3, frequency_ratio=0.9)
-                        )
+                        sb.ExternalForce(location=0.5, history=sb.HarmonicForce(amplitude=1e-3, frequency_ratio=0.9))
                     ]
                 )
             ),
@@ -138,8 +136,7 @@ def test_advice_is_accepted(number: int) -> None:
 def test_stable_manifold_under_the_laws_that_are_advised(law: sb.ContactLaw) -> None:
     saddle = sb.dynamics.periodic_orbit(system((NEWTON, SHAKER)), [0.0, 0.0])
     with pytest.raises(
-        sb.InputError,
-        match=r"no inverse .* use type = 'hertz', or 'hunt_crossley' with restitution and speed",
+        sb.InputError, match=r"no inverse .* use type = 'hertz', or 'hunt_crossley' with restitution and speed"
     ):
         sb.dynamics.invariant_manifold(saddle, "stable", max_arclength=0.3)
     saddle = sb.dynamics.periodic_orbit(system((law, SHAKER)), [0.0, 0.0])

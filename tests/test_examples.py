@@ -8,13 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pytest
 
-DEAR = {
-    "ex23_extended_models",
-    "ex24_dynamics",
-    "ex25_design",
-    "ex27_bifurcation_curves",
-    "ex30_experiment",
-}
+DEAR = {"ex23_extended_models", "ex24_dynamics", "ex25_design", "ex27_bifurcation_curves", "ex30_experiment"}
 """Examples that take seconds."""
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("ex*.py"))
 
@@ -24,11 +18,7 @@ def test_there_are_examples():
 
 
 @pytest.mark.parametrize(
-    "path",
-    [
-        pytest.param(path, marks=pytest.mark.slow if path.stem in DEAR else (), id=path.stem)
-        for path in EXAMPLES
-    ],
+    "path", [pytest.param(path, marks=pytest.mark.slow if path.stem in DEAR else (), id=path.stem) for path in EXAMPLES]
 )
 def test_example(path, capsys):
     runpy.run_path(str(path))

@@ -10,27 +10,13 @@ import pytest
 
 import snapbeam
 
-HEAVY = (
-    "matplotlib",
-    "dask",
-    "distributed",
-    "cv2",
-    "av",
-    "pandas",
-    "zarr",
-    "typer",
-    "rich",
-    "pydantic",
-    "xarray",
-)
+HEAVY = ("matplotlib", "dask", "distributed", "cv2", "av", "pandas", "zarr", "typer", "rich", "pydantic", "xarray")
 
 
 @pytest.mark.parametrize("module", ["snapbeam", "snapbeam.cli"])
 def test_import_is_light(module):
     script = f"import sys, {module}; print(*[m for m in {HEAVY!r} if m in sys.modules])"
-    loaded = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    ).stdout.split()
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     allowed = {"typer", "rich"} if module == "snapbeam.cli" else set()
     assert set(loaded) <= allowed
 

@@ -93,9 +93,7 @@ def test_tests_of_a_part_are_in_its_folder() -> None:
     found = {}
     for file in sorted(TESTS.rglob("*.py")):
         folder = file.relative_to(TESTS).parts[0]
-        parts = {name.split(".")[1] for name in imported(parsed(file), "tests") if NAMED.match(name)} - {
-            folder
-        }
+        parts = {name.split(".")[1] for name in imported(parsed(file), "tests") if NAMED.match(name)} - {folder}
         if parts:
             found[str(file.relative_to(TESTS))] = parts
     assert found == {}
@@ -156,9 +154,7 @@ def test_works_without_a_part(tmp_path: Path, part: str) -> None:
 def test_works_without_each_part(tmp_path: Path, part: str) -> None:
     copy = without(part, tmp_path)
     works_without(part, copy)
-    collected = in_copy(
-        copy, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--collect-only", "tests"
-    )
+    collected = in_copy(copy, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "--collect-only", "tests")
     assert re.search(r"\d{3,} tests collected", collected)
     in_copy(
         copy, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow", "tests/test_import.py",

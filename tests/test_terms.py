@@ -158,9 +158,7 @@ def test_fields_and_attributes(name: str) -> None:
     if dataclasses.is_dataclass(kind):
         members |= {field.name for field in dataclasses.fields(kind)}
     members |= set(
-        typing.get_type_hints(kind)
-        if isinstance(kind, types.GenericAlias)
-        else getattr(kind, "__annotations__", {})
+        typing.get_type_hints(kind) if isinstance(kind, types.GenericAlias) else getattr(kind, "__annotations__", {})
     )
     assert MEMBERS[name] & members == set()
 
@@ -173,9 +171,7 @@ def test_arguments(name: str) -> None:
 
 
 def test_statuses_and_levels() -> None:
-    assert {"DECIDED", "RUNNING", "NOT_FINITE", "UNBALANCED", "INFERRED"} & set(
-        sb.RunStatus.__members__
-    ) == set()
+    assert {"DECIDED", "RUNNING", "NOT_FINITE", "UNBALANCED", "INFERRED"} & set(sb.RunStatus.__members__) == set()
     assert sb.Integration().accuracy == "standard"
 
 
@@ -235,15 +231,11 @@ def test_docstrings_begin_with_a_noun_or_an_imperative(docstrings: list[tuple[st
 
 def test_docstrings(docstrings: list[tuple[str, str]]) -> None:
     assert [
-        place
-        for place, text in docstrings
-        if WORDS.search(prose.plain(text)) or prose.BANNED.search(prose.plain(text))
+        place for place, text in docstrings if WORDS.search(prose.plain(text)) or prose.BANNED.search(prose.plain(text))
     ] == []
 
 
-@pytest.mark.parametrize(
-    "texts", [prose.help_texts, prose.headings, prose.labels], ids=lambda each: each.__name__
-)
+@pytest.mark.parametrize("texts", [prose.help_texts, prose.headings, prose.labels], ids=lambda each: each.__name__)
 def test_printed_texts(texts: Callable[[], Iterator[tuple[str, str]]]) -> None:
     """Help of the command line, headings of tables, labels of figures and variables."""
     printed = list(texts())

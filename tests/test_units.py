@@ -47,9 +47,7 @@ def test_parser_takes(text: str) -> None:
     assert is_unit(text)
 
 
-@pytest.mark.parametrize(
-    "text", ["", "b", "b omega_1", "m^0.5", "m//s", "%", "cycles", "/s", "m^", "N/m^1.5", "m s/"]
-)
+@pytest.mark.parametrize("text", ["", "b", "b omega_1", "m^0.5", "m//s", "%", "cycles", "/s", "m^", "N/m^1.5", "m s/"])
 def test_parser_refuses(text: str) -> None:
     assert not is_unit(text)
 
@@ -98,10 +96,7 @@ def test_a_run_of_several_strikers(tmp_path) -> None:
     run = sb.simulate(
         sb.System(
             model,
-            contacts=[
-                sb.Contact(default_values.CONTACT, SYSTEM.striker),
-                sb.Contact(default_values.CONTACT, stop),
-            ],
+            contacts=[sb.Contact(default_values.CONTACT, SYSTEM.striker), sb.Contact(default_values.CONTACT, stop)],
         ),
         ASKED,
     )
@@ -115,10 +110,7 @@ def test_a_run_of_several_strikers(tmp_path) -> None:
 AXES = {
     "structure and run": {"beam.buckling_level": [3e-4, 3.5e-4], "frequency_ratio": [1.0, 1.2]},
     "contact": {"contact.stiffness": [1e8, 4e8], "contact.gap": [0.0, 1e-5]},
-    "initial_state": {
-        "initial_state.amplitude[1]": [-1.0, 1.0],
-        "initial_state.striker_position": [-4e-4, -3.5e-4],
-    },
+    "initial_state": {"initial_state.amplitude[1]": [-1.0, 1.0], "initial_state.striker_position": [-4e-4, -3.5e-4]},
     "words": {"contact.side": ["below", "above"], "integration.cycles": [2, 3]},
 }
 
@@ -135,9 +127,7 @@ def test_maps(name: str, tmp_path) -> None:
 def test_lists_and_thresholds() -> None:
     points = xr.Dataset({"beam_thickness": ("point", [4e-4, 4.1e-4]), "location": ("point", [0.4, 0.5])})
     check(sb.sweep(SYSTEM, points, ASKED))
-    check(
-        sb.threshold(SYSTEM, "velocity_amplitude", np.linspace(0.1, 0.6, 6), {"location": [0.4, 0.5]}, ASKED)
-    )
+    check(sb.threshold(SYSTEM, "velocity_amplitude", np.linspace(0.1, 0.6, 6), {"location": [0.4, 0.5]}, ASKED))
     check(sb.sweep(SYSTEM, {"frequency_ratio": [1.0, 1.1, 1.3]}, ASKED, refine_levels=1))
 
 

@@ -53,11 +53,6 @@ def _prepare(method: int, weight: float, case: Case, tolerance: float) -> Solver
 
 _LEVELS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10)
 METHODS = tuple(
-    Method(
-        f"Boost.odeint {name}",
-        _LEVELS,
-        partial(_prepare, number, 10.0),
-        f"Boost {_VERSION}, -O3 -march=native",
-    )
+    Method(f"Boost.odeint {name}", _LEVELS, partial(_prepare, number, 10.0), f"Boost {_VERSION}, -O3 -march=native")
     for number, name in enumerate(("dopri5", "fehlberg78", "Bulirsch-Stoer"))
 )

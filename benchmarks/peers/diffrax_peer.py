@@ -111,9 +111,7 @@ def _prepare_many(kind: Any, weight: float, cases: list[Case], tolerance: float)
             adjoint=diffrax.ForwardMode(),
         ).ys  # fmt: skip
 
-    amplitudes, drives = (
-        jnp.asarray([getattr(each, name) for each in every]) for name in ("amplitude", "drive")
-    )
+    amplitudes, drives = (jnp.asarray([getattr(each, name) for each in every]) for name in ("amplitude", "drive"))
     sampled = jax.jit(jax.vmap(lambda times, a, w: solve(times[-1], times, a, w)))
     last = jax.jit(jax.vmap(lambda end, a, w: solve(end, None, a, w)))
     read_out = e.read_out[order]

@@ -60,9 +60,7 @@ class Program:
             *(each.ctypes.data for each in self._arrays), structure.nonlinear_stiffness, CONTACT.stiffness
         )
         self.modes, self.scale = case.modes, case.model.length_scale
-        self.runs = [
-            _Run(0.0, equations_of(each).amplitude, equations_of(each).drive, each.period) for each in cases
-        ]
+        self.runs = [_Run(0.0, equations_of(each).amplitude, equations_of(each).drive, each.period) for each in cases]
         self.steps = [_INSTANTS * math.ceil(each.period / (_INSTANTS * step)) for each in cases]
 
     def sample(self, i: int, cycles: int) -> _Array:

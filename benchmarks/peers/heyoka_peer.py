@@ -60,9 +60,7 @@ def _prepare(case: Case, tolerance: float) -> Solver:
         direction = hy.event_direction.negative if touching else hy.event_direction.positive
         event = hy.t_event(gap, direction=direction)
         phases.append(
-            hy.taylor_adaptive(
-                equations, np.zeros(2 * count), tol=tolerance, t_events=[event], compact_mode=True
-            )
+            hy.taylor_adaptive(equations, np.zeros(2 * count), tol=tolerance, t_events=[event], compact_mode=True)
         )
 
     def integrate(times: _Array | None, end: float) -> _Array | None:

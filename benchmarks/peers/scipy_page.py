@@ -80,9 +80,7 @@ def page(dataset: xr.Dataset, modes: int, cycles: int) -> Any:
     tap = hv.streams.CircuitIncrement(source=image, x=None, y=None)
 
     def run(x: float | None, y: float | None) -> Any:
-        found = (
-            ([], []) if x is None or y is None else waveform(Case(modes, _near(xs, x), _near(ys, y)), cycles)
-        )
+        found = ([], []) if x is None or y is None else waveform(Case(modes, _near(xs, x), _near(ys, y)), cycles)
         return hv.Curve(found, "cycle", "displacement (b)")
 
     xs, ys = x, y
@@ -90,8 +88,7 @@ def page(dataset: xr.Dataset, modes: int, cycles: int) -> Any:
         hv.opts.Curve(width=620, height=420, framewise=True, hooks=[_named("run", "waveform")])
     )
     return pn.Row(
-        image.opts(width=560, height=420, tools=["tap"], cmap="viridis", hooks=[_named("map", "map-base")]),
-        shown,
+        image.opts(width=560, height=420, tools=["tap"], cmap="viridis", hooks=[_named("map", "map-base")]), shown
     )
 
 
@@ -112,9 +109,7 @@ def main() -> None:
     file, modes, cycles = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     dataset = xr.load_dataset(file, engine="h5netcdf")
     waveform(Case(modes, 1.2, 0.1), 1)  # the compile aside
-    server = pn.serve(
-        lambda: page(dataset, modes, cycles), port=0, address="127.0.0.1", show=False, start=False
-    )
+    server = pn.serve(lambda: page(dataset, modes, cycles), port=0, address="127.0.0.1", show=False, start=False)
     server.start()
     print(f"Page at http://127.0.0.1:{server.port}/", flush=True)
     server.io_loop.start()

@@ -35,9 +35,7 @@ def save(picture: Image.Image, target: Path) -> None:
     """Save a picture as a small PNG file: at most 1,400 pixels wide, with a palette."""
     picture = picture.convert("RGB")
     if picture.width > 1400:
-        picture = picture.resize(
-            (1400, round(picture.height * 1400 / picture.width)), Image.Resampling.LANCZOS
-        )
+        picture = picture.resize((1400, round(picture.height * 1400 / picture.width)), Image.Resampling.LANCZOS)
     picture.quantize(colors=128, dither=Image.Dither.NONE).save(target, optimize=True)
 
 
@@ -114,9 +112,7 @@ def draw_potential(images: Path) -> None:
         def turning(level: float) -> float:
             return float(w[w > 1.0][np.argmax(energy(w[w > 1.0]) >= level)])
 
-        axes.annotate(
-            "", (0.0, barrier), (0.0, 0.0), arrowprops={"arrowstyle": "<->", "shrinkA": 0, "shrinkB": 0}
-        )
+        axes.annotate("", (0.0, barrier), (0.0, 0.0), arrowprops={"arrowstyle": "<->", "shrinkA": 0, "shrinkB": 0})
         axes.text(0.04, 0.1 * barrier, "barrier")
         axes.plot([-1.0, 1.0], [0.0, 0.0], "ko", ms=4)
         axes.plot([0.0], [barrier], "ko", mfc="white", ms=4)
@@ -128,33 +124,19 @@ def draw_potential(images: Path) -> None:
         inner = float(w[(w > -1.0) & (w < 0.0)][np.argmax(energy(w[(w > -1.0) & (w < 0.0)]) >= level)])
         arrow = {"arrowstyle": "<->", "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
         axes.annotate(
-            "",
-            (-left, level),
-            (inner, level),
-            arrowprops=arrow | {"color": CLASS_COLORS[ResponseClass.INTRAWELL]},
+            "", (-left, level), (inner, level), arrowprops=arrow | {"color": CLASS_COLORS[ResponseClass.INTRAWELL]}
         )
-        axes.text(
-            -1.0,
-            level + 0.08 * barrier,
-            "intrawell",
-            ha="center",
-            color=CLASS_COLORS[ResponseClass.INTRAWELL],
-        )
+        axes.text(-1.0, level + 0.08 * barrier, "intrawell", ha="center", color=CLASS_COLORS[ResponseClass.INTRAWELL])
         level = 1.75 * barrier
         green = "#6F8A2F"  # the class colour, dark enough for type
-        axes.annotate(
-            "", (-turning(level), level), (turning(level), level), arrowprops=arrow | {"color": green}
-        )
+        axes.annotate("", (-turning(level), level), (turning(level), level), arrowprops=arrow | {"color": green})
         axes.text(0.0, level + 0.08 * barrier, "continuous interwell", ha="center", color=green)
         blue = CLASS_COLORS[ResponseClass.TRANSIENT_2]
         over = np.linspace(-0.95, 0.9, 60)
         height = barrier * (0.25 + 1.1 * (1.0 - (over / 0.95) ** 2))
         axes.plot(over, height, color=blue, lw=1.6)
         axes.annotate(
-            "",
-            (over[-1], height[-1]),
-            (over[-3], height[-3]),
-            arrowprops=arrow | {"arrowstyle": "->", "color": blue},
+            "", (over[-1], height[-1]), (over[-3], height[-3]), arrowprops=arrow | {"arrowstyle": "->", "color": blue}
         )
         axes.text(0.5, 1.18 * barrier, "transient interwell 2", color="#2F7FB5", va="center")
         axes.set_xlabel("Displacement at mid-span $w/b$")
@@ -175,12 +157,8 @@ def draw_systems(images: Path) -> None:
     burst = sb.Burst(
         frequency_ratio=1.2, velocity_amplitude=0.2, duration_cycles=5, ramp_up_cycles=2, ramp_down_cycles=1, retraction=0.4
     )  # fmt: skip
-    body = sb.Striker(
-        drive=burst, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=0.1 * level
-    )
-    sphere = sb.Striker(
-        drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=0.5 * level, side="above", location=0.5
-    )
+    body = sb.Striker(drive=burst, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=0.1 * level)
+    sphere = sb.Striker(drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=0.5 * level, side="above", location=0.5)
     several = [
         sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.18) + burst, location=0.3),
         sb.Striker(drive=sb.Sine(frequency_ratio=0.9, velocity_amplitude=0.12), side="above", location=0.7, gap=0.3 * level),

@@ -86,13 +86,7 @@ def displayed(lines: list[str]) -> list[tuple[int, int]]:
         line = lines[at]
         before = next((each for each in reversed(lines[:at]) if each.strip()), "")
         alone = at > 0 and not lines[at - 1].strip() and _depth(line) >= 4 and _depth(line) > _depth(before)
-        if (
-            line.strip()
-            and alone
-            and " = " in line
-            and ">>>" not in line
-            and not before.rstrip().endswith("::")
-        ):
+        if line.strip() and alone and " = " in line and ">>>" not in line and not before.rstrip().endswith("::"):
             end = at
             while end < len(lines) and lines[end].strip():
                 end += 1

@@ -80,9 +80,7 @@ def parameter_tables() -> str:
     types = {
         "contact": LAWS,
         "drive": {name: kind for name, kind in DRIVES.items() if name != "sum"},
-        "base_excitation": {
-            name: kind for name, kind in DRIVES.items() if name != "sum" and kind.can_excite_base()
-        },
+        "base_excitation": {name: kind for name, kind in DRIVES.items() if name != "sum" and kind.can_excite_base()},
         "axial_load": LOADS,
         "force": {**FORCES, **LOCAL_FORCES},
         "harvester": HARVESTERS,
@@ -106,9 +104,7 @@ def parameter_tables() -> str:
             key = name.partition(".")[2]
             meaning = row.quantity.long_name + (f", {symbol}" if symbol else "")
             meaning += f"; in datasets `{row.short}`" if row.short != key else ""
-            owners = ", ".join(
-                f"`{each}`" for each, kind in types.get(section, {}).items() if key in _keys(kind)
-            )
+            owners = ", ".join(f"`{each}`" for each, kind in types.get(section, {}).items() if key in _keys(kind))
             level = "run" if row.is_run else "model"
             rows.append((f"`{key}`", meaning, unit, limits, shown or "–", level, owners))
         keys = [row[0] for row in rows]
@@ -210,21 +206,15 @@ def command_line() -> str:
     from snapbeam.cli.app import app
 
     group: Any = typer.main.get_command(app)
-    commands = [
-        each for name, command in group.commands.items() for each in _commands(f"snapbeam {name}", command, 2)
-    ]
+    commands = [each for name, command in group.commands.items() for each in _commands(f"snapbeam {name}", command, 2)]
     counts = Counter(row for _, command, _ in commands for row in _options(command))
     common: dict[str, list[tuple[str, str, str]]] = {}
     for row, count in counts.items():
         if count >= _COMMON:
             common.setdefault(row[0], []).append(row)
-    parts = [
-        "## Common options\n\nBelow each command, a line names the groups of these options that it has.\n"
-    ]
+    parts = ["## Common options\n\nBelow each command, a line names the groups of these options that it has.\n"]
     for panel, rows in common.items():
-        parts.append(
-            f"### {panel.partition(' (')[0]}\n\n" + _table(("option", "meaning"), [row[1:] for row in rows])
-        )
+        parts.append(f"### {panel.partition(' (')[0]}\n\n" + _table(("option", "meaning"), [row[1:] for row in rows]))
     return "\n".join([*parts, *(part for each in commands for part in _command(*each, common))])
 
 
@@ -257,9 +247,7 @@ def _options(command: Any) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _command(
-    title: str, command: Any, level: int, common: Mapping[str, list[tuple[str, str, str]]]
-) -> list[str]:
+def _command(title: str, command: Any, level: int, common: Mapping[str, list[tuple[str, str, str]]]) -> list[str]:
     """Return the help of a command, a table of its own options, and the groups of its common options."""
     words = "\n\n".join(_paragraphs(command.help or ""))
     parts = [f"{'#' * level} {title}\n\n{words}\n"]
@@ -309,11 +297,7 @@ def interface_tables() -> str:
                 listed = [each.strip() for each in members.split(",") if each.strip()] if module else []
                 found += listed or (import_module(name).__all__ if module else [name.rpartition(".")[2]])
             if found:
-                anchor = (
-                    ""
-                    if heading == title
-                    else "#" + re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
-                )
+                anchor = "" if heading == title else "#" + re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
                 rows.append((f"[{heading}](api_{page}.md{anchor})", _listed(found)))
     tree = "\n".join(f"api_{page}" for page in _INTERFACE)
     return _table(("page", "names"), rows) + f"\n```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{tree}\n```"
@@ -437,9 +421,7 @@ def _parts() -> dict[str, Any]:
     def several(ratio: float, contact: Any = hertz) -> Any:
         other = sb.Sine(frequency_ratio=ratio, velocity_amplitude=0.1)
         above = sb.Striker(drive=other, location=0.3, side="above", gap=5e-5)
-        return sb.System(
-            model, contacts=[sb.Contact(contact, sb.Striker(drive=sine)), sb.Contact(hertz, above)]
-        )
+        return sb.System(model, contacts=[sb.Contact(contact, sb.Striker(drive=sine)), sb.Contact(hertz, above)])
 
     def based(motion: Any) -> Any:
         return struck(stop, gap=5e-5, base_excitation=sb.BaseExcitation(motion=motion))
@@ -451,17 +433,12 @@ def _parts() -> dict[str, Any]:
     )  # fmt: skip
     burst = sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.1, duration_cycles=9.0)
     noise = sb.BandLimitedNoise(low_ratio=0.8, high_ratio=1.4, velocity_rms=0.1, seed=1)
-    ends = beam.replace(
-        boundary=sb.BoundaryConditions(left_rotational_stiffness=50.0, right_rotational_stiffness=50.0)
-    )
+    ends = beam.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=50.0, right_rotational_stiffness=50.0))
     uneven = sb.ReducedModel.from_beam(beam, modes=2, imperfection=sb.Imperfection(midspan_amplitude=1e-6))
     piezo = sb.PiezoelectricHarvester(
         moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.05, patch_end=0.4
     )
-    spring, drag = (
-        sb.LocalSpring(stiffness=10.0, location=0.4),
-        sb.QuadraticDamping(coefficient=0.1, location=0.4),
-    )
+    spring, drag = (sb.LocalSpring(stiffness=10.0, location=0.4), sb.QuadraticDamping(coefficient=0.1, location=0.4))
     return {
         "the paper's": struck(),
         "a gap": struck(gap=5e-5),
@@ -585,7 +562,9 @@ def _refused_systems() -> dict[str, Any]:
     }
 
 
-MARK = "<!-- From here on the text is written by `python docs/_ext/reference.py`; a test compares it with the program. -->"
+MARK = (
+    "<!-- From here on the text is written by `python docs/_ext/reference.py`; a test compares it with the program. -->"
+)
 
 
 def pages() -> dict[str, Any]:

@@ -36,9 +36,7 @@ def library() -> Any:
     include = ["-I", os.environ["BOOST_INCLUDE"]] if "BOOST_INCLUDE" in os.environ else []
     flags = ["-O3", "-march=native", "-ffast-math", "-std=c++17", "-shared", "-fPIC"]
     source = str(Path(__file__).with_name("boost.cpp"))
-    done = subprocess.run(
-        [compiler, *flags, *include, source, "-o", str(target)], capture_output=True, text=True
-    )
+    done = subprocess.run([compiler, *flags, *include, source, "-o", str(target)], capture_output=True, text=True)
     if done.returncode:
         raise ImportError(f"Boost.odeint does not compile: {done.stderr.strip().splitlines()[0]}")
     loaded = ctypes.CDLL(str(target))
@@ -86,9 +84,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         return solve
     longest = ctypes.c_double(1.0 / max([case.frequency, *[tip.frequency for tip in case.tips], 0.5]))
 
-    def segment(
-        states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array
-    ) -> Segment:
+    def segment(states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array) -> Segment:
         set_states(case, p, states, pulse)
         state, at, reached = np.array(u, dtype=float), ctypes.c_double(t), ctypes.c_int(0)
         out, wanted = np.empty((times.size, u.size)), np.ascontiguousarray(times)
@@ -99,8 +95,6 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         )  # fmt: skip
         if hit == -2:
             raise CannotRun("the integration failed")
-        return Segment(
-            at.value, state, out[: reached.value, :n] @ case.output, hit, loaded.counted() - before
-        )
+        return Segment(at.value, state, out[: reached.value, :n] @ case.output, hit, loaded.counted() - before)
 
     return lambda: drive(case, segment)

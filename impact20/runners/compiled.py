@@ -54,13 +54,7 @@ def rhs(t, u, du, p):  # type: ignore[no-untyped-def]
                 if state == 1.0 or d > 0.0:
                     f = p[place + 2] * d + p[place + 5] * rate
             elif d > 0.0:
-                f = (
-                    d
-                    if p[place + 3] == 1.0
-                    else d * math.sqrt(d)
-                    if p[place + 3] == 1.5
-                    else d ** p[place + 3]
-                )
+                f = d if p[place + 3] == 1.0 else d * math.sqrt(d) if p[place + 3] == 1.5 else d ** p[place + 3]
                 f *= p[place + 2] * (1.0 + p[place + 4] * rate)
             if state == 2.0 and f < 0.0:
                 f = 0.0

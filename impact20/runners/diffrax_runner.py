@@ -93,9 +93,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
     if not setting["events"]:
         jumps = [case.pulse_duration] if case.pulse is not None else None
         inner = diffrax.PIDController(rtol=tolerance, atol=tolerance * 1e-1)
-        controller = (
-            inner if jumps is None else diffrax.ClipStepSizeController(inner, jump_ts=jnp.asarray(jumps))
-        )
+        controller = inner if jumps is None else diffrax.ClipStepSizeController(inner, jump_ts=jnp.asarray(jumps))
         times = jnp.asarray(np.concatenate((case.times, [])))
 
         @jax.jit
@@ -135,16 +133,9 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
             term, method, t, end, 1e-4, u, saveat=both(times), max_steps=None,
             stepsize_controller=restart, event=event, adjoint=diffrax.ForwardMode(),
         )  # fmt: skip
-        return (
-            found.ts[1][0],
-            found.ys[0],
-            found.ys[1][0],
-            found.event_mask,
-        )
+        return (found.ts[1][0], found.ys[0], found.ys[1][0], found.event_mask)
 
-    def segment(
-        states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array
-    ) -> Segment:
+    def segment(states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array) -> Segment:
         del states, pulse
         wanted = np.clip(case.times, t, end)
         at, found, last, hits = flight(t, jnp.asarray(u), end, jnp.asarray(wanted))

@@ -25,9 +25,7 @@ def settings(case: Case) -> list[dict[str, Any]]:
 
 
 def _dot(weights: Array, terms: list[Any]) -> Any:
-    return hy.sum(
-        [float(w) * x for w, x in zip(weights, terms, strict=True) if w != 0.0] or [hy.expression(0.0)]
-    )
+    return hy.sum([float(w) * x for w, x in zip(weights, terms, strict=True) if w != 0.0] or [hy.expression(0.0)])
 
 
 def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
@@ -35,9 +33,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
     n, tolerance = len(case.stiffness), setting["tolerance"]
     singular = any(tip.law in ("power", "hunt_crossley") and tip.exponent % 1 for tip in case.tips)
     # Force left out at the edge: stiffness edge^1.5.
-    edge = (
-        1e-2 * case.scale * (tolerance / max(tip.stiffness for tip in case.tips)) ** 0.5 if singular else 0.0
-    )
+    edge = 1e-2 * case.scale * (tolerance / max(tip.stiffness for tip in case.tips)) ** 0.5 if singular else 0.0
     x, v = ([hy.make_vars(f"{name}{i}") for i in range(n)] for name in "xv")
     z = hy.make_vars("z")
     made: dict[tuple[tuple[int, ...], bool], Any] = {}
@@ -91,18 +87,14 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
                         f = f * (1.0 + tip.factor * rate)
                 add(tip.row, f)
             events.append(hy.t_event(ends, direction=hy.event_direction.negative))
-        equations = [(a, b + 0.0) for a, b in zip(x, v, strict=True)] + list(
-            zip(v, accelerations, strict=True)
-        )
+        equations = [(a, b + 0.0) for a, b in zip(x, v, strict=True)] + list(zip(v, accelerations, strict=True))
         if case.circuit is not None:
             equations.append((z, case.circuit[0] * v[0] - case.circuit[1] * z))
         return hy.taylor_adaptive(
             equations, np.zeros(len(equations)), tol=tolerance, t_events=events, compact_mode=n > 4
         )
 
-    def segment(
-        states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array
-    ) -> Segment:
+    def segment(states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array) -> Segment:
         if (states, pulse) not in made:
             made[states, pulse] = build(states, pulse)
         integrator = made[states, pulse]

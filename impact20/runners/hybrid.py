@@ -44,19 +44,12 @@ def approach(case: Case, j: int, t: float, u: Array) -> tuple[float, float]:
 
 def _reaction(case: Case, t: float) -> tuple[float, Array]:
     """Acceleration that presses a single mass which stands on the tip of its only contact, and its state."""
-    if (
-        len(case.stiffness) != 1
-        or case.coupling is not None
-        or case.circuit is not None
-        or case.truss is not None
-    ):
+    if len(case.stiffness) != 1 or case.coupling is not None or case.circuit is not None or case.truss is not None:
         raise CannotRun("sustained contact of several or nonlinear coordinates is left out")
     tip = case.tips[0]
     row = tip.row[0]
     angle = tip.frequency * t + tip.phase
-    u = np.array(
-        [(tip.amplitude * sin(angle) - tip.gap) / row, tip.amplitude * tip.frequency * cos(angle) / row]
-    )
+    u = np.array([(tip.amplitude * sin(angle) - tip.gap) / row, tip.amplitude * tip.frequency * cos(angle) / row])
     force = -case.stiffness[0] * u[0] - case.damping[0] * u[1]
     if case.load is not None:
         force += case.load[0]

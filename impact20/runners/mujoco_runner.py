@@ -38,12 +38,7 @@ def _damping(e: float) -> float:
 
 def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
     """A solve of the case."""
-    if (
-        len(case.stiffness) > 1
-        or case.coupling is not None
-        or case.truss is not None
-        or case.circuit is not None
-    ):
+    if len(case.stiffness) > 1 or case.coupling is not None or case.truss is not None or case.circuit is not None:
         raise CannotRun("modal, cubic and circuit terms are no rigid bodies")
     if case.stiffness[0] < 0 or case.pulse is not None:
         raise CannotRun("only passive springs and steady forces")
@@ -76,9 +71,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         while at < case.samples:
             data.qfrc_applied[0] = steady
             if case.harmonic is not None:
-                data.qfrc_applied[0] += case.harmonic[0] * sin(
-                    case.frequency * (count + 0.5) * h + case.phase
-                )
+                data.qfrc_applied[0] += case.harmonic[0] * sin(case.frequency * (count + 0.5) * h + case.phase)
             before, speed = data.qpos[0], data.qvel[0]
             mujoco.mj_step(model, data)
             count += 1
@@ -88,17 +81,11 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
                 q = s - 1
                 x, v = data.qpos[0], data.qvel[0]
                 values[at] = case.output[0] * (
-                    (1 + 2 * s) * q * q * before
-                    + s * q * q * h * speed
-                    + s * s * (3 - 2 * s) * x
-                    + s * s * q * h * v
+                    (1 + 2 * s) * q * q * before + s * q * q * h * speed + s * s * (3 - 2 * s) * x + s * s * q * h * v
                 )
                 at += 1
         return Result(
-            values,
-            None,
-            count * (4 if setting["method"] == "RK4" else 1),
-            np.concatenate((data.qpos, data.qvel)),
+            values, None, count * (4 if setting["method"] == "RK4" else 1), np.concatenate((data.qpos, data.qvel))
         )
 
     return solve

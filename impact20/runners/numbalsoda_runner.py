@@ -49,13 +49,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
 
     def solve() -> Result:
         states, success = method(
-            function.address,
-            start,
-            times,
-            p,
-            rtol=setting["tolerance"],
-            atol=setting["tolerance"] * 1e-1,
-            mxstep=10**8,
+            function.address, start, times, p, rtol=setting["tolerance"], atol=setting["tolerance"] * 1e-1, mxstep=10**8
         )
         if not success:
             raise CannotRun("the integration failed")

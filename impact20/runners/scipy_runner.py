@@ -59,13 +59,9 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
     # A step is no longer than a sixth of the drive's radian, or events in pairs are jumped over.
     longest = 1.0 / max([case.frequency, *[tip.frequency for tip in case.tips], 0.5])
 
-    def segment(
-        states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array
-    ) -> Segment:
+    def segment(states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array) -> Segment:
         set_states(case, p, states, pulse)
-        run = solve_ivp(
-            slope, (t, end), u, events=watching, dense_output=times.size > 0, max_step=longest, **options
-        )
+        run = solve_ivp(slope, (t, end), u, events=watching, dense_output=times.size > 0, max_step=longest, **options)
         reached = times[times <= run.t[-1]]
         passed = case.output @ run.sol(reached)[:n] if reached.size else np.empty(0)
         hit = [j for j in range(len(watching)) if run.status == 1 and len(run.t_events[j])]

@@ -59,9 +59,7 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
         return solve
     watching = CVODE(slope, eventsfn=events, num_events=count, max_step=longest, **options)
 
-    def segment(
-        states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array
-    ) -> Segment:
+    def segment(states: tuple[int, ...], pulse: bool, t: float, u: Array, end: float, times: Array) -> Segment:
         set_states(case, p, states, pulse)
         before = calls[0]
         asked = times[times > t]

@@ -61,9 +61,7 @@ def test_a_part_runs(part, tmp_path):
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / f"{part}.json").stat().st_size > 500 and "| " in (tmp_path / f"{part}.inc").read_text(
-        "utf-8"
-    )
+    assert (tmp_path / f"{part}.json").stat().st_size > 500 and "| " in (tmp_path / f"{part}.inc").read_text("utf-8")
 
 
 @pytest.mark.slow

@@ -334,12 +334,7 @@ class Solution:
         found: list[Array] = []
         pieces, ends = (
             0,
-            [
-                limit(local, sign)
-                for local in self.parts.local
-                for sign in (1.0, -1.0)
-                if local.reach < math.inf
-            ],
+            [limit(local, sign) for local in self.parts.local for sign in (1.0, -1.0) if local.reach < math.inf],
         )
         while t < last:
             until = min([at for at in self.parts.breaks if at > t * (1.0 + 1e-12)] + [last])

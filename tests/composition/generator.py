@@ -221,9 +221,9 @@ def chirp(first: float, last: float, speed: float, length: float, log: bool) -> 
 
 def noise(seed: int, low: float, high: float, rms: float, rise: float) -> Motion:
     """32 sines of equal velocity amplitude, one in each part of the band, under a rise."""
-    x = (
-        seed * 2654435769 + np.arange(64, dtype=np.uint64) * np.uint64(2246822519) + np.uint64(374761393)
-    ) % np.uint64(2**32)
+    x = (seed * 2654435769 + np.arange(64, dtype=np.uint64) * np.uint64(2246822519) + np.uint64(374761393)) % np.uint64(
+        2**32
+    )
     for shift, factor in ((16, 2146121005), (15, 2221713035)):
         x = ((x ^ (x >> np.uint64(shift))) * np.uint64(factor)) % np.uint64(2**32)
     shares = (x ^ (x >> np.uint64(16))) / 2.0**32
@@ -233,8 +233,7 @@ def noise(seed: int, low: float, high: float, rms: float, rise: float) -> Motion
     def motion(t: float) -> tuple[float, float, float]:
         angles, s = rates * t + phases, min(t / rise, 1.0)
         w, v, a = (
-            speed * float(np.sum(each))
-            for each in (np.sin(angles) / rates, np.cos(angles), -rates * np.sin(angles))
+            speed * float(np.sum(each)) for each in (np.sin(angles) / rates, np.cos(angles), -rates * np.sin(angles))
         )
         e, e1 = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * (s * (1.0 - s)) ** 2 / rise
         e2 = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / rise**2
@@ -255,14 +254,10 @@ def moving(kind: str, number: Numbers, side: float = 1.0) -> tuple[sb.Drive, Mot
         drive: sb.Drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity, phase=phase)
         return drive, sine(rate, reach, phase), []
     if kind == "displacement_sine":
-        drive = sb.DisplacementSine(
-            frequency_ratio=ratio, displacement_amplitude=velocity / ratio, phase=phase
-        )
+        drive = sb.DisplacementSine(frequency_ratio=ratio, displacement_amplitude=velocity / ratio, phase=phase)
         return drive, sine(rate, reach, phase), []
     if kind == "acceleration_sine":
-        drive = sb.AccelerationSine(
-            frequency_ratio=ratio, acceleration_amplitude=velocity * ratio, phase=phase
-        )
+        drive = sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=velocity * ratio, phase=phase)
         return drive, sine(rate, reach, phase), []
     if kind == "sine+sine":
         other, more = number(0.5, 3.0), number(0.01, 0.1)
@@ -287,11 +282,7 @@ def moving(kind: str, number: Numbers, side: float = 1.0) -> tuple[sb.Drive, Mot
     if kind == "noise":
         wide, ramp, seed = number(0.2, 1.5), number(0.3, 1.0), int(number(0.0, 2e9))
         drive = sb.BandLimitedNoise(
-            low_ratio=ratio,
-            high_ratio=ratio + wide,
-            velocity_rms=0.5 * velocity,
-            seed=seed,
-            ramp_up_cycles=ramp,
+            low_ratio=ratio, high_ratio=ratio + wide, velocity_rms=0.5 * velocity, seed=seed, ramp_up_cycles=ramp
         )
         rise = ramp * 4.0 * math.pi / ((2.0 * ratio + wide) * first)
         return drive, noise(seed, rate, rate + wide * first, 0.5 * speed, rise), [rise]

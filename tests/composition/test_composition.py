@@ -33,9 +33,7 @@ PHYSICAL = {
 """Refusals with a physical reason, or for data that are missing."""
 QUICK = (
     Features(2, (("hertz", "sine", False),), base="acceleration_sine", local=("local_spring",), uneven=True),
-    Features(
-        3, (("hunt_crossley", "burst", False), ("kelvin_voigt", "fixed", True)), local=("local_spring",)
-    ),
+    Features(3, (("hunt_crossley", "burst", False), ("kelvin_voigt", "fixed", True)), local=("local_spring",)),
     Features(2, (("power", "displacement_sine", True),), load="sine", circuits=("piezo", "coil")),
     Features(4, external=("harmonic_force",), local=("quadratic_damping", "magnetic_force"), started=True),
     Features(
@@ -124,10 +122,7 @@ def recorded(composition: Composition, run: sb.Run) -> Array:
 
 
 def checked(
-    seed: int,
-    features: Features | None = None,
-    levels: tuple[str, ...] = ("reference",),
-    engine: str = "native",
+    seed: int, features: Features | None = None, levels: tuple[str, ...] = ("reference",), engine: str = "native"
 ) -> Report:
     """Compare one system with the reference; failures are listed in the report."""
     report = Report(seed)
@@ -224,9 +219,7 @@ def check_voltages(
     several = len(composition.volts) > 1
     found = run.dataset["voltages"].values if several else run.dataset["voltage"].values[:, None]
     # of a beam at rest, or where nothing moves the circuit, the voltage is rounding
-    error = (np.abs(found[: len(expected)] - expected) / np.maximum(np.abs(expected).max(axis=0), QUIET)).max(
-        axis=1
-    )
+    error = (np.abs(found[: len(expected)] - expected) / np.maximum(np.abs(expected).max(axis=0), QUIET)).max(axis=1)
     # impacts change the velocity, which the voltage follows, within short times
     if within.any() and not float((error / amplified)[within].max()) < 100.0 * limit:
         report.failures.append(f"voltage: error {float(error[within].max()):.2e} of its greatest")
@@ -301,9 +294,7 @@ def pieces(composition: Composition, cycles: int) -> list[str]:
         if repeats and not np.array_equal(one, two, equal_nan=True):
             found.append(f"advanced in pieces: {name}")
     if not repeats and not np.abs(whole.amplitude - state.amplitude).max() < PIECES * scale:
-        found.append(
-            f"advanced in pieces: differs by {np.abs(whole.amplitude - state.amplitude).max() / scale:.2e}"
-        )
+        found.append(f"advanced in pieces: differs by {np.abs(whole.amplitude - state.amplitude).max() / scale:.2e}")
     return found
 
 
@@ -402,6 +393,4 @@ def judge(reports: list[Report]) -> None:
     if tested:
         print(f"compared up to {np.mean([each.compared for each in tested]):.0%} of the runs")
     wrong = {each.seed: each.failures for each in reports if each.failures}
-    assert not wrong, (
-        f"repeat with python tests/composition/generator.py {' '.join(map(str, wrong))}: {wrong}"
-    )
+    assert not wrong, f"repeat with python tests/composition/generator.py {' '.join(map(str, wrong))}: {wrong}"

@@ -71,9 +71,7 @@ def test_every_tool_finds_every_number(name: str) -> None:
     assert len(names) > 8
     for full in names:
         row, value = lookup(full), system.get(full)
-        spellings = {full, row.short} | (
-            {split_name(full)[1]} if tails.count(split_name(full)[1]) == 1 else set()
-        )
+        spellings = {full, row.short} | ({split_name(full)[1]} if tails.count(split_name(full)[1]) == 1 else set())
         for spelling in spellings:
             assert system.parameter(spelling).name == full, spelling
             if not full.startswith("initial_state"):
@@ -95,9 +93,7 @@ def test_every_number_can_be_uncertain_and_chosen(name: str) -> None:
         value = system.get(full)
         if value <= 0.0 or full.startswith("initial_state"):
             continue
-        uncertainty = sb.uncertainty.ParameterUncertainty(
-            of={full: sb.uncertainty.Normal(0.01, relative=True)}
-        )
+        uncertainty = sb.uncertainty.ParameterUncertainty(of={full: sb.uncertainty.Normal(0.01, relative=True)})
         trials = trials_of(system, uncertainty, sb.Integration(cycles=3))
         columns = trials.columns({}, np.arange(64))
         drawn = columns[ratio_of(full)] / system.get(ratio_of(full))
@@ -155,9 +151,7 @@ def test_every_command_takes_names_and_units(command, names, value, axis, harves
 
 def test_an_option_of_the_striker_is_that_of_the_base_without_one(harvester) -> None:
     """--frequency-hz of a shaken beam is the frequency of its base; an amplitude that it does not have is refused."""
-    result = CliRunner().invoke(
-        app, ["simulate", "--config", str(harvester), "--frequency-hz", "40", "--print-config"]
-    )
+    result = CliRunner().invoke(app, ["simulate", "--config", str(harvester), "--frequency-hz", "40", "--print-config"])
     assert result.exit_code == 0, result.output
     wanted = config_of("base and circuit").system.replace(**{"base_excitation.frequency_hz": 40.0})
     (harvester.parent / "printed.toml").write_text(result.output, encoding="utf-8")
@@ -191,9 +185,7 @@ def test_seeds_are_replicas() -> None:
     uncertainty = sb.uncertainty.ParameterUncertainty(of=seeds)
     trials = trials_of(system, uncertainty, sb.Integration(cycles=2))
     drawn = trials.columns({}, np.arange(20))["base_excitation.seed"]
-    assert (
-        drawn.dtype == np.int64 and len(set(drawn.tolist())) > 15 and 0 <= drawn.min() and drawn.max() < 1000
-    )
+    assert drawn.dtype == np.int64 and len(set(drawn.tolist())) > 15 and 0 <= drawn.min() and drawn.max() < 1000
     with pytest.raises(sb.InputError, match="UniformRange"):
         sb.uncertainty.ParameterUncertainty(of={"base_excitation.seed": sb.uncertainty.Normal(1.0)})
 

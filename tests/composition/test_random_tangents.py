@@ -50,9 +50,7 @@ def errors_of(seed: int, accuracy: str) -> list[tuple[str, float, float]]:
     begun = sb.advance(system, system.start_state, 1, integration=how)
     if not np.isfinite(begun.amplitude).all():
         return []  # it left the range of a law, as its status says
-    name = str(
-        rng.choice([name for name, values in run_columns(system, {}).items() if values[0] != 0.0] or [""])
-    )
+    name = str(rng.choice([name for name, values in run_columns(system, {}).items() if values[0] != 0.0] or [""]))
 
     def batch(moved: Array, points: dict[str, Array] | None = None) -> Ensemble:
         many = begun.flat()[np.zeros(len(moved), int)]
@@ -67,16 +65,10 @@ def errors_of(seed: int, accuracy: str) -> list[tuple[str, float, float]]:
     none = np.zeros((1, *start.shape))
     one = batch(none)
     rate = np.where(one.structure.omega > 0.0, one.structure.omega, one.structure.omega.max())
-    size = np.sqrt(np.mean(start[0] ** 2) + np.mean((start[1] / rate) ** 2)) + 1e-3 * np.linalg.norm(
-        one.structure.well
-    )
+    size = np.sqrt(np.mean(start[0] ** 2) + np.mean((start[1] / rate) ** 2)) + 1e-3 * np.linalg.norm(one.structure.well)
     scale = np.concatenate((rate, np.ones_like(rate)))
-    changes = (
-        rng.standard_normal((DIRECTIONS, 2, start.shape[1])) * size * np.stack((np.ones_like(rate), rate))
-    )
-    found = np.concatenate(native.tangents(one, changes[None, :, 0], changes[None, :, 1], threads=1), axis=2)[
-        0
-    ]
+    changes = rng.standard_normal((DIRECTIONS, 2, start.shape[1])) * size * np.stack((np.ones_like(rate), rate))
+    found = np.concatenate(native.tangents(one, changes[None, :, 0], changes[None, :, 1], threads=1), axis=2)[0]
     pairs = []
     for own, change in zip(found, changes, strict=True):
 
@@ -93,9 +85,7 @@ def errors_of(seed: int, accuracy: str) -> list[tuple[str, float, float]]:
         step = 1e-5
         beside = [batch(none, {name: np.array([value * (1.0 + sign * step)])}) for sign in (1.0, -1.0)]
         if native.differentiable(*beside):
-            own = np.concatenate(
-                native.tangents(one, none[:, :1], none[:, 1:], 1, (*beside, 2.0 * step)), axis=2
-            )[0, 0]
+            own = np.concatenate(native.tangents(one, none[:, :1], none[:, 1:], 1, (*beside, 2.0 * step)), axis=2)[0, 0]
             pairs.append((name, own, *differences(varied, scale)))
     judged = []
     for what, own, other, gap in pairs:

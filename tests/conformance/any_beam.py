@@ -34,9 +34,7 @@ def wavenumbers(count: int) -> list[float]:
         found.append(2.0 * n * math.pi)
         # between two symmetric shapes one antisymmetric one, where the determinant over sin(k/2) changes its sign
         low, high = 2.0 * n * math.pi + 1e-6, 2.0 * (n + 1) * math.pi - 1e-6
-        found.append(
-            brentq(lambda k: float(np.linalg.det(clamped(k))) / math.sin(0.5 * k), low, high, xtol=1e-14)
-        )
+        found.append(brentq(lambda k: float(np.linalg.det(clamped(k))) / math.sin(0.5 * k), low, high, xtol=1e-14))
         n += 1
     return found[:count]
 
@@ -108,9 +106,7 @@ class AnyBeam:
 
     def shape(self, x: float) -> Array:
         """phi_i at x, over the length."""
-        return np.array(
-            [c[0] + c[1] * x + c[2] * math.cos(k * x) + c[3] * math.sin(k * x) for k, c in self.made_of]
-        )
+        return np.array([c[0] + c[1] * x + c[2] * math.cos(k * x) + c[3] * math.sin(k * x) for k, c in self.made_of])
 
     def displacement(self, times: Array, velocity_factor: float = 1.0) -> Array:
         """At the contact point and at the centre, over the level, at *times* (s, rising from 0); shape (times, 2)."""

@@ -89,9 +89,7 @@ def integrate_ensemble() -> EnsembleIntegrator:
 def model_of():
     """The paper's beam on N modes, by N and damping ratio."""
     return cache(
-        lambda modes, damping_ratio=0.005: sb.ReducedModel.from_beam(
-            default_values.BEAM, modes, damping_ratio
-        )
+        lambda modes, damping_ratio=0.005: sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio)
     )
 
 

@@ -125,10 +125,7 @@ def try_one(system: sb.System, name: str, folder: Path) -> str:
 
     def sweep(store: Path | None) -> Any:
         return sb.sweep(
-            system,
-            axes,
-            integration,
-            checkpoint=None if store is None else CheckpointOptions(store, points_per_task=1),
+            system, axes, integration, checkpoint=None if store is None else CheckpointOptions(store, points_per_task=1)
         )
 
     try:
@@ -186,9 +183,7 @@ def main() -> None:
             names.remove("base_excitation.striker_on_base")  # a sweep is refused under a striker in space
         if "contact.suspension_damping" in names and not system.get("contact.suspension_stiffness"):
             names.remove("contact.suspension_damping")  # of a suspension, which a mass in flight has not
-        chosen = (
-            arguments.only.split(",") if arguments.only else [name for name in names if name not in NOT_SWEPT]
-        )
+        chosen = arguments.only.split(",") if arguments.only else [name for name in names if name not in NOT_SWEPT]
         for name in chosen:
             with tempfile.TemporaryDirectory() as folder:
                 said = try_one(system, name, Path(folder))

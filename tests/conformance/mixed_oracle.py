@@ -49,9 +49,7 @@ class MixedBeam(SprungBeam):
 
     def gradient(self, a: Array) -> Array:
         s = a @ a - self.initial @ self.initial
-        return np.asarray(
-            BENDING * self.k**2 * (a - self.initial) - (self.load - self.gamma * s) * a - self.side
-        )
+        return np.asarray(BENDING * self.k**2 * (a - self.initial) - (self.load - self.gamma * s) * a - self.side)
 
     def tangent(self, a: Array) -> Array:
         s = a @ a - self.initial @ self.initial
@@ -60,9 +58,7 @@ class MixedBeam(SprungBeam):
 
     def slope(self, x: float) -> Array:
         """phi_i' at x (m)."""
-        return np.array(
-            [float(self._of(c, k, np.array(x), 1)) for c, k in zip(self.forms, self.k, strict=True)]
-        )
+        return np.array([float(self._of(c, k, np.array(x), 1)) for c, k in zip(self.forms, self.k, strict=True)])
 
 
 @dataclass(frozen=True)

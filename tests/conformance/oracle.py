@@ -122,9 +122,7 @@ class PaperBeam:
         alpha = np.concatenate(states)
         return Solution(np.concatenate(found), alpha @ phi / LEVEL, alpha @ center / LEVEL, np.array(impacts))
 
-    def bounces(
-        self, ratio: float, velocity: float, coefficient: float, location: float, count: int
-    ) -> Array:
+    def bounces(self, ratio: float, velocity: float, coefficient: float, location: float, count: int) -> Array:
         """The first *count* impacts of one mode under Newton's law, rows of onset (s) and impulse (N s)."""
         phi, mass = float(self.shape(location * LENGTH)[0]), float(self.mass[0, 0])
         omega = ratio * self.omega[0]

@@ -47,8 +47,7 @@ def small_system(modes: int = 1, damping_ratio: float = 0.005, **drive: float) -
 
 PLANE = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": [0.06, 0.15, 0.3]}
 SPREAD = sb.uncertainty.ParameterUncertainty(
-    of={"location": sb.uncertainty.Normal(0.01), "contact.stiffness": sb.uncertainty.LogNormal(0.2)},
-    phase=True,
+    of={"location": sb.uncertainty.Normal(0.01), "contact.stiffness": sb.uncertainty.LogNormal(0.2)}, phase=True
 )
 SHORT = sb.Integration(cycles=6, threads=1)
 
@@ -60,9 +59,7 @@ def quiet_system() -> sb.System:
 
 @cache
 def found_attractors() -> Any:
-    return sb.dynamics.find_attractors(
-        quiet_system(), 12, transient=300, integration=sb.Integration(threads=1)
-    )
+    return sb.dynamics.find_attractors(quiet_system(), 12, transient=300, integration=sb.Integration(threads=1))
 
 
 def basins() -> xr.Dataset:

@@ -84,11 +84,7 @@ def record(case: Case) -> dict[str, NDArray[np.float64]]:
         for level, bound in bounds.items():
             bound = bound + (0.0 if whole else FLOOR[level] * scale)
             found[level].append(
-                np.where(
-                    (bound > ILL * scale * (10.0 if level == "standard" else 1.0)) | np.isnan(own),
-                    np.inf,
-                    bound,
-                )
+                np.where((bound > ILL * scale * (10.0 if level == "standard" else 1.0)) | np.isnan(own), np.inf, bound)
             )
     return {name: np.array(rows) for name, rows in found.items()}
 

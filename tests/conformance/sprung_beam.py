@@ -21,9 +21,7 @@ BENDING = YOUNG * WIDTH * THICKNESS**3 / 12.0
 class SprungBeam(PaperBeam):
     """Rotational stiffnesses (N m/rad; None clamps) and an axial stiffness of the supports (N/m)."""
 
-    def __init__(
-        self, modes: int, left: float | None, right: float | None, axial: float | None = None
-    ) -> None:
+    def __init__(self, modes: int, left: float | None, right: float | None, axial: float | None = None) -> None:
         self.left, self.right = left, right
         section = THICKNESS * WIDTH
         self.gamma = YOUNG * section / (2.0 * LENGTH)
@@ -88,6 +86,4 @@ class SprungBeam(PaperBeam):
 
     def shape(self, x: float) -> Array:
         """phi_i at x (m)."""
-        return np.array(
-            [float(self._of(c, k, np.array(x), 0)) for c, k in zip(self.forms, self.k, strict=True)]
-        )
+        return np.array([float(self._of(c, k, np.array(x), 0)) for c, k in zip(self.forms, self.k, strict=True)])

@@ -7,9 +7,7 @@ import numpy as np
 import snapbeam as sb
 
 
-def start_up(
-    model: sb.ReducedModel, ratio: float = 1.3, velocity: float = 0.3, cycles: int = 8
-) -> sb.RecordedMotion:
+def start_up(model: sb.ReducedModel, ratio: float = 1.3, velocity: float = 0.3, cycles: int = 8) -> sb.RecordedMotion:
     """Return the motion, sampled 60 times a cycle, as an experiment would record it."""
     frequency = ratio * model.reference_frequency
     rate = 60.0 * frequency

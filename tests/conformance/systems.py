@@ -16,10 +16,7 @@ from snapbeam.model import default_values
 
 SINE = {"drive.frequency_ratio": (0.3, 3.5), "drive.velocity_amplitude": (0.02, 0.6)}
 PLACE = {"contact.location": (0.15, 0.85)}
-SHAKEN = {
-    "base_excitation.frequency_ratio": (0.4, 2.0),
-    "base_excitation.acceleration_amplitude": (0.05, 0.6),
-}
+SHAKEN = {"base_excitation.frequency_ratio": (0.4, 2.0), "base_excitation.acceleration_amplitude": (0.05, 0.6)}
 
 
 @dataclass(frozen=True)
@@ -57,9 +54,7 @@ def mirror_image(system: sb.System) -> sb.System:
     model, base = system.model, system.base_excitation
     if model.imperfection is not None:
         assert model.beam is not None
-        model = sb.ReducedModel.from_beam(
-            model.beam, modes=model.modes, imperfection=model.imperfection.mirrored
-        )
+        model = sb.ReducedModel.from_beam(model.beam, modes=model.modes, imperfection=model.imperfection.mirrored)
     contacts = []
     for each in system.contacts:
         drive, side = each.striker.drive, "above" if each.striker.side == "below" else "below"
@@ -96,10 +91,7 @@ def record(model: sb.ReducedModel) -> dict[str, object]:
     omega, amplitude = 2.0 * math.pi * frequency, 0.25 * LEVEL / 1.3
     x = np.minimum(t * frequency / 3.0, 1.0)
     e, slope = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) * frequency / 3.0
-    s, c = (
-        np.sin(omega * t) + 0.2 * np.sin(2.0 * omega * t),
-        np.cos(omega * t) + 0.4 * np.cos(2.0 * omega * t),
-    )
+    s, c = (np.sin(omega * t) + 0.2 * np.sin(2.0 * omega * t), np.cos(omega * t) + 0.4 * np.cos(2.0 * omega * t))
     drive = sb.RecordedMotion(
         displacement=amplitude * e * s,
         velocity=amplitude * (slope * s + e * omega * c),
@@ -151,9 +143,7 @@ UNEVEN = sb.Imperfection(
     gravity=0.01,
 )
 MEASURED = sb.Imperfection(
-    profile=np.array([[0.0, 0.2, 0.5, 0.7, 1.0], [0.0, 3e-6, 6e-6, 4e-6, 0.0]]),
-    midspan_amplitude=2e-6,
-    shape="sine",
+    profile=np.array([[0.0, 0.2, 0.5, 0.7, 1.0], [0.0, 3e-6, 6e-6, 4e-6, 0.0]]), midspan_amplitude=2e-6, shape="sine"
 )
 
 SYSTEMS: dict[str, ExtendedSystem] = {

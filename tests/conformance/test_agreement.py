@@ -64,9 +64,7 @@ def test_trajectory(modes, pair, cycles, measured) -> None:
     )
     bound = min(1e-3, 3.0 * measured)
     np.testing.assert_allclose(run.dataset.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound)
-    np.testing.assert_allclose(
-        run.dataset.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
-    )
+    np.testing.assert_allclose(run.dataset.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound)
 
     assert run.impacts.sizes["impact"] == len(truth.impacts)
     onset, duration, peak = truth.impacts.T
@@ -101,16 +99,11 @@ def test_statistics(integrate_ensemble, model_of, modes, pair, cycles, measured)
     ).statistics
     # of b: what a cubic through the flight steps may miss, and what may lie between two samples
     cubic, grid = 5e-5 + measured, 2e-3
-    for name, values in (
-        ("displacement", truth.displacement),
-        ("midspan_displacement", truth.midspan_displacement),
-    ):
+    for name, values in (("displacement", truth.displacement), ("midspan_displacement", truth.midspan_displacement)):
         assert -cubic <= found[f"max_{name}"][0] - values.max() < grid
         assert -cubic <= values.min() - found[f"min_{name}"][0] < grid
     assert found["impacts"][0] == len(truth.impacts)
-    assert found["contact_time_fraction"][0] == pytest.approx(
-        truth.impacts[:, 1].sum() / truth.time[-1], rel=1e-2
-    )
+    assert found["contact_time_fraction"][0] == pytest.approx(truth.impacts[:, 1].sum() / truth.time[-1], rel=1e-2)
     assert found["peak_force"][0] == pytest.approx(truth.impacts[:, 2].max(), rel=3e-3)
     sign = np.sign(truth.midspan_displacement)
     assert found["zero_crossings"][0] == np.count_nonzero(sign[1:] != sign[:-1])

@@ -31,19 +31,13 @@ def test_against_an_independent_solution(modes) -> None:
     truth = live(beam, around, times)
     system = sb.System(
         model(modes),
-        base_excitation=sb.BaseExcitation(
-            motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)
-        ),
-        axial_load=sb.AxialLoadModulation(
-            motion=sb.HarmonicLoad(frequency_ratio=1.7, amplitude=size, phase=0.4)
-        ),
+        base_excitation=sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
+        axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=1.7, amplitude=size, phase=0.4)),
     )
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         data = run.dataset
-        np.testing.assert_allclose(
-            data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound)
         for name in ("base_work", "load_work"):
             wanted = getattr(truth, name)
             own = data["base_work" if name == "base_work" else "load_work"]
@@ -57,9 +51,7 @@ def test_slow_unbuckling() -> None:
     beam = model(1)
     excess = float(beam.nonlinear_stiffness * beam.well_amplitude[0] ** 2)
     ramp = sb.LoadRamp(change=-0.5 * excess, duration=60.0)
-    run = sb.simulate(
-        sb.System(beam, axial_load=sb.AxialLoadModulation(motion=ramp)), sb.Integration(cycles=80)
-    )
+    run = sb.simulate(sb.System(beam, axial_load=sb.AxialLoadModulation(motion=ramp)), sb.Integration(cycles=80))
     # quasi-statically alpha^2 = (P - P_cr)/gamma
     assert float(run.dataset.midspan_displacement[-1]) == pytest.approx(-math.sqrt(0.5), abs=2e-3)
     assert ledger(run) < 1e-4

@@ -15,9 +15,7 @@ REGULAR = [(1.4, 0.02), (0.1, 0.05)]
 ELSEWHERE = [(1.21, 0.18), (1.625, 0.3), (3.0, 0.5), (0.5, 0.4)]
 
 
-def energy_errors(
-    integrate_ensemble, model, share: float, cycles: list[int]
-) -> tuple[list[float], list[int]]:
+def energy_errors(integrate_ensemble, model, share: float, cycles: list[int]) -> tuple[list[float], list[int]]:
     """Relative error of an energy, at first a *share* of the barrier, after so many cycles; and crossings."""
     energy = share * (model.saddle_energy - model.well_energy)
     velocity = model.linear_modes[:, 0] * math.sqrt(2.0 * energy)
@@ -42,17 +40,13 @@ def energy_errors(
 )
 def test_no_drift_within_a_well(integrate_ensemble, model_of, modes, cycles, share, bound) -> None:
     """Measured: at most 7e-8 from the first hundred cycles to the last, without a trend."""
-    errors, crossings = energy_errors(
-        integrate_ensemble, model_of(modes, 0.0), share, [100, cycles // 10, cycles]
-    )
+    errors, crossings = energy_errors(integrate_ensemble, model_of(modes, 0.0), share, [100, cycles // 10, cycles])
     assert crossings == [0, 0, 0]
     assert max(errors) < bound
 
 
 @pytest.mark.parametrize("modes", [1, 8, 32])
-def test_energy_of_a_random_motion_stays_within_the_reserve_of_decisions(
-    integrate_ensemble, model_of, modes
-) -> None:
+def test_energy_of_a_random_motion_stays_within_the_reserve_of_decisions(integrate_ensemble, model_of, modes) -> None:
     """Motion in every mode up to the fastest, far more than an impact gives them: measured, 5e-4 of the barrier."""
     model = model_of(modes, 0.0)
     barrier = model.saddle_energy - model.well_energy
@@ -81,9 +75,7 @@ def test_undamped_beam_gains_the_work_of_the_shaker(integrate_ensemble, model_of
     error when nothing damps them; elsewhere at most 7e-4.
     """
     ratio, velocity = np.array(REGULAR + ELSEWHERE).T
-    end = integrate_ensemble(
-        model_of(modes, 0.0), frequency_ratio=ratio, velocity_amplitude=velocity, cycles=8
-    )
+    end = integrate_ensemble(model_of(modes, 0.0), frequency_ratio=ratio, velocity_amplitude=velocity, cycles=8)
     missing = end.accumulators_of_runs["energy"] - end.accumulators_of_runs["work"]
     share = np.abs(missing) / end.accumulators_of_runs["gross_work"]
     assert (end.accumulators_of_runs["impacts"] > 3).all()

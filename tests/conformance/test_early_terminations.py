@@ -21,9 +21,7 @@ def compare(integrate_ensemble, model, given, cycles: int) -> tuple[int, set[int
     np.testing.assert_array_equal(
         (full["response_class"] == ResponseClass.TRANSIENT_2) & ~continuous, odd & ~continuous
     )
-    np.testing.assert_array_equal(
-        full["response_class"] == ResponseClass.INTRAWELL, full["zero_crossings"] == 0
-    )
+    np.testing.assert_array_equal(full["response_class"] == ResponseClass.INTRAWELL, full["zero_crossings"] == 0)
     np.testing.assert_array_equal(continuous, full["zero_crossings_last_quarter"] * 20 > cycles)
 
     decided = early["status"] == RunStatus.EARLY_STOP
@@ -36,9 +34,7 @@ def compare(integrate_ensemble, model, given, cycles: int) -> tuple[int, set[int
     return int(decided.sum()), set(full["response_class"].tolist())
 
 
-@pytest.mark.parametrize(
-    ("modes", "runs", "cycles"), [(1, 1500, 20), (2, 300, 20), (8, 120, 16), (32, 40, 12)]
-)
+@pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 1500, 20), (2, 300, 20), (8, 120, 16), (32, 40, 12)])
 def test_early_terminations(integrate_ensemble, model_of, draw, modes, runs, cycles) -> None:
     decided, classes = compare(integrate_ensemble, model_of(modes), draw(runs, 100 + modes), cycles)
     assert decided > runs // 20

@@ -34,9 +34,7 @@ def test_chirp_that_ends_in_contact(start: float, stop: float, velocity: float, 
     near = edge + np.linspace(-2e-6, 2e-6, 401) * cycle
     times = np.sort(np.concatenate([np.linspace(0.0, 3.0 * edge, 4001), near]))
     run = sb.simulate(
-        system_of(drive),
-        sb.Integration(cycles=1, accuracy=accuracy),
-        sample_times=times[times < 0.99 * cycle],
+        system_of(drive), sb.Integration(cycles=1, accuracy=accuracy), sample_times=times[times < 0.99 * cycle]
     )
     data, time = run.dataset, run.dataset.time.values
     force = data.contact_force.values

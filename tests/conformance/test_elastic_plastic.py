@@ -66,9 +66,7 @@ def follow(
     while t < times[-1]:
         events, meant = [], []
         for each in surfaces:
-            watched = {"apart": [(0, 1.0)], "elastic": [(0, -1.0), (1, -1.0)], "loading": [(2, -1.0)]}[
-                each.branch
-            ]
+            watched = {"apart": [(0, 1.0)], "elastic": [(0, -1.0), (1, -1.0)], "loading": [(2, -1.0)]}[each.branch]
             for which, direction in watched:
 
                 def event(t: float, z: Array, each: Surface = each, which: int = which) -> float:
@@ -140,15 +138,13 @@ def test_free_mass(speed) -> None:
     assert np.ptp(ledger(run)) < 1e-9 * energy
     rebound = LAW.restitution * speed
     again = sb.simulate(
-        thrown(LAW, rebound, indentation=left, striker_position=left),
-        sb.Integration(cycles=1, accuracy="reference"),
+        thrown(LAW, rebound, indentation=left, striker_position=left), sb.Integration(cycles=1, accuracy="reference")
     )
     assert again.dataset.modal_velocity.values[-1, 0] / rebound == pytest.approx(1.0, abs=1e-8)
     assert float(again.final_state.indentation) == pytest.approx(left, rel=1e-9)
     # a faster one deepens it, to what one impact at that speed would leave
     faster = sb.simulate(
-        thrown(LAW, speed, indentation=left, striker_position=left),
-        sb.Integration(cycles=1, accuracy="reference"),
+        thrown(LAW, speed, indentation=left, striker_position=left), sb.Integration(cycles=1, accuracy="reference")
     )
     force = math.sqrt(speed**2 * MASS * K_1 + K_1 * K_1 / (K_2 - K_1) * K_2 * left**2)
     assert faster.summary.peak_force == pytest.approx(force, rel=1e-8)
@@ -198,8 +194,7 @@ def two() -> tuple[sb.System, Callable, Array, list[Surface]]:
         return w - z[0], v - z[1]
 
     system = sb.System(
-        one_mode(SPRING, ZETA),
-        contacts=[sb.Contact(SOFT, sb.Striker(drive=drive)), sb.Contact(stiffer, wall)],
+        one_mode(SPRING, ZETA), contacts=[sb.Contact(SOFT, sb.Striker(drive=drive)), sb.Contact(stiffer, wall)]
     )
     surfaces = [Surface(depth, 2e4, 5e4), Surface(lambda t, z: (z[0] - gap, z[1]), 1e5, 1.7e5)]
     return system, rate, np.zeros(2), surfaces
@@ -218,9 +213,7 @@ def sprung() -> tuple[sb.System, Callable, Array, list[Surface]]:
         w, w_rate = shaken(t)
         # the force that would move it alone as the drive says
         pushed = -mass * (RATIO * OMEGA) ** 2 * w + spring * w + damper * w_rate
-        return np.array(
-            [v, own(x, v) + forces[0] / MASS, u, (pushed - spring * s - damper * u - forces[0]) / mass]
-        )
+        return np.array([v, own(x, v) + forces[0] / MASS, u, (pushed - spring * s - damper * u - forces[0]) / mass])
 
     system = sb.System(one_mode(SPRING, ZETA), contacts=[sb.Contact(SOFT, striker)])
     start = np.array([0.0, 0.0, 0.0, STROKE * RATIO * OMEGA])
@@ -253,11 +246,7 @@ def test_trajectory(name, cycles, at_standard, at_reference) -> None:
         assert np.ptp(ledger(run)) < 1e-6 * data.attrs["gross_work"] or accuracy == "standard"
         into = [each.penetration(t, z)[0] for t, z in zip(times, truth, strict=True) for each in surfaces]
         depths = (np.reshape(into, (times.size, -1)) - left) / LEVEL
-        given = (
-            data.striker_penetrations.values
-            if len(surfaces) > 1
-            else data.penetration_normalised.values[:, None]
-        )
+        given = data.striker_penetrations.values if len(surfaces) > 1 else data.penetration_normalised.values[:, None]
         np.testing.assert_allclose(given, depths, rtol=0.0, atol=bound)
         tips = shaken_tips(name, times, truth)
         np.testing.assert_allclose(data.striker_displacement.values, tips / LEVEL, rtol=0.0, atol=bound)
@@ -281,9 +270,7 @@ def test_going_on(tmp_path) -> None:
             state = sb.advance(system, state)
             for name in ("amplitude", "velocity", "indentation", "contact_time", "striker_rate"):
                 values, expected = getattr(state, name), getattr(whole[i], name)
-                np.testing.assert_allclose(
-                    values, expected, rtol=0.0 if exact else 1e-9, err_msg=f"{name} {i}"
-                )
+                np.testing.assert_allclose(values, expected, rtol=0.0 if exact else 1e-9, err_msg=f"{name} {i}")
         assert (np.diff(whole.indentation, axis=0) >= 0.0).all() and (whole.indentation[0] > 0.0).all()
         first = sb.simulate(system, sb.Integration(cycles=2, accuracy="reference"))
         first.save(tmp_path / "run.nc")
@@ -295,9 +282,7 @@ def test_going_on(tmp_path) -> None:
         )
         once = sb.simulate(system, sb.Integration(cycles=4, accuracy="reference"))
         np.testing.assert_allclose(rest.final_state.indentation, once.final_state.indentation, rtol=1e-7)
-        np.testing.assert_allclose(
-            rest.final_state.amplitude, once.final_state.amplitude, rtol=0.0, atol=1e-7 * LEVEL
-        )
+        np.testing.assert_allclose(rest.final_state.amplitude, once.final_state.amplitude, rtol=0.0, atol=1e-7 * LEVEL)
 
 
 def test_equal_stiffness_is_elastic_and_refusals() -> None:
@@ -320,9 +305,7 @@ def test_force_and_energy() -> None:
     force = np.array([LAW.force(law, d) for d in depths])
     energy = np.array([LAW.energy(law, d) for d in depths])
     np.testing.assert_allclose(np.diff(energy), 0.5 * (force[1:] + force[:-1]) * np.diff(depths), rtol=1e-3)
-    np.testing.assert_allclose(
-        np.diff(force) / np.diff(depths), [LAW.slope(law, d) for d in depths[:-1] + 1e-12]
-    )
+    np.testing.assert_allclose(np.diff(force) / np.diff(depths), [LAW.slope(law, d) for d in depths[:-1] + 1e-12])
     assert LAW.memory_after(law, kink) == pytest.approx(2e-6)
 
 

@@ -53,9 +53,7 @@ def test_against_an_independent_solution(elongation, buckled) -> None:
         return np.concatenate((y[3:], inverse @ (force - bent - damping @ y[3:])))
 
     times = np.linspace(0.0, 3.99 / 0.3, 200)
-    expected = solve_ivp(
-        rate, (0.0, times[-1]), np.r_[start, np.zeros(3)], "DOP853", times, rtol=1e-11, atol=1e-13
-    )
+    expected = solve_ivp(rate, (0.0, times[-1]), np.r_[start, np.zeros(3)], "DOP853", times, rtol=1e-11, atol=1e-13)
     history = sb.HarmonicForce(frequency_ratio=1.0, amplitude=1.5)
     system = sb.System(reduced, forces=[sb.ExternalForce(history=history, shape=row)])
     run = sb.simulate(system, sb.Integration(cycles=4, accuracy="reference"), sample_times=times)
@@ -110,9 +108,7 @@ def test_refused_with_nothing_to_stiffen() -> None:
 def test_imperfect_beam_with_one_well_vibrates_through_its_centre() -> None:
     """The beam has no second well about which it could be described."""
     straight = default_values.BEAM.replace(axial_load=0.0)
-    reduced = sb.ReducedModel.from_beam(
-        straight, modes=1, imperfection=sb.Imperfection(midspan_amplitude=2e-5)
-    )
+    reduced = sb.ReducedModel.from_beam(straight, modes=1, imperfection=sb.Imperfection(midspan_amplitude=2e-5))
     assert not reduced.is_bistable
     system = sb.System(reduced, initial_state=sb.State(amplitude=-12.0 * reduced.well_amplitude))
     with pytest.warns(sb.DiagnosticWarning, match="leaves one well"):

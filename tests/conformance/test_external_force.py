@@ -17,9 +17,7 @@ ROW, BASE = np.array([0.2, 1.0]), np.array([1.0, 0.7])
 
 
 def model(**more) -> sb.ReducedModel:
-    return sb.ReducedModel.from_matrices(
-        MASS, STIFFNESS, contact_shape=[1.0, 0.5], damping_ratio=[0.02, 0.05], **more
-    )
+    return sb.ReducedModel.from_matrices(MASS, STIFFNESS, contact_shape=[1.0, 0.5], damping_ratio=[0.02, 0.05], **more)
 
 
 def truth(reduced: sb.ReducedModel, row, force, times):
@@ -29,9 +27,7 @@ def truth(reduced: sb.ReducedModel, row, force, times):
     def rate(t, y):
         return np.concatenate((y[2:], inverse @ (row * force(t) - STIFFNESS @ y[:2] - damping @ y[2:])))
 
-    found = solve_ivp(
-        rate, (0.0, times[-1]), np.zeros(4), method="DOP853", rtol=1e-11, atol=1e-14, t_eval=times
-    )
+    found = solve_ivp(rate, (0.0, times[-1]), np.zeros(4), method="DOP853", rtol=1e-11, atol=1e-14, t_eval=times)
     return found.y[:2].T
 
 
@@ -63,14 +59,9 @@ def test_recorded_and_constant_force():
     t = np.arange((8 * 60) + 1) / rate
     samples = np.sin(9.0 * t) + 0.5 * np.cos(31.0 * t) - 0.2
     system = sb.System(
-        model(),
-        forces=[
-            sb.ExternalForce(history=sb.RecordedForce(record=samples, sampling_frequency=rate), shape=ROW)
-        ],
+        model(), forces=[sb.ExternalForce(history=sb.RecordedForce(record=samples, sampling_frequency=rate), shape=ROW)]
     )
-    held_against(
-        system, ROW, lambda t: math.sin(9.0 * t) + 0.5 * math.cos(31.0 * t) - 0.2, 2e-4
-    )  # of the samples
+    held_against(system, ROW, lambda t: math.sin(9.0 * t) + 0.5 * math.cos(31.0 * t) - 0.2, 2e-4)  # of the samples
     with pytest.raises(InputError, match="the recorded force lasts"):
         sb.simulate(system, sb.Integration(cycles=9))
     constant = sb.ExternalForce(history=sb.ConstantForce(force=-3.0))
@@ -104,9 +95,7 @@ def test_forces_along_different_rows_beside_a_moving_base():
             ),
             sb.LocalSpring(stiffness=0.0, shape=[1.0, 0.0]),
             sb.ExternalForce(
-                history=sb.RecordedForce(
-                    record=record, sampling_frequency=200.0 * reduced.reference_frequency
-                ),
+                history=sb.RecordedForce(record=record, sampling_frequency=200.0 * reduced.reference_frequency),
                 shape=other,
             ),
         ],
@@ -155,9 +144,7 @@ def test_weight_of_a_free_mass_on_a_moving_stop():
     ball = sb.ReducedModel.from_matrices([[0.5]], [0.0], contact_shape=[1.0], reference_frequency=10.0)
     weight = sb.ExternalForce(history=sb.ConstantForce(force=-0.5 * 9.81))
     free = sb.simulate(
-        sb.System(ball, forces=[weight]),
-        sb.Integration(cycles=3),
-        sample_times=np.linspace(0.0, 0.29, 30),
+        sb.System(ball, forces=[weight]), sb.Integration(cycles=3), sample_times=np.linspace(0.0, 0.29, 30)
     )
     t = free.dataset["time"].values
     np.testing.assert_allclose(free.dataset["modal_amplitude"][:, 0], -4.905 * t * t, atol=1e-12)

@@ -58,13 +58,9 @@ def compare(
             sample_times=times,
         )
         data = run.dataset
-        np.testing.assert_allclose(
-            data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound)
         size = float(np.abs(truth.z).max())
-        np.testing.assert_allclose(
-            data.voltage, volts * truth.z, rtol=0.0, atol=10 * bound * abs(volts) * size
-        )
+        np.testing.assert_allclose(data.voltage, volts * truth.z, rtol=0.0, atol=10 * bound * abs(volts) * size)
         share = float(harvester.share(np.array([harvester.resistance]))[0])
         given = share * truth.circuit
         np.testing.assert_allclose(data.energy_harvested, given, rtol=0.0, atol=slack * given[-1])
@@ -100,12 +96,7 @@ def test_coil(modes, inductance) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("modes", "ratio", "velocity", "resistance", "cycles"),
-    [
-        (3, 2.782, 0.333, 9.06e5, 3),
-        (1, 0.4038, 0.473, 3.27e5, 1),
-        (3, 1.3, 0.4, 3e5, 2),
-        (8, 2.0, 0.3, 5e5, 1),
-    ],
+    [(3, 2.782, 0.333, 9.06e5, 3), (1, 0.4038, 0.473, 3.27e5, 1), (3, 1.3, 0.4, 3e5, 2), (8, 2.0, 0.3, 5e5, 1)],
 )
 def test_struck_with_a_nearly_open_circuit(modes, ratio, velocity, resistance, cycles) -> None:
     """The layers stiffen the beam, so that it comes back to the tip sooner than without: no contact is missed."""
@@ -134,9 +125,7 @@ def test_struck_with_a_nearly_open_circuit(modes, ratio, velocity, resistance, c
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         assert run.summary.impacts > 2
-        np.testing.assert_allclose(
-            run.dataset.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(run.dataset.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound)
         assert ledger(run) < 1e-4
 
 
@@ -211,7 +200,4 @@ def test_layers_by_their_material() -> None:
     )
     assert series.moment_per_volt == pytest.approx(-16.6 * 15e-3 * 0.3e-3)
     assert series.capacitance == pytest.approx(0.5 * 25.55e-9 * 15e-3 * 0.25 * 0.161 / 0.2e-3)
-    assert (
-        parallel.moment_per_volt == 2.0 * series.moment_per_volt
-        and parallel.capacitance == 4.0 * series.capacitance
-    )
+    assert parallel.moment_per_volt == 2.0 * series.moment_per_volt and parallel.capacitance == 4.0 * series.capacitance

@@ -79,9 +79,7 @@ def test_runs_of_different_contact_are_what_they_are_alone(model_of) -> None:
 def test_cycles_beyond_the_last_do_not_change_the_first(integrate_ensemble, model_of) -> None:
     """Statistics that only accumulate are those of the longer run's beginning: time comes from ticks."""
     model = model_of(2)
-    short, long = (
-        integrate_ensemble(model, frequency_ratio=1.4, velocity_amplitude=0.02, cycles=c) for c in (5, 10)
-    )
+    short, long = (integrate_ensemble(model, frequency_ratio=1.4, velocity_amplitude=0.02, cycles=c) for c in (5, 10))
     for name in ("time", "zero_crossings", "impacts", "steps", "contact_time", "total_impulse", "gross_work"):
         assert (long.accumulators_of_runs[name] >= short.accumulators_of_runs[name]).all(), name
     assert long.statistics["peak_force"] >= short.statistics["peak_force"]

@@ -16,9 +16,7 @@ def end(striker: sb.Striker | None = None, modes: int = 3, **parts) -> np.ndarra
     """Amplitudes after one cycle at level reference, over the first one at rest."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     striker = sb.Striker(drive=SHAKER) if striker is None else striker
-    system = sb.System(
-        model, contacts=[sb.Contact(parts.pop("contact", default_values.CONTACT), striker)], **parts
-    )
+    system = sb.System(model, contacts=[sb.Contact(parts.pop("contact", default_values.CONTACT), striker)], **parts)
     run = sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"))
     return np.asarray(run.final_state.amplitude / abs(model.well_amplitude[0]))
 
@@ -78,9 +76,7 @@ def test_a_base_and_a_load_that_hardly_move(plain) -> None:
         )
 
     def load(size: float) -> np.ndarray:
-        return end(
-            axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=size))
-        )
+        return end(axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=size)))
 
     recedes(plain, base, (1e-4, 1e-6, 1e-8), 1e-7)
     recedes(plain, load, (1e-2, 1e-4, 1e-6), 1e-6)
@@ -90,9 +86,7 @@ def test_a_base_and_a_load_that_hardly_move(plain) -> None:
 def test_a_coil_without_a_magnet(plain) -> None:
     """K to 0: its force goes with K squared."""
     errors = [
-        np.abs(
-            end(harvesters=[sb.ElectromagneticHarvester(force_factor=constant, resistance=30.0)]) - plain
-        ).max()
+        np.abs(end(harvesters=[sb.ElectromagneticHarvester(force_factor=constant, resistance=30.0)]) - plain).max()
         for constant in (0.1, 0.01, 0.0)
     ]
     assert errors[0] > 30.0 * errors[1]

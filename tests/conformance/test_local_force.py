@@ -35,9 +35,7 @@ def friction(tmp_path_factory):
     sys.path.insert(0, str(folder))
     invalidate_caches()
     try:
-        yield import_module("own_force").DryFriction(
-            friction_force=2e-3, smoothing_velocity=0.02, location=0.45
-        )
+        yield import_module("own_force").DryFriction(friction_force=2e-3, smoothing_velocity=0.02, location=0.45)
     finally:
         sys.path.remove(str(folder))
         del sys.modules["own_force"]
@@ -155,9 +153,7 @@ def cycle_of(system):
 def test_with_impacts(names, side, friction):
     """A shaker strikes; onset and release of each contact are located although the forces change the motion."""
     forces = [FORCES.get(name, friction) for name in names]
-    striker = sb.Striker(
-        drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.18), side=side, location=1 / 2.1
-    )
+    striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.18), side=side, location=1 / 2.1)
     system = sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, striker)], forces=forces)
     run = sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"))
     start = sb.State(amplitude=run.dataset["modal_amplitude"].values[0], velocity=np.zeros(MODEL.modes))
@@ -169,12 +165,7 @@ def test_on_a_moving_base(name):
     """The works of the base and of the force, each to the last digits."""
     force, start = FORCES[name], struck_start(MODEL, 0.3)
     motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)
-    system = sb.System(
-        MODEL,
-        forces=[force],
-        initial_state=start,
-        base_excitation=sb.BaseExcitation(motion=motion),
-    )
+    system = sb.System(MODEL, forces=[force], initial_state=start, base_excitation=sb.BaseExcitation(motion=motion))
     check_against_independent(system, start, 4, 1e-6)
 
 
@@ -254,10 +245,6 @@ def test_a_start_beyond_the_range_of_a_law(engine: str) -> None:
     alone = sb.advance(system, inside, 1, integration=sb.Integration(engine=engine))
     batch = sb.State(amplitude=np.stack((0.9 * well, -1.5 * well, 1.5 * well)))
     found = sb.advance(system, batch, 1, integration=sb.Integration(engine=engine))
-    assert found.statistics["status"].tolist() == [
-        sb.RunStatus.OK,
-        sb.RunStatus.DIVERGED,
-        sb.RunStatus.DIVERGED,
-    ]
+    assert found.statistics["status"].tolist() == [sb.RunStatus.OK, sb.RunStatus.DIVERGED, sb.RunStatus.DIVERGED]
     assert np.isnan(found.amplitude[1:]).all()
     np.testing.assert_allclose(found.amplitude[0], alone.amplitude, rtol=1e-12, atol=0.0)

@@ -58,8 +58,7 @@ def test_no_loss_is_hertz() -> None:
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
     runs = [
         sb.simulate(
-            sb.System(model, contacts=[sb.Contact(law, shaker)]),
-            sb.Integration(cycles=1, accuracy="reference"),
+            sb.System(model, contacts=[sb.Contact(law, shaker)]), sb.Integration(cycles=1, accuracy="reference")
         )
         for law in (sb.HertzContact(4e8), sb.HuntCrossley(4e8, 0.0), sb.HuntCrossley(4e8, 1e-9))
     ]
@@ -102,11 +101,7 @@ def test_trajectory(name, modes, cycles, at_standard, at_reference) -> None:
     omega = ratio * float(beam.omega[0])
     stroke = velocity * LEVEL * float(beam.omega[0]) / omega
     times = np.linspace(0.0, 2.0 * math.pi * cycles / omega, 1501) * (1.0 - 1e-13)
-    tip = Tip(
-        lambda t, _: (stroke * math.sin(omega * t), stroke * omega * math.cos(omega * t)),
-        force(law),
-        edge(law),
-    )
+    tip = Tip(lambda t, _: (stroke * math.sin(omega * t), stroke * omega * math.cos(omega * t)), force(law), edge(law))
     truth = follow(beam, tip, times)
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
@@ -120,9 +115,7 @@ def test_trajectory(name, modes, cycles, at_standard, at_reference) -> None:
         np.testing.assert_allclose(
             run.dataset.displacement_at_striker, truth.displacement_at_striker, rtol=0.0, atol=bound
         )
-        np.testing.assert_allclose(
-            run.dataset.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(run.dataset.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound)
         assert np.ptp(ledger(run)) < 1e-4 * run.dataset.attrs["gross_work"]
         assert run.summary.energy_lost_contact > 0.1 * run.summary.gross_work
         # the force is what the law says, sampled between the kicks

@@ -125,17 +125,11 @@ def mixture(seed: int, modes: int) -> Mixture:
         words.append("unequal wells")
     structure = default_values.BEAM.replace(
         boundary=sb.BoundaryConditions(
-            left_rotational_stiffness=ends[0],
-            right_rotational_stiffness=ends[1],
-            axial_support_stiffness=ends[2],
+            left_rotational_stiffness=ends[0], right_rotational_stiffness=ends[1], axial_support_stiffness=ends[2]
         )
     )
     names = {"rise": "midspan_amplitude", "skew": "antisymmetric_amplitude"}
-    given = (
-        sb.Imperfection(**{names.get(name, name): value for name, value in uneven.items()})
-        if uneven
-        else None
-    )
+    given = sb.Imperfection(**{names.get(name, name): value for name, value in uneven.items()}) if uneven else None
     model = sb.ReducedModel.from_beam(structure, modes=modes, imperfection=given)
     beam = MixedBeam(modes, ends, uneven)
     unit, first = model.length_scale or LEVEL, 2.0 * math.pi * model.reference_frequency
@@ -150,11 +144,7 @@ def mixture(seed: int, modes: int) -> Mixture:
     elif tap != "none":
         inertia = 0.01 if tap != "coil" else 0.0
         harvester = sb.ElectromagneticHarvester(
-            force_factor=1.2,
-            resistance=rng.uniform(5.0, 60.0),
-            coil_resistance=8.0,
-            inductance=inertia,
-            location=0.4,
+            force_factor=1.2, resistance=rng.uniform(5.0, 60.0), coil_resistance=8.0, inductance=inertia, location=0.4
         )
         coupling, loss = 1.2 * beam.shape(0.4 * 0.161), harvester.resistance + 8.0
     words += [str(tap)] if tap != "none" else []
@@ -162,11 +152,7 @@ def mixture(seed: int, modes: int) -> Mixture:
     strikers, laws, tips, breaks = [], [], [], []
     count = int(rng.choice([1, 1, 2, 3]))
     if rng.random() < 0.4:
-        ratio, reach, striker_on_base = (
-            rng.uniform(0.5, 1.5),
-            rng.uniform(0.05, 0.2),
-            bool(rng.random() < 0.6),
-        )
+        ratio, reach, striker_on_base = (rng.uniform(0.5, 1.5), rng.uniform(0.05, 0.2), bool(rng.random() < 0.6))
         motion = sb.DisplacementSine(frequency_ratio=ratio, displacement_amplitude=reach)
         base, base_row = (
             sb.BaseExcitation(motion=motion, striker_on_base=striker_on_base),
@@ -175,9 +161,7 @@ def mixture(seed: int, modes: int) -> Mixture:
         words.append("a base" if striker_on_base else "a base under what stands in space")
     if rng.random() < 0.4:
         ratio, size, phase = rng.uniform(0.5, 2.5), rng.uniform(1.0, 6.0), rng.uniform(-1.0, 1.0)
-        axial = sb.AxialLoadModulation(
-            motion=sb.HarmonicLoad(frequency_ratio=ratio, amplitude=size, phase=phase)
-        )
+        axial = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=ratio, amplitude=size, phase=phase))
 
         def load(t: float) -> float:
             return size * math.sin(ratio * first * t + phase)
@@ -192,9 +176,7 @@ def mixture(seed: int, modes: int) -> Mixture:
         if striker_on_base and rng.random() < 0.4:
             body = (rng.uniform(5e-3, 5e-2), rng.uniform(200.0, 900.0), rng.uniform(0.0, 1.0))
         of_body = (
-            {}
-            if body is None
-            else dict(zip(("mass", "suspension_stiffness", "suspension_damping"), body, strict=True))
+            {} if body is None else dict(zip(("mass", "suspension_stiffness", "suspension_damping"), body, strict=True))
         )
         below = "below" if side > 0.0 else "above"
         strikers.append(sb.Striker(drive=drive, location=place, side=below, gap=gap, **of_body))
@@ -227,9 +209,7 @@ def compared(seed: int, modes: int) -> tuple[dict[str, float], Mixture]:
         how = sb.Integration(cycles=cycles, accuracy=accuracy)
         data = sb.simulate(system, how, sample_times=times).dataset
         names = ("displacement_at_striker", "midspan_displacement", "penetration_normalised")
-        found[accuracy] = max(
-            float(np.abs(data[name].values - truth[:, i]).max()) for i, name in enumerate(names)
-        )
+        found[accuracy] = max(float(np.abs(data[name].values - truth[:, i]).max()) for i, name in enumerate(names))
         found.setdefault("ledger", abs(float(data.attrs["energy_error"])))
     found["growth"] = float(sb.perturbation_growth(system, sb.Integration(cycles=cycles)).separation.max())
     return found, mixed
@@ -237,8 +217,7 @@ def compared(seed: int, modes: int) -> tuple[dict[str, float], Mixture]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("seed", "modes"),
-    [(seed, modes) for modes in (1, 3, 8) for seed in range({1: 8, 3: 14, 8: 7}[modes])],
+    ("seed", "modes"), [(seed, modes) for modes in (1, 3, 8) for seed in range({1: 8, 3: 14, 8: 7}[modes])]
 )
 def test_a_mixture(seed: int, modes: int) -> None:
     """1e-3 b at level *standard*, 1e-7 b at *reference*; in proportion where a change by 1e-13 makes more than 5e-12 b."""

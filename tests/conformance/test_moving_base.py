@@ -24,12 +24,8 @@ def ledger(run: sb.Run) -> float:
     """What the ledger misses at its worst, over the gross work."""
     data = run.dataset
     stored = sum(data[name] for name in ("energy_beam", "energy_contact", "energy_striker") if name in data)
-    given = sum(
-        data[name] for name in ("striker_work", "base_work", "load_work", "force_work") if name in data
-    )
-    taken = sum(
-        data[name] for name in ("energy_dissipated", "energy_harvested", "energy_circuit") if name in data
-    )
+    given = sum(data[name] for name in ("striker_work", "base_work", "load_work", "force_work") if name in data)
+    taken = sum(data[name] for name in ("energy_dissipated", "energy_harvested", "energy_circuit") if name in data)
     return float(np.ptp((stored + taken - given).values)) / data.attrs["gross_work"]
 
 
@@ -58,12 +54,8 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         data = run.dataset
         name = "displacement_at_striker" if stop != "none" else "midspan_displacement"
-        np.testing.assert_allclose(
-            data[name], getattr(truth, name.removesuffix("_at_striker")), rtol=0.0, atol=bound
-        )
-        np.testing.assert_allclose(
-            data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(data[name], getattr(truth, name.removesuffix("_at_striker")), rtol=0.0, atol=bound)
+        np.testing.assert_allclose(data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound)
         size = float(np.abs(truth.base_work).max())
         np.testing.assert_allclose(data.base_work, truth.base_work, rtol=0.0, atol=max(bound, 1e-6) * size)
         assert ledger(run) < 1e-4
@@ -138,10 +130,7 @@ def test_mirrored_and_going_on() -> None:
             base_excitation=sb.BaseExcitation(motion=motion, direction=direction),
         )
 
-    once, mirrored = (
-        sb.advance(system("below", "up"), periods=3),
-        sb.advance(system("above", "down"), periods=3),
-    )
+    once, mirrored = (sb.advance(system("below", "up"), periods=3), sb.advance(system("above", "down"), periods=3))
     np.testing.assert_array_equal(mirrored.amplitude, -once.amplitude)
     np.testing.assert_array_equal(mirrored.velocity, -once.velocity)
     below = system("below", "up")
@@ -176,9 +165,7 @@ def test_never_ended_early_by_energy() -> None:
     """A shaken beam may cross at any time: nothing is final, and only a continuous response is certain early."""
     system = sb.System(
         model(1),
-        base_excitation=sb.BaseExcitation(
-            motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)
-        ),
+        base_excitation=sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)),
     )
     early, whole = (
         sb.sweep(
@@ -190,9 +177,7 @@ def test_never_ended_early_by_energy() -> None:
     )
     assert not early.final_well_proven.any() and not whole.final_well_proven.any()
     np.testing.assert_array_equal(early.response_class, whole.response_class)
-    assert (
-        early.early_stop_time.notnull() <= (early.response_class == int(sb.ResponseClass.CONTINUOUS))
-    ).all()
+    assert (early.early_stop_time.notnull() <= (early.response_class == int(sb.ResponseClass.CONTINUOUS))).all()
     assert len(np.unique(whole.response_class)) > 1
 
 
@@ -211,9 +196,7 @@ def test_refusals_and_the_way_there_and_back() -> None:
         sb.System(plain, base_excitation=base)
     system = sb.System(model(2), contacts=[sb.Contact(default_values.CONTACT, striker)], base_excitation=base)
     assert sb.System.from_mapping(system.to_mapping()) == system
-    changed = system.replace(
-        **{"base_excitation.acceleration_amplitude": 0.3, "base_excitation.direction": "down"}
-    )
+    changed = system.replace(**{"base_excitation.acceleration_amplitude": 0.3, "base_excitation.direction": "down"})
     assert (
         changed.get("base_excitation.acceleration_amplitude") == 0.3
         and changed.get("base_excitation.direction") == "down"

@@ -17,9 +17,7 @@ from snapbeam.solver import native
 from snapbeam.solver.assemble import make_ensemble
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*the mass that an impulse at a point meets")
-STEEL = dict(
-    length=0.16, thickness=4e-4, width=15e-3, density=7800.0, young_modulus=200e9, buckling_level=3.35e-4
-)
+STEEL = dict(length=0.16, thickness=4e-4, width=15e-3, density=7800.0, young_modulus=200e9, buckling_level=3.35e-4)
 
 
 def bouncing(system, cycles, times):
@@ -66,15 +64,7 @@ def bouncing(system, cycles, times):
             impacts[j] += 1
     while t < end:
         piece = solve_ivp(
-            slope,
-            (t, end),
-            y,
-            method="DOP853",
-            rtol=1e-12,
-            atol=1e-17,
-            dense_output=True,
-            events=gaps,
-            max_step=2e-5,
+            slope, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-17, dense_output=True, events=gaps, max_step=2e-5
         )
         inside = (times >= t) & (times <= piece.t[-1])
         if inside.any():
@@ -103,20 +93,14 @@ def shaken(modes, *strikers):
 
 @pytest.mark.parametrize(
     ("modes", "strikers"),
-    [
-        (3, [(0.8, 1.21, 0.3, 0.45)]),
-        (8, [(0.9, 0.7, 0.3, 0.45)]),
-        (4, [(0.7, 1.1, 0.2, 0.45), (0.9, 1.1, 0.15, 0.6)]),
-    ],
+    [(3, [(0.8, 1.21, 0.3, 0.45)]), (8, [(0.9, 0.7, 0.3, 0.45)]), (4, [(0.7, 1.1, 0.2, 0.45), (0.9, 1.1, 0.15, 0.6)])],
 )
 def test_every_impact_is_that_of_all_modes(modes, strikers):
     system = shaken(modes, *strikers)
     times = np.linspace(0.0, 1.5 * 2.0 * np.pi / system.scale.omega / strikers[0][1], 300)
     expected, impacts = bouncing(system, 2, times)
     for level, limit in (("standard", 1e-5), ("reference", 1e-8)):
-        run = sb.simulate(
-            system, sb.Integration(cycles=2, accuracy=level, engine="native"), sample_times=times
-        )
+        run = sb.simulate(system, sb.Integration(cycles=2, accuracy=level, engine="native"), sample_times=times)
         error = np.abs(run.dataset["modal_amplitude"].values - expected) / system.scale.length
         assert error.max() < limit
     met = run.impacts.where(run.impacts.onset <= times[-1], drop=True)
@@ -127,15 +111,12 @@ def test_every_impact_is_that_of_all_modes(modes, strikers):
 def test_a_contact_that_is_held_together_balances(modes, e):
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.02)
     system = sb.System(
-        model,
-        contacts=[sb.Contact(sb.Restitution(e), sb.Shaker(frequency_ratio=0.15, velocity_amplitude=0.05))],
+        model, contacts=[sb.Contact(sb.Restitution(e), sb.Shaker(frequency_ratio=0.15, velocity_amplitude=0.05))]
     )
     times = np.linspace(0.0, 2.0 * np.pi / system.scale.omega / 0.15, 300)[:-1]
     found = []
     for level in ("standard", "reference"):
-        run = sb.simulate(
-            system, sb.Integration(cycles=1, accuracy=level, engine="native"), sample_times=times
-        )
+        run = sb.simulate(system, sb.Integration(cycles=1, accuracy=level, engine="native"), sample_times=times)
         data = run.dataset
         residual = data.energy_beam + data.energy_contact + data.energy_dissipated - data.striker_work
         assert abs(residual).max() < 1e-4 * data.attrs["gross_work"]
@@ -157,9 +138,7 @@ def test_a_record_in_pieces_has_every_impact_once(monkeypatch):
     np.testing.assert_array_equal(pieces, whole)
 
 
-@pytest.mark.parametrize(
-    ("ratio", "velocity", "location"), [(0.8, 0.24, 0.48), (0.46, 0.36, 0.35), (0.25, 0.55, 0.49)]
-)
+@pytest.mark.parametrize(("ratio", "velocity", "location"), [(0.8, 0.24, 0.48), (0.46, 0.36, 0.35), (0.25, 0.55, 0.49)])
 def test_a_contact_that_opens_does_not_land_again_at_once(ratio, velocity, location):
     """It opens where the force that holds it together is zero, with a gap that grows."""
     model = sb.ReducedModel.from_beam(sb.model.default_values.BEAM, 1, damping_ratio=0.005)
@@ -176,8 +155,7 @@ def test_energies_over_impacts_do_not_depend_on_the_step():
     system = sb.System(model, contacts=[striker])
     axes = {"drive.velocity_amplitude": [0.1, 0.3]}
     runs = [
-        sb.sweep(system, axes, sb.Integration(cycles=4, step=step, high_frequency_ratio=1.5))
-        for step in (2e-5, 1e-5)
+        sb.sweep(system, axes, sb.Integration(cycles=4, step=step, high_frequency_ratio=1.5)) for step in (2e-5, 1e-5)
     ]
     assert (runs[0].impacts > 3).all()
     high = [run.high_frequency_energy_fraction.values for run in runs]

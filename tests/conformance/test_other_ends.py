@@ -34,15 +34,11 @@ def model_of(modes: int, left: float | None, right: float | None, axial: float |
 
 def struck(model: sb.ReducedModel, velocity: float = 0.3) -> sb.System:
     drive = sb.Sine(frequency_ratio=1.21, velocity_amplitude=velocity)
-    return sb.System(
-        model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION))]
-    )
+    return sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION))])
 
 
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
-@pytest.mark.parametrize(
-    ("modes", "cycles"), [pytest.param(1, 3, marks=SLOW), (3, 2), pytest.param(8, 1, marks=SLOW)]
-)
+@pytest.mark.parametrize(("modes", "cycles"), [pytest.param(1, 3, marks=SLOW), (3, 2), pytest.param(8, 1, marks=SLOW)])
 def test_independent_solution(modes, cycles, ends) -> None:
     if ends[2] is not None:
         cycles = min(cycles, 1)  # two answer a relative change of 1e-10 by more than 1e-7 b
@@ -52,8 +48,7 @@ def test_independent_solution(modes, cycles, ends) -> None:
     omega = 1.21 * first
     stroke = 0.3 * LEVEL * first / omega
     tip = Tip(
-        lambda t, _: (stroke * math.sin(omega * t), stroke * omega * math.cos(omega * t)),
-        lambda d, _: HERTZ * d**1.5,
+        lambda t, _: (stroke * math.sin(omega * t), stroke * omega * math.cos(omega * t)), lambda d, _: HERTZ * d**1.5
     )
     times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
     truth = follow(beam, tip, times)

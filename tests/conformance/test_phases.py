@@ -57,9 +57,7 @@ def test_the_map_is_advance(names) -> None:
     system = system_of(names)
     flow = Stroboscope(system)
     wanted = advanced(system, flow)
-    np.testing.assert_allclose(
-        flow.advance(flow.coordinates(), PERIODS, every=True).every[0], wanted, atol=1e-12
-    )
+    np.testing.assert_allclose(flow.advance(flow.coordinates(), PERIODS, every=True).every[0], wanted, atol=1e-12)
     here = flow.coordinates()
     for period in range(PERIODS):
         here = flow.advance(here, 1)
@@ -75,11 +73,7 @@ def test_the_map_is_advance(names) -> None:
 
 @pytest.mark.parametrize(
     "names",
-    [
-        pytest.param(("base",), marks=SLOW),
-        pytest.param(("load",), marks=SLOW),
-        pytest.param(tuple(PHASES), marks=SLOW),
-    ],
+    [pytest.param(("base",), marks=SLOW), pytest.param(("load",), marks=SLOW), pytest.param(tuple(PHASES), marks=SLOW)],
 )
 def test_against_an_independent_solution(names) -> None:
     first = float(PaperBeam(2).omega[0])
@@ -151,9 +145,7 @@ def test_phases_that_would_be_ignored_are_refused() -> None:
     flow = Stroboscope(system_of(("striker",)), phase=1.0)
     with pytest.raises(sb.InputError, match=r"phase = 1: must not be given if drive.phase changes"):
         flow.changed({"drive.phase": 0.3})
-    with pytest.raises(
-        sb.InputError, match=r"state phase = .*: must be the phase at which the system is observed"
-    ):
+    with pytest.raises(sb.InputError, match=r"state phase = .*: must be the phase at which the system is observed"):
         flow.coordinates(sb.State(amplitude=MODEL.well_amplitude, phase=0.3))
     flow.coordinates(sb.State(amplitude=MODEL.well_amplitude, phase=1.0 + 6.0 * math.pi))
     with pytest.raises(sb.InputError, match="state phase"):

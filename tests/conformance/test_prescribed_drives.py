@@ -30,9 +30,7 @@ class Case(NamedTuple):
 
 def chirp(first: float, spacing: str) -> Case:
     """The angle is the integral of the frequency, written as such: -cos and powers of the ratio by themselves."""
-    drive = sb.Chirp(
-        start_ratio=0.9, stop_ratio=1.9, velocity_amplitude=0.25, sweep_cycles=1.7, sweep_type=spacing
-    )
+    drive = sb.Chirp(start_ratio=0.9, stop_ratio=1.9, velocity_amplitude=0.25, sweep_cycles=1.7, sweep_type=spacing)
     low, high, cycle = 0.9 * first, 1.9 * first, 2.0 * math.pi / (0.9 * first)
     length, speed = 1.7 * cycle, 0.25 * LEVEL * first
 
@@ -78,11 +76,7 @@ def noise(first: float) -> Case:
     drive = sb.BandLimitedNoise(low_ratio=0.6, high_ratio=2.2, velocity_rms=0.2, seed=11, ramp_up_cycles=0.8)
     cycle, drawn = 2.0 * math.pi / (1.4 * first), shares(11)
     rates = first * (0.6 + 1.6 / 32.0 * (np.arange(32) + drawn[::2]))
-    phases, speed, rise = (
-        2.0 * math.pi * drawn[1::2],
-        0.2 * LEVEL * first * math.sqrt(2.0 / 32.0),
-        0.8 * cycle,
-    )
+    phases, speed, rise = (2.0 * math.pi * drawn[1::2], 0.2 * LEVEL * first * math.sqrt(2.0 / 32.0), 0.8 * cycle)
 
     def motion(t: float) -> tuple[float, float]:
         angles = rates * t + phases
@@ -120,10 +114,7 @@ def record(first: float) -> Case:
 
     rows = np.array([motion(t) for t in np.arange(0.0, 6.0 * cycle, 5e-6)])
     drive = sb.RecordedMotion(
-        displacement=rows[:, 0],
-        velocity=rows[:, 1],
-        sampling_frequency=2e5,
-        frequency=omega / (2.0 * math.pi),
+        displacement=rows[:, 0], velocity=rows[:, 1], sampling_frequency=2e5, frequency=omega / (2.0 * math.pi)
     )
     return Case(drive, motion, cycle)
 
@@ -180,9 +171,7 @@ def test_a_shock_that_ends_in_touch(name) -> None:
         sb.Integration(cycles=cycles),
     )
     data = run.dataset
-    ends = (
-        drive.parts_of_sum[1] if isinstance(drive, sb.SumDrive) else drive
-    ).duration / model.reference_frequency
+    ends = (drive.parts_of_sum[1] if isinstance(drive, sb.SumDrive) else drive).duration / model.reference_frequency
     at = int(np.abs(data.time.values - ends).argmin())
     assert data.penetration_normalised.values[at] > 0.0
     np.testing.assert_allclose(data.time.values[at], ends, rtol=0.0, atol=1e-8)
@@ -203,9 +192,7 @@ def test_a_shock_beside_other_motions_ends_with_a_step(name) -> None:
     else:
         base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.2))
         system = sb.System(
-            model,
-            contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=shock))],
-            base_excitation=base,
+            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=shock))], base_excitation=base
         )
     data = sb.simulate(system, sb.Integration(cycles=2)).dataset
     near = np.abs(data.time.values - 0.7 / model.reference_frequency)

@@ -74,9 +74,7 @@ def solved(rng: np.random.Generator) -> Drawn | None:
     error = {}
     for accuracy in LIMIT:
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
-        found = np.stack(
-            (run.dataset.displacement_at_striker.values, run.dataset.midspan_displacement.values), axis=1
-        )
+        found = np.stack((run.dataset.displacement_at_striker.values, run.dataset.midspan_displacement.values), axis=1)
         error[accuracy] = float(np.abs(found - truth).max())
     return Drawn(
         float(np.abs(system.model.omega / own.omega - 1.0).max()),
@@ -100,10 +98,7 @@ def judge(tried: list[Drawn | None]) -> None:
         print(f"{accuracy}: {len(over)} of {len(well)} beyond {limit:g}")
         assert len(over) <= 0.05 * len(well)
         for draw in over:
-            assert draw.error[accuracy] <= max(5.0 * limit, CARRIED / 1e-13 * draw.separation), (
-                accuracy,
-                draw,
-            )
+            assert draw.error[accuracy] <= max(5.0 * limit, CARRIED / 1e-13 * draw.separation), (accuracy, draw)
     assert max(draw.frequencies for draw in draws) < 1e-11
 
 

@@ -89,9 +89,7 @@ def judge(runs: list[Bounced]) -> None:
     """Within the limits, or what the conditioning makes of a tiny change of the drive; the figures are printed."""
     regular = [run.separation <= CHAOTIC for run in runs]
     cycles, compared = sum(r.size for r in regular), sum(int(r.sum()) for r in regular)
-    print(
-        f"{compared} of {cycles} cycles are compared, {sum(r.all() for r in regular)} of {len(runs)} runs whole"
-    )
+    print(f"{compared} of {cycles} cycles are compared, {sum(r.all() for r in regular)} of {len(runs)} runs whole")
     beyond = []
     for level, limit in LIMIT.items():
         errors = np.concatenate([run.error[level][here] for run, here in zip(runs, regular, strict=True)])

@@ -54,9 +54,7 @@ def test_mean_square_of_a_part() -> None:
     assert mean_square(falling, 10.0, 1000.0) == pytest.approx(math.log(100.0), rel=1e-13)
     edges = np.array([0.0, 5.0, 15.0, 40.0, 999.0, 5000.0])
     parts = mean_square(falling, edges[:-1], edges[1:])
-    np.testing.assert_allclose(
-        parts, [0.0, math.log(1.5), math.log(8 / 3), math.log(999 / 40), math.log(1000 / 999)]
-    )
+    np.testing.assert_allclose(parts, [0.0, math.log(1.5), math.log(8 / 3), math.log(999 / 40), math.log(1000 / 999)])
 
 
 @pytest.mark.slow
@@ -99,9 +97,7 @@ def test_motion_of_a_striker_has_no_drift() -> None:
     )
     again = sb.RecordedAcceleration.from_psd(SHAPE, duration_s=5.0, seed=4, ramp_up_s=0.2)
     assert again == motion and np.array_equal(again.record, motion.record)
-    assert not np.array_equal(
-        sb.RecordedAcceleration.from_psd(SHAPE, duration_s=5.0, seed=5).record, motion.record
-    )
+    assert not np.array_equal(sb.RecordedAcceleration.from_psd(SHAPE, duration_s=5.0, seed=5).record, motion.record)
 
 
 def oscillator(frequency: float, damping: float, motion) -> sb.System:
@@ -129,9 +125,7 @@ def test_linear_oscillator_against_its_exact_mean_square() -> None:
     frequency, damping, seeds = 80.0, 0.05, 40
     motion = sb.RecordedAcceleration.from_psd(SHAPE, duration_s=1.3, rms_g=0.1)
     system = oscillator(frequency, damping, motion)
-    exact = (
-        exact_mean_square(SHAPE, frequency, damping) * (0.1 / math.sqrt(mean_square(SHAPE, 0.0, 1e9))) ** 2
-    )
+    exact = exact_mean_square(SHAPE, frequency, damping) * (0.1 / math.sqrt(mean_square(SHAPE, 0.0, 1e9))) ** 2
     times = np.linspace(0.3, 1.2, 360)  # exp(-2 zeta omega t) is 5e-4 at the first
     squares = []
     for seed in range(seeds):
@@ -194,8 +188,7 @@ def test_units_of_break_points() -> None:
     np.testing.assert_allclose(found, [(20.0, 0.04), (200.0, 0.04)], rtol=1e-14)
     with pytest.raises(InputError, match="the random vibration lasts 1 s"):
         sb.simulate(
-            oscillator(80.0, 0.05, sb.RecordedAcceleration.from_psd(SHAPE, duration_s=1.0)),
-            sb.Integration(cycles=90),
+            oscillator(80.0, 0.05, sb.RecordedAcceleration.from_psd(SHAPE, duration_s=1.0)), sb.Integration(cycles=90)
         )
 
 
@@ -208,11 +201,7 @@ def test_two_wells_against_fokker_planck() -> None:
     """
     damping, seeds, cycles, top = 0.1, 20, 640, 12.0
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=damping)
-    f, omega, mass = (
-        model.reference_frequency,
-        2.0 * math.pi * model.reference_frequency,
-        float(model.mass[0, 0]),
-    )
+    f, omega, mass = (model.reference_frequency, 2.0 * math.pi * model.reference_frequency, float(model.mass[0, 0]))
     well = abs(float(model.well_amplitude[0]))
     factor = float(rigid_mass(model)[0] / mass)
     # U = omega^2/(8 w^2) (x^2 - w^2)^2 has the frequency omega in both wells; its barrier is omega^2 w^2/8
@@ -262,22 +251,15 @@ def test_interval_of_an_estimate_contains_the_density() -> None:
 def test_motion_of_a_striker_is_that_of_its_samples() -> None:
     """A tip that moves by a random vibration against the same samples as a record: impacts and displacements agree."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
-    motion = sb.RecordedAcceleration.from_psd(
-        [(40.0, 1e-3), (300.0, 1e-3)], duration_s=0.5, rms_g=3.0, ramp_up_s=0.1
-    )
+    motion = sb.RecordedAcceleration.from_psd([(40.0, 1e-3), (300.0, 1e-3)], duration_s=0.5, rms_g=3.0, ramp_up_s=0.1)
     times = np.arange(motion.record.size) / motion.sampling_frequency
     moved, speed, _ = motion_of(motion, Scale(1e-3, 500.0), times[-1])(times)
     record = sb.RecordedMotion(
-        displacement=moved,
-        velocity=speed,
-        sampling_frequency=motion.sampling_frequency,
-        frequency=80.0,
+        displacement=moved, velocity=speed, sampling_frequency=motion.sampling_frequency, frequency=80.0
     )
     found = []
     for drive in (motion, record):
-        system = sb.System(
-            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, gap=2e-5))]
-        )
+        system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, gap=2e-5))])
         run = sb.simulate(system, sb.Integration(cycles=20), sample_times=np.linspace(0.0, 0.15, 100))
         assert run.summary.impacts > 0
         found.append(run.dataset["striker_displacement"].values)

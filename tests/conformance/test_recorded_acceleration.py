@@ -84,9 +84,7 @@ def test_a_shaken_structure_against_scipy(direction: str) -> None:
 
     cycles = int(0.99 * (RECORD.size - 1) / RATE * model.reference_frequency)
     times = np.linspace(0.0, cycles / model.reference_frequency * 0.999, 201)
-    truth = solve_ivp(
-        rate, (0.0, times[-1]), np.zeros(4), "DOP853", times, rtol=1e-11, atol=1e-15, max_step=1e-3
-    )
+    truth = solve_ivp(rate, (0.0, times[-1]), np.zeros(4), "DOP853", times, rtol=1e-11, atol=1e-15, max_step=1e-3)
     expected = (scaled @ vectors @ truth.y[:2])[0]
     run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy="reference"), sample_times=times)
     got = run.dataset["modal_amplitude"].values[:, 0]
@@ -103,10 +101,7 @@ def test_a_record_of_a_sine_acts_as_the_sine(side: str, on_base: bool) -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     first = model.reference_frequency
     omega, amplitude = 2.0 * math.pi * 0.9 * first, 0.2 * model.length_scale * (2.0 * math.pi * first) ** 2
-    rate, periods = (
-        180.0 * first,
-        9,
-    )  # whole periods, so that the sine's velocity has zero mean over the record
+    rate, periods = (180.0 * first, 9)  # whole periods, so that the sine's velocity has zero mean over the record
     t = np.arange(round(periods / 0.9 / first * rate) + 1) / rate
     stop = sb.Striker(drive=sb.FixedStop(), gap=2e-5, side=side)
     found = []
@@ -117,9 +112,7 @@ def test_a_record_of_a_sine_acts_as_the_sine(side: str, on_base: bool) -> None:
         base = sb.BaseExcitation(motion=motion, striker_on_base=on_base)
         system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, stop)], base_excitation=base)
         run = sb.simulate(
-            system,
-            sb.Integration(cycles=5, accuracy="reference"),
-            sample_times=np.linspace(0.0, 4.0 / first, 120),
+            system, sb.Integration(cycles=5, accuracy="reference"), sample_times=np.linspace(0.0, 4.0 / first, 120)
         )
         found.append(run.dataset["midspan_displacement"].values)
         assert run.summary.impacts > 0
@@ -133,19 +126,14 @@ def test_records_beside_other_motions(case: str) -> None:
     model, ends = sb.ReducedModel.from_beam(default_values.BEAM, modes=2), (None, None, None)
     first, cycles = 2.0 * math.pi * model.reference_frequency, 2
     reach, ratio, lasts = 0.1 * LEVEL, 1.21, 2.4 / model.reference_frequency
-    rates = {
-        name: n * model.reference_frequency for name, n in (("tip", 90.0), ("base", 130.0), ("force", 70.0))
-    }
+    rates = {name: n * model.reference_frequency for name, n in (("tip", 90.0), ("base", 130.0), ("force", 70.0))}
     at = {name: np.arange(int(lasts * rate)) / rate for name, rate in rates.items()}
     turned = ratio * first * at["tip"]
     moved, speed = reach * np.sin(turned), reach * ratio * first * np.cos(turned)
     shaken = 0.1 * LEVEL * first**2 * np.sin(2.3 * first * at["base"])
     pushed = 0.01 * np.cos(1.7 * first * at["force"])
     record = sb.RecordedMotion(
-        displacement=moved,
-        velocity=speed,
-        sampling_frequency=rates["tip"],
-        frequency=ratio * model.reference_frequency,
+        displacement=moved, velocity=speed, sampling_frequency=rates["tip"], frequency=ratio * model.reference_frequency
     )
     tip, acceleration = CubicHermiteSpline(at["tip"], moved, speed), CubicSpline(at["base"], shaken)
     drift = float(acceleration.antiderivative(2)(at["base"][-1])) / at["base"][-1]
@@ -161,17 +149,8 @@ def test_records_beside_other_motions(case: str) -> None:
     def base(t: float) -> tuple[float, float, float]:
         if case == "four records":
             velocity = acceleration.antiderivative()(t) - drift
-            return (
-                float(acceleration.antiderivative(2)(t)) - drift * t,
-                float(velocity),
-                float(acceleration(t)),
-            )
-        s, c, w, hardest = (
-            math.sin(0.7 * first * t),
-            math.cos(0.7 * first * t),
-            0.7 * first,
-            0.15 * LEVEL * first**2,
-        )
+            return (float(acceleration.antiderivative(2)(t)) - drift * t, float(velocity), float(acceleration(t)))
+        s, c, w, hardest = (math.sin(0.7 * first * t), math.cos(0.7 * first * t), 0.7 * first, 0.15 * LEVEL * first**2)
         return hardest / w**2 * s, hardest / w * c, -hardest * s
 
     force = CubicSpline(at["force"], pushed)

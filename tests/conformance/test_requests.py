@@ -49,9 +49,7 @@ def request_of(rng: np.random.Generator) -> KernelOutput:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # not reached: the accuracy says so, and up to where
         run = sb.simulate(system, sb.Integration(cycles=cycles, tolerance=tolerance), sample_times=times)
-    found = np.stack(
-        (run.dataset.displacement_at_striker.values, run.dataset.midspan_displacement.values), axis=1
-    )
+    found = np.stack((run.dataset.displacement_at_striker.values, run.dataset.midspan_displacement.values), axis=1)
     if newton:
         truth = Bouncer(ratio, velocity, coefficient, location).run(times).displacement[:, None]
         found = found[:, :1]

@@ -75,16 +75,12 @@ def test_against_an_independent_solution(case: str, modes: int, cycles: int) -> 
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         data = run.dataset
         np.testing.assert_allclose(data.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound)
-        np.testing.assert_allclose(
-            data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound)
         np.testing.assert_allclose(data.striker_displacements, truth.tip, rtol=0.0, atol=bound)
         assert abs(data.attrs["energy_error"]) < 1e-4
     size = float(truth.force.max())
     np.testing.assert_allclose(data.striker_forces, truth.force, rtol=0.0, atol=1e-3 * size)
-    np.testing.assert_allclose(
-        data.striker_work, truth.work, rtol=0.0, atol=1e-5 * float(np.abs(truth.work).max())
-    )
+    np.testing.assert_allclose(data.striker_work, truth.work, rtol=0.0, atol=1e-5 * float(np.abs(truth.work).max()))
     hit = set(run.impacts.striker.values.astype(int).tolist())
     assert hit == {j + 1 for j in range(len(tips)) if truth.force[:, j].max() > 0.0}
     assert len(hit) > 1
@@ -118,8 +114,7 @@ def test_one_of_two_out_of_reach_is_none(early: bool) -> None:
 def test_mirrored() -> None:
     """The mirrored system's mirrored run, bit for bit."""
     below = sb.System(
-        model(3),
-        contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())],
+        model(3), contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())]
     )
     above = below.replace(**{"contact.side": "above", "contact.2.side": "below"})
     how = sb.Integration(cycles=5)
@@ -128,12 +123,7 @@ def test_mirrored() -> None:
     np.testing.assert_array_equal(one.dataset.displacement_at_striker, -other.dataset.displacement_at_striker)
     np.testing.assert_array_equal(one.dataset.striker_displacements, -other.dataset.striker_displacements)
     np.testing.assert_array_equal(one.dataset.striker_forces, other.dataset.striker_forces)
-    for name in (
-        "peak_force_contact_1",
-        "peak_force_contact_2",
-        "striker_work_contact_1",
-        "impulse_contact_2",
-    ):
+    for name in ("peak_force_contact_1", "peak_force_contact_2", "striker_work_contact_1", "impulse_contact_2"):
         assert one.summary[name] == other.summary[name]
 
 
@@ -143,13 +133,11 @@ def test_two_of_half_the_stiffness_are_one() -> None:
     half = sb.HertzContact(0.5 * CONTACT_STIFFNESS)
     how = sb.Integration(cycles=2, accuracy="reference")
     one = sb.System(
-        model(3),
-        contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())],
+        model(3), contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())]
     )
     tip = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.12), gap=0.0)
     two = sb.System(
-        model(3),
-        contacts=[sb.Contact(half, FIRST), sb.Contact(half, tip), sb.Contact(default_values.CONTACT, stop())],
+        model(3), contacts=[sb.Contact(half, FIRST), sb.Contact(half, tip), sb.Contact(default_values.CONTACT, stop())]
     )
     times = np.linspace(0.0, 2.0, 301) / (1.21 * model(3).reference_frequency) * (1.0 - 1e-12)
     found, expected = sb.simulate(two, how, sample_times=times), sb.simulate(one, how, sample_times=times)
@@ -159,17 +147,14 @@ def test_two_of_half_the_stiffness_are_one() -> None:
     force = found.dataset.striker_forces
     size = float(expected.dataset.contact_force.max())
     np.testing.assert_allclose(force[:, 0], force[:, 1], rtol=0.0, atol=1e-4 * size)
-    np.testing.assert_allclose(
-        force[:, 0] + force[:, 1], expected.dataset.contact_force, rtol=0.0, atol=1e-3 * size
-    )
+    np.testing.assert_allclose(force[:, 0] + force[:, 1], expected.dataset.contact_force, rtol=0.0, atol=1e-3 * size)
 
 
 @pytest.mark.slow
 def test_order() -> None:
     """Steps of an eighth, impacts of both on the way: order 3.9 measured; of one halving 2.8 to 4.6, since steps end at contacts."""
     system = sb.System(
-        model(1),
-        contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())],
+        model(1), contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())]
     )
     times = np.linspace(0.0, 2.0, 101) / (1.21 * model(1).reference_frequency) * (1.0 - 1e-12)
     exact = sb.simulate(
@@ -186,13 +171,10 @@ def test_order() -> None:
 def test_swept_by_dotted_names(tmp_path) -> None:
     """A map over the place and the gap of the second striker has the runs of its points; its store is read again."""
     system = sb.System(
-        model(3),
-        contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())],
+        model(3), contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())]
     )
     axes = {"contact.2.location": [0.3, 0.6], "contact.2.gap": [0.1 * LEVEL, 0.3 * LEVEL]}
-    swept = sb.sweep(
-        system, axes, sb.Integration(cycles=5), checkpoint=sb.CheckpointOptions(tmp_path / "store")
-    )
+    swept = sb.sweep(system, axes, sb.Integration(cycles=5), checkpoint=sb.CheckpointOptions(tmp_path / "store"))
     read = sb.read_checkpoint(tmp_path / "store")
     for name in ("response_class", "impacts_contact_1", "peak_force_contact_2"):
         np.testing.assert_array_equal(read[name].transpose(*swept[name].dims), swept[name], err_msg=name)
@@ -216,8 +198,7 @@ def test_swept_by_dotted_names(tmp_path) -> None:
 def test_statistics_of_each(tmp_path) -> None:
     """Against the list of impacts and the samples of the run; together they are the whole; one striker has none."""
     system = sb.System(
-        model(3),
-        contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())],
+        model(3), contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())]
     )
     run = sb.simulate(system, sb.Integration(cycles=5))
     found, listed = run.summary, run.impacts
@@ -235,8 +216,7 @@ def test_statistics_of_each(tmp_path) -> None:
     assert not any(
         "_contact_" in name
         for name in sb.simulate(
-            sb.System(model(3), contacts=[sb.Contact(default_values.CONTACT, FIRST)]),
-            sb.Integration(cycles=2),
+            sb.System(model(3), contacts=[sb.Contact(default_values.CONTACT, FIRST)]), sb.Integration(cycles=2)
         ).summary
     )
 
@@ -248,8 +228,7 @@ def test_work_of_each() -> None:
         drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.05), location=0.3, side="above", gap=GAP
     )
     system = sb.System(
-        model(1),
-        contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, second)],
+        model(1), contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, second)]
     )
     length = model(1).length_scale
     end = 3.0 / (1.21 * model(1).reference_frequency)
@@ -265,8 +244,7 @@ def test_work_of_each() -> None:
 
 def test_refusals() -> None:
     two = sb.System(
-        model(1),
-        contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())],
+        model(1), contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, stop())]
     )
     with pytest.raises(sb.InputError, match="this system has 2 contacts"):
         two.replace(**{"contact.3.gap": 1e-5})
@@ -276,23 +254,17 @@ def test_refusals() -> None:
 def test_a_run_that_goes_on_shows_every_tip_where_it_is() -> None:
     """From a state within a cycle: displacements, forces and penetrations are those of one run."""
     second = sb.Striker(
-        drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.05, phase=0.6),
-        location=0.3,
-        side="above",
-        gap=GAP,
+        drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.05, phase=0.6), location=0.3, side="above", gap=GAP
     )
     system = sb.System(
-        model(3),
-        contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, second)],
+        model(3), contacts=[sb.Contact(default_values.CONTACT, FIRST), sb.Contact(default_values.CONTACT, second)]
     )
     period = 1.0 / (1.21 * system.model.reference_frequency)
     times = np.linspace(0.0, 0.999 * period, 301)
     how = sb.Integration(cycles=3, accuracy="reference")
     whole = sb.simulate(system, how, sample_times=1.0 * period + times).dataset
     state = sb.simulate(system, how.replace(cycles=1)).final_state
-    later = sb.simulate(
-        system.replace(initial_state=state), how.replace(cycles=1), sample_times=times
-    ).dataset
+    later = sb.simulate(system.replace(initial_state=state), how.replace(cycles=1), sample_times=times).dataset
     for name in ("striker_displacements", "striker_penetrations"):
         np.testing.assert_allclose(later[name], whole[name], rtol=0.0, atol=1e-9, err_msg=name)
 

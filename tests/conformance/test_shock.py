@@ -60,9 +60,7 @@ def test_in_a_parameter_file(tmp_path) -> None:
     system = load_config(path).system
     assert system.striker is None
     assert system.base_excitation.motion == sb.Shock(acceleration_g=5000, duration_ms=0.2, shape="haversine")
-    assert (
-        system.replace(**{"base_excitation.acceleration_g": 10}).base_excitation.motion.acceleration_g == 10
-    )
+    assert system.replace(**{"base_excitation.acceleration_g": 10}).base_excitation.motion.acceleration_g == 10
 
 
 @pytest.mark.slow
@@ -70,9 +68,7 @@ def test_response_spectrum_of_a_half_sine() -> None:
     """Greatest relative displacement of a linear structure over A/omega^2, during the pulse and after it."""
     frequency = 40.0
     omega = 2.0 * math.pi * frequency
-    mass = sb.ReducedModel.from_matrices(
-        [[1.0]], [omega**2], contact_shape=[1.0], base_shape=[1.0], length_scale=1e-3
-    )
+    mass = sb.ReducedModel.from_matrices([[1.0]], [omega**2], contact_shape=[1.0], base_shape=[1.0], length_scale=1e-3)
     peak = 5.0 * GRAVITY
     for cycles in (0.2, 0.8, 2.3):
         duration = cycles / frequency

@@ -34,9 +34,7 @@ def compare(modes, striker, tip, period, cycles, at_standard, at_reference) -> s
         np.testing.assert_allclose(
             run.dataset.displacement_at_striker, truth.displacement_at_striker, rtol=0.0, atol=bound
         )
-        np.testing.assert_allclose(
-            run.dataset.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(run.dataset.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound)
         np.testing.assert_allclose(
             run.dataset.penetration_normalised, truth.penetration_normalised, rtol=0.0, atol=bound
         )
@@ -44,10 +42,7 @@ def compare(modes, striker, tip, period, cycles, at_standard, at_reference) -> s
     return run
 
 
-@pytest.mark.parametrize(
-    ("modes", "cycles"),
-    [(1, 4), (3, 2), (8, 1)],
-)
+@pytest.mark.parametrize(("modes", "cycles"), [(1, 4), (3, 2), (8, 1)])
 @pytest.mark.slow
 def test_body_on_a_suspension(modes, cycles) -> None:
     """The physical body: m x'' + c x' + k x = F(t) - f, with the force that would move it alone as the drive says."""
@@ -65,10 +60,7 @@ def test_body_on_a_suspension(modes, cycles) -> None:
         return np.array([z[1], (drive - damper * z[1] - spring * z[0] - force) / mass])
 
     tip = Tip(
-        lambda t, z: (float(z[0]), float(z[1])),
-        lambda d, _: HERTZ * d**1.5,
-        body=body,
-        state=(0.0, stroke * omega),
+        lambda t, z: (float(z[0]), float(z[1])), lambda d, _: HERTZ * d**1.5, body=body, state=(0.0, stroke * omega)
     )
     striker = sb.Striker(
         drive=sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity),
@@ -91,13 +83,7 @@ def test_thrown_sphere(modes) -> None:
     def body(t: float, z: np.ndarray, force: float) -> np.ndarray:
         return np.array([z[1], -force / mass])
 
-    tip = Tip(
-        lambda t, z: (float(z[0]), float(z[1])),
-        lambda d, _: HERTZ * d**1.5,
-        body=body,
-        state=(0.0, v),
-        gap=gap,
-    )
+    tip = Tip(lambda t, z: (float(z[0]), float(z[1])), lambda d, _: HERTZ * d**1.5, body=body, state=(0.0, v), gap=gap)
     striker = sb.Striker(drive=sb.ConstantVelocity(speed=speed), mass=mass, gap=gap)
     run = compare(modes, striker, tip, 2.0 * math.pi / first, 2 if modes < 8 else 1, 1e-3, 1e-7)
     # momentum: what the sphere lost is the impulse on the beam
@@ -114,9 +100,7 @@ def test_sphere_meets_a_free_mass() -> None:
         striker = sb.Striker(drive=sb.ConstantVelocity(speed=0.3), mass=mass, gap=0.1 * LEVEL)
         run = sb.simulate(
             sb.System(
-                model,
-                contacts=[sb.Contact(default_values.CONTACT, striker)],
-                initial_state=sb.State(amplitude=[0.0]),
+                model, contacts=[sb.Contact(default_values.CONTACT, striker)], initial_state=sb.State(amplitude=[0.0])
             ),
             sb.Integration(cycles=1, accuracy="reference"),
         )
@@ -133,15 +117,12 @@ def test_heavy_body_is_the_shaker() -> None:
     drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.15)
 
     def end(**more):
-        system = sb.System(
-            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, **more))]
-        )
+        system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, **more))])
         return sb.simulate(system, sb.Integration(cycles=1, accuracy="reference")).final_state.amplitude
 
     shaker, scale = end(), abs(model.well_amplitude[0])
     errors = [
-        np.abs(end(mass=mass, suspension_stiffness=100.0 * mass) - shaker).max() / scale
-        for mass in (1e2, 1e4, 1e6)
+        np.abs(end(mass=mass, suspension_stiffness=100.0 * mass) - shaker).max() / scale for mass in (1e2, 1e4, 1e6)
     ]
     assert errors[0] > 30.0 * errors[1] > 900.0 * errors[2]
     assert errors[2] < 1e-7
@@ -153,9 +134,7 @@ def test_going_on_and_mirror() -> None:
     body = {"mass": 0.01, "suspension_stiffness": 300.0, "suspension_damping": 0.4}
     drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.25)
     below, above = (
-        sb.System(
-            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, side=side, **body))]
-        )
+        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, side=side, **body))])
         for side in ("below", "above")
     )
     once, mirrored = sb.advance(below, periods=3), sb.advance(above, periods=3)
@@ -165,15 +144,7 @@ def test_going_on_and_mirror() -> None:
     np.testing.assert_array_equal(step.amplitude, once.amplitude)
     assert float(once.striker_shift) != 0.0
     # from numbers alone, as a file keeps them
-    names = (
-        "amplitude",
-        "velocity",
-        "phase",
-        "striker_position",
-        "contact_time",
-        "striker_shift",
-        "striker_rate",
-    )
+    names = ("amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate")
     middle = sb.advance(below, periods=2)
     plain = sb.State(**{name: getattr(middle, name) for name in names})
     np.testing.assert_allclose(
@@ -188,8 +159,6 @@ def test_early_termination_is_off_and_refusals() -> None:
         sb.Striker(drive=drive, mass=0.1, suspension_stiffness=10.0, suspension_damping=100.0)
     with pytest.raises(InputError, match="a striker without a mass moves as prescribed; give its mass"):
         sb.Striker(drive=drive, suspension_stiffness=10.0)
-    system = sb.System(
-        model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, mass=0.1))]
-    )
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, mass=0.1))])
     assert sb.System.from_mapping(system.to_mapping()) == system
     assert system.replace(**{"contact.mass": 0.2}).get("contact.mass") == 0.2

@@ -68,9 +68,7 @@ def test_terms_that_have_samples() -> None:
     cycle = 2.0 * math.pi / (1.4 * scale.omega)
     instants = np.arange(0.0, 5.0 * cycle, 1e-5)
     moved, speed, _ = motion_of(total, scale, instants[-1])(instants)
-    record = sb.RecordedMotion(
-        displacement=moved, velocity=speed, sampling_frequency=1e5, frequency=1.0 / cycle
-    )
+    record = sb.RecordedMotion(displacement=moved, velocity=speed, sampling_frequency=1e5, frequency=1.0 / cycle)
     times = np.linspace(0.0, 4.0 * cycle, 101) * (1.0 - 1e-13)
     one, other = (
         sb.simulate(struck_by(drive), sb.Integration(cycles=4, accuracy="reference"), sample_times=times)
@@ -108,9 +106,7 @@ def test_against_an_independent_solution(modes: int, cycles: int) -> None:
     system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=SINE + BURST))])
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
-        np.testing.assert_allclose(
-            run.dataset.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(run.dataset.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound)
         np.testing.assert_allclose(run.dataset.striker_displacement, truth.tip[:, 0], rtol=0.0, atol=bound)
         assert abs(run.dataset.attrs["energy_error"]) < 1e-4
     assert run.summary.impacts > 1

@@ -171,10 +171,7 @@ def surrounded(names: set[str], first: float, unit: float, beam: MixedBeam) -> t
     forces: list[Any] = []
     forces_of_beam: list[Callable[[float, float, float], float]] = []
     if "base" in names or "base in space" in names:
-        motion, carries = (
-            sb.DisplacementSine(frequency_ratio=0.7, displacement_amplitude=0.1),
-            "base" in names,
-        )
+        motion, carries = (sb.DisplacementSine(frequency_ratio=0.7, displacement_amplitude=0.1), "base" in names)
         parts["base_excitation"] = sb.BaseExcitation(motion=motion, striker_on_base=carries)
         around |= {"base": sine(0.7 * first, 0.1 * unit, 0.0), "striker_on_base": carries}
     if "load" in names:
@@ -192,9 +189,7 @@ def surrounded(names: set[str], first: float, unit: float, beam: MixedBeam) -> t
         forces.append(sb.QuadraticDamping(coefficient=3.0, location=0.4))
         forces_of_beam.append(lambda t, a, v: -3.0 * abs(skew) ** 3 * abs(v) * v)
     if "layers" in names:
-        layers = sb.PiezoelectricHarvester(
-            moment_per_volt=1e-4, capacitance=80e-9, resistance=3e4, patch_end=0.3
-        )
+        layers = sb.PiezoelectricHarvester(moment_per_volt=1e-4, capacitance=80e-9, resistance=3e4, patch_end=0.3)
         parts["harvesters"] = [layers]
         slopes = float((beam.slope(0.3 * LENGTH) - beam.slope(0.0))[0])
         around |= {"coupling": 1e-4 * slopes, "inertia": 80e-9, "loss": 1.0 / 3e4}
@@ -258,13 +253,7 @@ def test_sticking_to_a_tip_on_a_moving_base() -> None:
 @pytest.mark.parametrize("e", [0.0, 0.3])
 @pytest.mark.parametrize(
     "names",
-    [
-        "base",
-        "base in space",
-        "force, drag, load",
-        "coil, base in space, spring, unequal wells",
-        "layers, load",
-    ],
+    ["base", "base in space", "force, drag, load", "coil, base in space, spring, unequal wells", "layers, load"],
 )
 def test_chatter_and_sticking(names: str, e: float) -> None:
     """Displacement, constraint force and the energy balance, beside what surrounds the beam."""

@@ -36,9 +36,7 @@ def test_tangents_are_the_derivatives(name: str, modes: int) -> None:
     """
     around, drive, ratio = SYSTEMS[name]
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
-    system = sb.System(
-        model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, gap=GAP))], **around
-    )
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, gap=GAP))], **around)
     well, omega = model.wells[0], float(model.omega[0])
     size = float(np.abs(well).max())
     rng, weights = np.random.default_rng(3), 1.0 / np.arange(1, modes + 1) ** 2

@@ -30,10 +30,7 @@ def assert_mirrored(below, above) -> None:
 def test_shaker_from_the_other_side(integrate_ensemble, model_of, draw, modes, runs, cycles) -> None:
     given = draw(runs, modes)
     assert_mirrored(
-        *(
-            integrate_ensemble(model_of(modes), **given, side=side, cycles=cycles)
-            for side in ("below", "above")
-        )
+        *(integrate_ensemble(model_of(modes), **given, side=side, cycles=cycles) for side in ("below", "above"))
     )
 
 
@@ -44,9 +41,7 @@ def test_every_law_and_drive_from_the_other_side(integrate_ensemble, model_of, d
     above = below | {"side": "above"}
     if "drive" in below:
         drive = below["drive"]
-        above["drive"] = dataclasses.replace(
-            drive, displacement=-drive.displacement, velocity=-drive.velocity
-        )
+        above["drive"] = dataclasses.replace(drive, displacement=-drive.displacement, velocity=-drive.velocity)
     assert_mirrored(integrate_ensemble(model, **below), integrate_ensemble(model, **above))
 
 
@@ -54,9 +49,9 @@ def test_every_law_and_drive_from_the_other_side(integrate_ensemble, model_of, d
 def test_negated_start(integrate_ensemble, model_of, draw, modes) -> None:
     model, given = model_of(modes), draw(6, 7)
     rng = np.random.default_rng(modes)
-    alpha = model.well_amplitude + 0.02 * np.abs(model.well_amplitude[0]) * rng.standard_normal(
-        modes
-    ) / np.arange(1, modes + 1)
+    alpha = model.well_amplitude + 0.02 * np.abs(model.well_amplitude[0]) * rng.standard_normal(modes) / np.arange(
+        1, modes + 1
+    )
     velocity = model.linear_modes[:, 0] * np.sqrt(1.5 * (model.saddle_energy - model.well_energy))
     below = integrate_ensemble(model, **given, cycles=4, start=State(amplitude=alpha, velocity=velocity))
     above = integrate_ensemble(

@@ -49,10 +49,7 @@ def test_none_is_missing() -> None:
     """
     others = sb.Shock, sb.RecordedAcceleration, RandomVibration
     elsewhere = {
-        f"{section}.{name}"
-        for section in ("drive", "base_excitation")
-        for kind in others
-        for name in quantities(kind)
+        f"{section}.{name}" for section in ("drive", "base_excitation") for kind in others for name in quantities(kind)
     }
     elsewhere |= {f"contact.{name}" for law in LAWS.values() if law.memory for name in quantities(law)}
     systems = [extended.system() for extended in SYSTEMS.values()]
@@ -73,9 +70,7 @@ def test_none_is_missing() -> None:
         assert not missing, f"{section}: no extended system has {missing}"
     own = set().union(*(each.parameters for each in systems))
     missing = {
-        name
-        for name, row in parameters().items()
-        if row.section not in ("integration", "initial_state", "force")
+        name for name, row in parameters().items() if row.section not in ("integration", "initial_state", "force")
     } - own
     assert missing <= elsewhere
 

@@ -20,9 +20,7 @@ def smooth(x: float) -> tuple[float, float]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("modes", "at_standard", "at_reference"), [(1, 1e-3, 1e-7), (3, 1e-4, 1e-7), (8, 1e-5, 1e-8)]
-)
+@pytest.mark.parametrize(("modes", "at_standard", "at_reference"), [(1, 1e-3, 1e-7), (3, 1e-4, 1e-7), (8, 1e-5, 1e-8)])
 def test_burst(modes, at_standard, at_reference) -> None:
     """Two cycles up, one as it is, half a cycle down, and the tip withdrawn."""
     beam, ratio, velocity = PaperBeam(modes), 1.21, 0.2
@@ -66,9 +64,7 @@ def test_burst(modes, at_standard, at_reference) -> None:
         np.testing.assert_allclose(
             run.dataset.displacement_at_striker, truth.displacement_at_striker, rtol=0.0, atol=bound
         )
-        np.testing.assert_allclose(
-            run.dataset.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(run.dataset.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound)
         np.testing.assert_allclose(
             run.dataset.penetration_normalised, truth.penetration_normalised, rtol=0.0, atol=bound
         )
@@ -81,11 +77,7 @@ def test_burst(modes, at_standard, at_reference) -> None:
 def test_going_on_is_going_on() -> None:
     """Three calls of one period give what one of three gives, to rounding: time is part of the state."""
     drive = sb.Burst(
-        frequency_ratio=1.3,
-        velocity_amplitude=0.2,
-        duration_cycles=2.0,
-        ramp_up_cycles=0.5,
-        ramp_down_cycles=0.5,
+        frequency_ratio=1.3, velocity_amplitude=0.2, duration_cycles=2.0, ramp_up_cycles=0.5, ramp_down_cycles=0.5
     )
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=3),
@@ -111,9 +103,7 @@ def test_one_tone_alone_is_the_sine() -> None:
         ).final_state
         for drive in (two, one)
     ]
-    np.testing.assert_allclose(
-        ends[0].amplitude, ends[1].amplitude, rtol=0.0, atol=1e-9 * abs(model.well_amplitude[0])
-    )
+    np.testing.assert_allclose(ends[0].amplitude, ends[1].amplitude, rtol=0.0, atol=1e-9 * abs(model.well_amplitude[0]))
 
 
 def test_other_amplitudes_and_a_stop() -> None:
@@ -125,12 +115,6 @@ def test_other_amplitudes_and_a_stop() -> None:
         return sb.simulate(system, sb.Integration(cycles=1)).final_state.amplitude
 
     sine = end(sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.25))
-    np.testing.assert_array_equal(
-        end(sb.DisplacementSine(frequency_ratio=2.0, displacement_amplitude=0.125)), sine
-    )
-    np.testing.assert_array_equal(
-        end(sb.AccelerationSine(frequency_ratio=2.0, acceleration_amplitude=0.5)), sine
-    )
-    np.testing.assert_array_equal(
-        end(sb.FixedStop()), end(sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.0))
-    )
+    np.testing.assert_array_equal(end(sb.DisplacementSine(frequency_ratio=2.0, displacement_amplitude=0.125)), sine)
+    np.testing.assert_array_equal(end(sb.AccelerationSine(frequency_ratio=2.0, acceleration_amplitude=0.5)), sine)
+    np.testing.assert_array_equal(end(sb.FixedStop()), end(sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.0)))

@@ -25,12 +25,8 @@ GIVEN = {
 }
 
 
-def imperfection(
-    rise: float = 0.0, skew: float = 0.0, force: float = 0.0, at: float = 0.5
-) -> sb.Imperfection:
-    return sb.Imperfection(
-        midspan_amplitude=rise, antisymmetric_amplitude=skew, point_load=force, point_location=at
-    )
+def imperfection(rise: float = 0.0, skew: float = 0.0, force: float = 0.0, at: float = 0.5) -> sb.Imperfection:
+    return sb.Imperfection(midspan_amplitude=rise, antisymmetric_amplitude=skew, point_load=force, point_location=at)
 
 
 def model_of(modes: int, **given: float) -> sb.ReducedModel:
@@ -40,8 +36,7 @@ def model_of(modes: int, **given: float) -> sb.ReducedModel:
 def struck_system(model: sb.ReducedModel, ratio: float, velocity: float, **more) -> sb.System:
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
     return sb.System(
-        model,
-        contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION, **more))],
+        model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION, **more))]
     )
 
 
@@ -60,41 +55,28 @@ def test_independent_solution(modes, cycles, given) -> None:
     omega, velocity = 1.21 * first, 0.4
     stroke = velocity * LEVEL * first / omega
     tip = Tip(
-        lambda t, _: (stroke * math.sin(omega * t), stroke * omega * math.cos(omega * t)),
-        lambda d, _: HERTZ * d**1.5,
+        lambda t, _: (stroke * math.sin(omega * t), stroke * omega * math.cos(omega * t)), lambda d, _: HERTZ * d**1.5
     )
     times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
     truth = follow(beam, tip, times)
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(
-            struck_system(model, 1.21, velocity),
-            sb.Integration(cycles=cycles, accuracy=accuracy),
-            sample_times=times,
+            struck_system(model, 1.21, velocity), sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times
         )
         data = run.dataset
-        np.testing.assert_allclose(
-            data.displacement_at_striker, truth.displacement_at_striker, rtol=0.0, atol=bound
-        )
-        np.testing.assert_allclose(
-            data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
-        )
+        np.testing.assert_allclose(data.displacement_at_striker, truth.displacement_at_striker, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound)
         ledger = data.energy_beam + data.energy_contact + data.energy_dissipated - data.striker_work
         assert np.ptp(ledger.values) < 1e-4 * data.attrs["gross_work"]
     assert run.summary.zero_crossings > 0 or cycles == 1
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=pytest.mark.slow if seed > 1 else ()) for seed in range(6)]
-)
+@pytest.mark.parametrize("seed", [pytest.param(seed, marks=pytest.mark.slow if seed > 1 else ()) for seed in range(6)])
 def test_no_equilibrium_is_missed(seed) -> None:
     """Every minimum that 200 starts find is there, and every equilibrium is one."""
     rng = np.random.default_rng(seed)
     modes = int(rng.integers(1, 6))
-    given = {
-        "rise": LEVEL * rng.uniform(-0.12, 0.12),
-        "force": rng.uniform(-0.3, 0.3),
-        "at": rng.uniform(0.1, 0.9),
-    }
+    given = {"rise": LEVEL * rng.uniform(-0.12, 0.12), "force": rng.uniform(-0.3, 0.3), "at": rng.uniform(0.1, 0.9)}
     if modes > 1:
         given["skew"] = LEVEL * rng.uniform(-0.1, 0.1)
     if seed % 2 == 0:
@@ -133,13 +115,11 @@ def test_a_small_shape_recedes_to_the_perfect_beam() -> None:
     errors = []
     for rise in (1e-9, 1e-10, 1e-11):
         near = sb.simulate(
-            struck_system(model_of(3, rise=rise), 1.3, 0.15),
-            sb.Integration(cycles=1, accuracy="reference"),
+            struck_system(model_of(3, rise=rise), 1.3, 0.15), sb.Integration(cycles=1, accuracy="reference")
         )
         errors.append(
             float(
-                np.abs(near.final_state.amplitude - run.final_state.amplitude).max()
-                / abs(run.final_state.amplitude[0])
+                np.abs(near.final_state.amplitude - run.final_state.amplitude).max() / abs(run.final_state.amplitude[0])
             )
         )
     assert errors[0] < 1e-4
@@ -152,9 +132,7 @@ def test_mirror_image() -> None:
     """The mirrored system's mirrored run, to the last bit."""
     given = {"rise": 9e-6, "skew": 4e-6, "force": 0.03, "at": 0.3}
     model = model_of(3, **given)
-    mirrored = sb.ReducedModel.from_beam(
-        default_values.BEAM, modes=3, imperfection=model.imperfection.mirrored
-    )
+    mirrored = sb.ReducedModel.from_beam(default_values.BEAM, modes=3, imperfection=model.imperfection.mirrored)
     np.testing.assert_array_equal(mirrored.wells[::-1], -model.wells)
     for velocity in (0.1, 0.2, 0.35):
         below = sb.advance(struck_system(model, 1.3, velocity), periods=5)
@@ -174,8 +152,7 @@ def test_a_run_knows_nothing_of_the_others_of_its_batch() -> None:
         ),
     )
     system = sb.System(
-        model,
-        contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.2))],
+        model, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.2))]
     )
     places = np.linspace(0.15, 0.85, 41)
     together = make_ensemble(system, sb.Integration(), {"contact.location": places})
@@ -228,8 +205,7 @@ def random_runs(modes: int, count: int, seed: int, cycles: int) -> tuple[int, in
         points = xr.Dataset({name: ("point", rng.uniform(*span, 40)) for name, span in columns.items()})
         system = struck_system(model, 1.2, 0.2, side=side)
         full, early = (
-            sb.sweep(system, points, sb.Integration(cycles=cycles, early_termination=flag))
-            for flag in (False, True)
+            sb.sweep(system, points, sb.Integration(cycles=cycles, early_termination=flag)) for flag in (False, True)
         )
         decided += int((early.status == RunStatus.EARLY_STOP).sum())
         wrong += int((early.response_class != full.response_class).sum())
@@ -255,10 +231,5 @@ def test_refusals() -> None:
         sb.Imperfection(profile=[[0.0, 0.2, 0.4, 0.9], [0.0, 1e-5, 1e-5, 0.0]])
     with pytest.raises(InputError, match="well_amplitude with transverse_force"):
         sb.ReducedModel.from_matrices(
-            [[1.0]],
-            [-1.0],
-            contact_shape=[1.0],
-            nonlinear_stiffness=1.0,
-            well_amplitude=[-1.0],
-            transverse_force=[0.1],
+            [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0], transverse_force=[0.1]
         )

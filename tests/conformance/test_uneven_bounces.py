@@ -39,15 +39,7 @@ def bounced(times):
             y, hits = [y[0], y[1] + (1.0 + KEEPS) * closing / phi], hits + 1
         begun = t
         part = solve_ivp(
-            flow,
-            (t, times[-1]),
-            y,
-            "DOP853",
-            dense_output=True,
-            rtol=1e-12,
-            atol=1e-16,
-            events=gap,
-            max_step=5e-5,
+            flow, (t, times[-1]), y, "DOP853", dense_output=True, rtol=1e-12, atol=1e-16, events=gap, max_step=5e-5
         )
         inside = (times >= t) & (times <= part.t[-1])
         found[inside] = phi * part.sol(times[inside])[0] / LEVEL

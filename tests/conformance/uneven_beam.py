@@ -15,9 +15,7 @@ Array = NDArray[np.float64]
 class UnevenBeam(PaperBeam):
     """Initial heights (m, at the centre) of the first mode, of the second at its top, and a force at a point."""
 
-    def __init__(
-        self, modes: int, rise: float = 0.0, skew: float = 0.0, force: float = 0.0, at: float = 0.5
-    ) -> None:
+    def __init__(self, modes: int, rise: float = 0.0, skew: float = 0.0, force: float = 0.0, at: float = 0.5) -> None:
         super().__init__(modes)
         bending = 200e9 * 15e-3 * (0.4e-3) ** 3 / 12.0
         self.load = bending * self.k**2 - self.stiffness

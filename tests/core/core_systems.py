@@ -40,16 +40,13 @@ def crowded(modes: int) -> sb.System:
             sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.7, amplitude=0.02), location=0.4),
         ],
         base_excitation=sb.BaseExcitation(
-            motion=sb.DisplacementSine(frequency_ratio=1.7, displacement_amplitude=0.02),
-            striker_on_base=False,
+            motion=sb.DisplacementSine(frequency_ratio=1.7, displacement_amplitude=0.02), striker_on_base=False
         ),
         axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=2.0)),
     )
 
 
-def arrays(
-    system: sb.System, cycles: int = 2, points: dict[str, Any] | None = None, **settings: Any
-) -> native._Arrays:
+def arrays(system: sb.System, cycles: int = 2, points: dict[str, Any] | None = None, **settings: Any) -> native._Arrays:
     """The arrays that the core gets."""
     how = sb.Integration(cycles=cycles, engine="native", **settings)
     found = {name: np.asarray(values, float) for name, values in (points or {}).items()}

@@ -31,11 +31,7 @@ def test_every_field_is_checked(which, name):
     words = rf"{which}\['{name}'\]"
     changed = []
     if isinstance(value, np.ndarray):
-        changed += [
-            value.astype(np.float32 if value.dtype.kind == "f" else np.int16),
-            "text",
-            value[..., None],
-        ]
+        changed += [value.astype(np.float32 if value.dtype.kind == "f" else np.int16), "text", value[..., None]]
         if value.shape[0] > 1:
             changed.append(value[:-1])
             if value.ndim > 1 and value.size:

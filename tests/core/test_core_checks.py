@@ -81,12 +81,7 @@ def test_the_sanitizers_find_nothing(tmp_path: Path) -> None:
     compiler = command("g++")
     asan, standard = library(compiler, "libasan.so"), library(compiler, "libstdc++.so")
     module = built(tmp_path, compiler, "SNAPBEAM_CHECKS")
-    tried(
-        module,
-        LD_PRELOAD=f"{asan} {standard}",
-        ASAN_OPTIONS="detect_leaks=0",
-        UBSAN_OPTIONS="print_stacktrace=1",
-    )
+    tried(module, LD_PRELOAD=f"{asan} {standard}", ASAN_OPTIONS="detect_leaks=0", UBSAN_OPTIONS="print_stacktrace=1")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="options of the compilers of Linux and macOS")

@@ -38,16 +38,12 @@ def let_go(mass, stiffness, damping, **more) -> sb.System:
         mass, stiffness, contact_shape=np.ones(n), damping=damping, length_scale=0.1, **more
     )
     rng = np.random.default_rng(9)
-    return sb.System(
-        model, initial_state=sb.State(amplitude=rng.uniform(-0.1, 0.1, n), velocity=rng.uniform(-1, 1, n))
-    )
+    return sb.System(model, initial_state=sb.State(amplitude=rng.uniform(-0.1, 0.1, n), velocity=rng.uniform(-1, 1, n)))
 
 
 def integrated(system: sb.System, **how):
     """Time (s), amplitudes and velocities in the coordinates of the matrices at the end, and the run."""
-    run = sb.simulate(
-        system, sb.Integration(**{"cycles": 4, "accuracy": "reference", "engine": "native"} | how)
-    )
+    run = sb.simulate(system, sb.Integration(**{"cycles": 4, "accuracy": "reference", "engine": "native"} | how))
     end = run.final_state
     return float(run.dataset.time[-1]), np.concatenate((end.amplitude, end.velocity)), run
 
@@ -106,9 +102,7 @@ def test_damping_of_rayleigh_is_that_of_ratios() -> None:
         mass, stiffness, contact_shape=np.ones(6), damping_ratio=ratios, length_scale=0.1
     )
     np.testing.assert_allclose(other.damping_matrix, model.damping_matrix, atol=1e-11)
-    one, two = (
-        integrated(each)[1] for each in (damped, sb.System(other, initial_state=damped.initial_state))
-    )
+    one, two = (integrated(each)[1] for each in (damped, sb.System(other, initial_state=damped.initial_state)))
     np.testing.assert_allclose(one, two, atol=1e-12)
 
 
@@ -195,12 +189,7 @@ def test_both_engines_with_a_circuit_and_a_local_damper() -> None:
     n = 3
     mass, stiffness, damping = matrices(n)
     model = sb.ReducedModel.from_matrices(
-        mass,
-        stiffness,
-        contact_shape=np.ones(n),
-        damping=damping,
-        length_scale=0.1,
-        patch_shape=[1.0, 0.5, 0.0],
+        mass, stiffness, contact_shape=np.ones(n), damping=damping, length_scale=0.1, patch_shape=[1.0, 0.5, 0.0]
     )
     coil = sb.ElectromagneticHarvester(force_factor=0.5, resistance=3.0, coil_resistance=2.0)
     layer = sb.PiezoelectricHarvester(moment_per_volt=0.6, capacitance=0.3, resistance=2.0)
@@ -255,12 +244,7 @@ def test_unequal_wells_have_one_matrix() -> None:
         system = sb.System(model, initial_state=start)
         time, found, run = integrated(system, engine=engine)
         exact = solve_ivp(
-            rate,
-            (0.0, time),
-            np.concatenate((start.amplitude, start.velocity)),
-            "DOP853",
-            rtol=1e-12,
-            atol=1e-13,
+            rate, (0.0, time), np.concatenate((start.amplitude, start.velocity)), "DOP853", rtol=1e-12, atol=1e-13
         ).y[:, -1]
         np.testing.assert_allclose(found, exact, atol=1e-8)
         assert abs(run.dataset.attrs["energy_error"]) < 1e-8
@@ -283,9 +267,7 @@ def test_what_is_refused(damping, more, message) -> None:
     scale = more.get("scale", 1.0)
     more = {name: value for name, value in more.items() if name != "scale"}
     with pytest.raises(InputError, match=message):
-        sb.ReducedModel.from_matrices(
-            scale * np.eye(2), [1.0, 2.0], contact_shape=[1.0, 1.0], damping=damping, **more
-        )
+        sb.ReducedModel.from_matrices(scale * np.eye(2), [1.0, 2.0], contact_shape=[1.0, 1.0], damping=damping, **more)
 
 
 def test_other_parts_of_the_package() -> None:
@@ -295,7 +277,5 @@ def test_other_parts_of_the_package() -> None:
     assert same == system and same.hash == system.hash
     other = system.replace(**{"model.reference_frequency": 2.0})
     np.testing.assert_array_equal(other.model.damping, damping)
-    with pytest.raises(
-        InputError, match=r"model.damping_ratio = 0.01: cannot be changed, the model has a damping"
-    ):
+    with pytest.raises(InputError, match=r"model.damping_ratio = 0.01: cannot be changed, the model has a damping"):
         system.replace(**{"model.damping_ratio": 0.01})

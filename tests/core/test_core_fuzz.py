@@ -37,9 +37,7 @@ def spoiled(rng, value):
         with np.errstate(all="ignore"):
             return np.nan_to_num(flat).astype(types[rng.integers(len(types))])
     if kind == 6:
-        return [None, "text", -1, flat.tolist(), np.zeros((0,) * max(flat.ndim, 1), flat.dtype)][
-            rng.integers(5)
-        ]
+        return [None, "text", -1, flat.tolist(), np.zeros((0,) * max(flat.ndim, 1), flat.dtype)][rng.integers(5)]
     if flat.size:
         at = rng.integers(flat.size)
         if flat.dtype == np.float64:

@@ -68,9 +68,7 @@ def test_law(law):
             assert (found["low"][0], found["high"][0]) == pytest.approx(kind.displacement_range(held))
             assert (found["damping"] >= steep * (1.0 - 1e-12)).all()
         np.testing.assert_allclose(found["force"], force, rtol=1e-12, atol=1e-300)
-        np.testing.assert_allclose(
-            found["potential"], [kind.energy(held, u) for u in x], rtol=1e-12, atol=1e-300
-        )
+        np.testing.assert_allclose(found["potential"], [kind.energy(held, u) for u in x], rtol=1e-12, atol=1e-300)
 
 
 @pytest.mark.parametrize("law", [law for law in MADE if isinstance(law, sb.LocalForce)], ids=repr)

@@ -51,17 +51,14 @@ def test_neighbours_threads_and_order_change_no_bit(made, layout):
 def test_layouts_agree_within_rounding(modes, which):
     """Over two cycles, in which the paper's motion enlarges rounding at most a million times."""
     found = {
-        layout: integrated(struck(modes), layout, which, points=RATIOS[:3])
-        for layout in ("runs", "modes", "thread")
+        layout: integrated(struck(modes), layout, which, points=RATIOS[:3]) for layout in ("runs", "modes", "thread")
     }
     columns = [
         native.STATISTICS.index(name)
         for name in ("max_displacement", "min_center", "energy", "dissipated", "square_velocity")
     ]
     for layout in ("runs", "modes"):
-        np.testing.assert_allclose(
-            found[layout][0][:, columns], found["thread"][0][:, columns], rtol=1e-8, atol=1e-18
-        )
+        np.testing.assert_allclose(found[layout][0][:, columns], found["thread"][0][:, columns], rtol=1e-8, atol=1e-18)
 
 
 def test_a_set_that_is_not_present_is_refused():

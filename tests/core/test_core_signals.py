@@ -47,9 +47,7 @@ def driven(drive: sb.Drive, modes: int = 1, **parts) -> sb.System:
 
 def moved_by_everything(modes: int) -> sb.System:
     """Pieces, windows, sweeps, jumps and tones on a striker, a second one, the base, a force and the load."""
-    chirp = sb.Chirp(
-        start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=1.0, sweep_type="log"
-    )
+    chirp = sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=1.0, sweep_type="log")
     second = sb.Contact(default_values.CONTACT, sb.Striker(drive=chirp, location=0.6, side="above", gap=1e-4))
     return driven(
         sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.2, phase=0.4) + PULSE,
@@ -141,10 +139,7 @@ def test_a_users_motion_without_components_is_approximated(monkeypatch):
 
     striker = sb.Striker(drive=OwnPulse(height=1e-4))
     system = sb.System(beam(3), contacts=[sb.Contact(default_values.CONTACT, striker)])
-    how, axes = (
-        sb.Integration(cycles=1, engine="native", accuracy="reference"),
-        {"drive.height": [5e-5, 1e-4, 4e-4]},
-    )
+    how, axes = (sb.Integration(cycles=1, engine="native", accuracy="reference"), {"drive.height": [5e-5, 1e-4, 4e-4]})
     found = sb.sweep(system, axes, how)
     monkeypatch.delattr(OwnPulse, "motion")
     monkeypatch.setattr(OwnPulse, "components", components)
@@ -194,9 +189,7 @@ class OwnCycle(Drive):
     @staticmethod
     def motion(drive, t):
         x, a = drive.omega * t, drive.amplitude
-        return a * (math.sin(x) + 0.2 * math.sin(2.0 * x)), a * drive.omega * (
-            math.cos(x) + 0.4 * math.cos(2.0 * x)
-        )
+        return a * (math.sin(x) + 0.2 * math.sin(2.0 * x)), a * drive.omega * (math.cos(x) + 0.4 * math.cos(2.0 * x))
 
 
 del DRIVES["own_cycle"]
@@ -226,8 +219,7 @@ def test_a_derivative_by_a_users_motion(monkeypatch):
     x = flow.advance(flow.coordinates(), 9).states[0]
     found = flow.slope(x, 2, "drive.height", 1e-4, 1e-9)
     ends = [
-        flow.advance(x[None], 2, points={"drive.height": np.array([at])}).states[0]
-        for at in (1e-4 + 3e-9, 1e-4 - 3e-9)
+        flow.advance(x[None], 2, points={"drive.height": np.array([at])}).states[0] for at in (1e-4 + 3e-9, 1e-4 - 3e-9)
     ]
     expected = (ends[0] - ends[1]) / 6e-9
     assert np.abs(expected).max() > 1e3
@@ -237,9 +229,7 @@ def test_a_derivative_by_a_users_motion(monkeypatch):
 def test_a_discontinuity_that_no_number_has_is_refused(monkeypatch):
     monkeypatch.setitem(DRIVES, "own_pulse", OwnPulse)
     monkeypatch.setattr(OwnPulse, "discontinuities", ("later",))
-    with pytest.raises(
-        InputError, match=r"later is not among the numbers omega, fastest, amplitude, duration"
-    ):
+    with pytest.raises(InputError, match=r"later is not among the numbers omega, fastest, amplitude, duration"):
         sb.simulate(driven(OwnPulse(height=1e-4)), sb.Integration(cycles=1))
 
 
@@ -250,8 +240,7 @@ def test_a_discontinuity_that_no_number_has_is_refused(monkeypatch):
 )
 def test_a_motion_that_is_not_smooth_is_refused(motion):
     with pytest.raises(
-        InputError,
-        match=r"Own\.motion at .* name the times of its jumps in discontinuities, or define components",
+        InputError, match=r"Own\.motion at .* name the times of its jumps in discontinuities, or define components"
     ):
         fitted("Own", motion, 1.0, 0.1, [])
 

@@ -72,9 +72,7 @@ def test_order_of_convergence(accuracy, order, lossy):
     ends = []
     for count in (40, 80, 160, 320):
         how = sb.Integration(cycles=1, engine="native", accuracy=accuracy, step=cycle / count * (1.0 + 1e-9))
-        ends.append(
-            sb.simulate(system, how, sample_times=[cycle * (1.0 - 1e-12)]).dataset.modal_amplitude.values[-1]
-        )
+        ends.append(sb.simulate(system, how, sample_times=[cycle * (1.0 - 1e-12)]).dataset.modal_amplitude.values[-1])
     errors = [np.abs(each - ends[-1]).max() for each in ends[:3]]
     floor = 1e-13 * np.abs(ends[-1]).max()
     for coarse, fine in itertools.pairwise(errors):
@@ -87,9 +85,7 @@ def test_order_of_convergence(accuracy, order, lossy):
 def test_early_termination_keeps_the_class(modes):
     points = {"drive.frequency_ratio": [0.8, 1.2, 1.6], "drive.velocity_amplitude": [0.05, 0.15, 0.3]}
     how = sb.Integration(cycles=40, engine="native")
-    early, whole = (
-        sb.sweep(struck(modes), points, how.replace(early_termination=each)) for each in (True, False)
-    )
+    early, whole = (sb.sweep(struck(modes), points, how.replace(early_termination=each)) for each in (True, False))
     np.testing.assert_array_equal(early.response_class, whole.response_class)
     assert (early.status == int(sb.RunStatus.EARLY_STOP)).any()
 

@@ -217,9 +217,7 @@ def test_a_users_law_is_the_packages(name, layout, monkeypatch):
 def test_without_numba_python_is_called(name, layout, monkeypatch, without_numba):
     monkeypatch.setenv("SNAPBEAM_LAYOUT", layout)
     monkeypatch.setattr("snapbeam.util.diagnostics._told", set())
-    sb.simulate(
-        made(*SAME[name][0]), NATIVE
-    )  # imports what it needs: not within the warnings that are caught
+    sb.simulate(made(*SAME[name][0]), NATIVE)  # imports what it needs: not within the warnings that are caught
     with pytest.warns(DiagnosticWarning, match=r"calls Python for every force.*\[laws\]"):
         check_same(name)
 
@@ -289,9 +287,7 @@ class OwnDent(OwnElasticPlastic):  # without energy and slope
 
 def test_a_users_memory_without_energy_and_slope():
     """They follow by quadrature and differences; the motion needs neither."""
-    given, own = (
-        sb.simulate(made(kind(1e5, 2e5)), REFERENCE) for kind in (sb.ElasticPlasticContact, OwnDent)
-    )
+    given, own = (sb.simulate(made(kind(1e5, 2e5)), REFERENCE) for kind in (sb.ElasticPlasticContact, OwnDent))
     np.testing.assert_allclose(own.final_state.indentation, given.final_state.indentation, rtol=1e-7)
     assert own.summary.energy_lost_contact == pytest.approx(given.summary.energy_lost_contact, rel=1e-3)
 
@@ -367,9 +363,7 @@ def test_values_of_a_force_alone():
     """Energy by a rule of Gauss, slope by differences."""
     law, x = OwnHertz(STIFFNESS), np.geomspace(1e-9, 1e-5, 9)
     own = user_laws.contact_law(law)
-    fields = {
-        name: np.empty(x.size) for name in ("force", "potential", "stiffness", "damping", "low", "high")
-    }
+    fields = {name: np.empty(x.size) for name in ("force", "potential", "stiffness", "damping", "low", "high")}
     numbers = np.array([*own.head, *law.numbers()])
     _core.law_values(channels.USER_LAWS[own.kind], {"x": x, "y": x, "numbers": numbers, **fields})
     kind = sb.HertzContact

@@ -30,9 +30,7 @@ def entries(docstring: str, sections: tuple[str, ...] = DESCRIBED) -> Iterator[t
     blocks = re.split(r"^(\w[\w ]*)\n-{3,}$", inspect.cleandoc(docstring), flags=re.MULTILINE)
     for title, block in zip(blocks[1::2], blocks[2::2], strict=True):
         if title in sections:
-            for name, text in re.findall(
-                r"^(\S.*)\n?((?:(?: .*)?\n)*)", block.strip("\n") + "\n", re.MULTILINE
-            ):
+            for name, text in re.findall(r"^(\S.*)\n?((?:(?: .*)?\n)*)", block.strip("\n") + "\n", re.MULTILINE):
                 yield name, " ".join(text.split())
 
 
@@ -117,11 +115,7 @@ def test_see_also() -> None:
     """Every public name refers to its neighbours, which are public too."""
     wrong = []
     for place, value in public():
-        names = [
-            name
-            for line, _ in entries(inspect.getdoc(value) or "", ("See Also",))
-            for name in line.split(", ")
-        ]
+        names = [name for line, _ in entries(inspect.getdoc(value) or "", ("See Also",)) for name in line.split(", ")]
         if not names or place in names or not all(_is_public(name) for name in names):
             wrong.append((place, names))
     assert wrong == []

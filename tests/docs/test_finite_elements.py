@@ -38,9 +38,7 @@ def test_finite_elements_agree_with_the_beam() -> None:
     assert float(for_fe.midspan_shape @ for_fe.well_amplitude) == pytest.approx(height, rel=2e-4)
     # the share of the base's motion that each mode takes
     np.testing.assert_allclose(
-        (model.mass @ model.base_shape)[0] ** 2,
-        (own.linear_modes.T @ inertial_row(own))[0] ** 2,
-        rtol=2e-3,
+        (model.mass @ model.base_shape)[0] ** 2, (own.linear_modes.T @ inertial_row(own))[0] ** 2, rtol=2e-3
     )
 
 

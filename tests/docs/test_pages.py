@@ -199,13 +199,9 @@ def test_there_are_commands_in_the_pages():
 def test_interface_page_is_complete(module):
     text = API
     named = set(re.findall(r"(?:auto\w+|py:data)::\s*(\S+)$", text, re.MULTILINE))
-    if block := re.search(
-        rf"automodule:: {re.escape(module)}\n   :members:\n(?:   :exclude-members: (.*))?", text
-    ):
+    if block := re.search(rf"automodule:: {re.escape(module)}\n   :members:\n(?:   :exclude-members: (.*))?", text):
         # Sphinx lists every name of __all__; the page lists excluded names in another section
-        assert {name for name in (block[1] or "").split(", ") if name} <= {
-            name.split(".")[-1] for name in named
-        }
+        assert {name for name in (block[1] or "").split(", ") if name} <= {name.split(".")[-1] for name in named}
         return
     package = import_module(module)
     elsewhere = {"Diagnostic", "Severity"} if module == "snapbeam.lab" else set()  # by the names of the core
@@ -247,9 +243,7 @@ def test_sections_of_the_interface_are_short(path):
             elif members:
                 count += len(members[1].split(","))
             else:
-                count += len(import_module(module[1]).__all__) - len(
-                    left_out[1].split(",") if left_out else ()
-                )
+                count += len(import_module(module[1]).__all__) - len(left_out[1].split(",") if left_out else ())
         assert count <= 20
 
 
@@ -292,9 +286,7 @@ def test_crossings_end_runs_that_energy_does_not(name):
     """The table says "crossings" of these systems: runs end early, and none has another class than the complete run."""
     system = REFERENCE["_parts"]()[name].replace(**{"model.modes": 1})
     section, drive = system.primary_excitation
-    axis = next(
-        each for each in ("velocity_amplitude", "acceleration_amplitude", "amplitude") if hasattr(drive, each)
-    )
+    axis = next(each for each in ("velocity_amplitude", "acceleration_amplitude", "amplitude") if hasattr(drive, each))
     axes = {f"{section}.{axis}": getattr(drive, axis) * np.linspace(1.0, 12.0, 40)}
     complete, early = (
         sb.sweep(system, axes, sb.Integration(cycles=60, early_termination=early)) for early in (False, True)
@@ -310,17 +302,12 @@ def test_a_proven_well_does_not_prove_the_class():
         sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
         contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))],
     )  # fmt: skip
-    axes = {
-        "drive.frequency_ratio": np.linspace(0.3, 3.0, 30),
-        "drive.velocity_amplitude": np.linspace(0.1, 0.6, 30),
-    }
+    axes = {"drive.frequency_ratio": np.linspace(0.3, 3.0, 30), "drive.velocity_amplitude": np.linspace(0.1, 0.6, 30)}
     short, long = (sb.sweep(system, axes, sb.Integration(cycles=cycles)) for cycles in (60, 240))
     proven = short["final_well_proven"].values
     assert proven.sum() > 100
     np.testing.assert_array_equal(short["final_well"].values[proven], long["final_well"].values[proven])
-    np.testing.assert_array_equal(
-        short["zero_crossings"].values[proven], long["zero_crossings"].values[proven]
-    )
+    np.testing.assert_array_equal(short["zero_crossings"].values[proven], long["zero_crossings"].values[proven])
     before, after = (each["response_class"].values[proven] for each in (short, long))
     changed = before != after
     assert (before[changed] == sb.ResponseClass.CONTINUOUS).all()
@@ -346,9 +333,7 @@ def test_supported_combinations():
     assert several["sections, exponents"] == several["orbits, branches, attractors, basins"] == "yes"
     reasons = re.findall(r"^\d+\. (.*)$", text, flags=re.MULTILINE)
     numbers = {
-        int(number)
-        for row in answers.values()
-        for number in re.findall(r"no \((\d+)\)", " ".join(row.values()))
+        int(number) for row in answers.values() for number in re.findall(r"no \((\d+)\)", " ".join(row.values()))
     }
     assert numbers == set(range(1, len(reasons) + 1))
     assert all(";" in reason for reason in reasons)
@@ -361,21 +346,8 @@ def test_glossary_is_sorted_and_complete():
     entries = dict(re.findall(r"^(\S.*)\n((?:  .*\n)+)", text.partition("```{glossary}\n")[2], re.MULTILINE))
     assert list(entries) == sorted(entries, key=str.lower)
     assert all(words.rstrip().endswith(".") for words in entries.values())
-    needed = {
-        "snap-through",
-        "penetration",
-        "excitation",
-        "checkpoint",
-        "tolerance",
-        "right-censored",
-    }
-    needed |= {
-        "frequency ratio",
-        "velocity amplitude",
-        "attractor",
-        "response class",
-        "early termination",
-    }
+    needed = {"snap-through", "penetration", "excitation", "checkpoint", "tolerance", "right-censored"}
+    needed |= {"frequency ratio", "velocity amplitude", "attractor", "response class", "early termination"}
     assert needed <= set(entries)
 
 
@@ -401,9 +373,7 @@ TEXTS = [
 def test_links_lead_to_files_of_the_repository(path) -> None:
     """Pages are read on the repository's page too, where nothing that is built exists."""
     text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-    targets = {
-        link.split("#")[0] for link in re.findall(r"\]\(([^)\s]+)\)", text) if not re.match(r"[a-z]+:", link)
-    }
+    targets = {link.split("#")[0] for link in re.findall(r"\]\(([^)\s]+)\)", text) if not re.match(r"[a-z]+:", link)}
     missing = [target for target in targets if target and not (path.parent / target).exists()]
     assert not missing
 
@@ -411,9 +381,7 @@ def test_links_lead_to_files_of_the_repository(path) -> None:
 def table(name: str) -> list[list[str]]:
     """Rows of all tables of a stored text, without their headings."""
     text = (ROOT / "docs" / "data" / name).read_text(encoding="utf-8")
-    lines = [
-        line for line in text.splitlines() if line.startswith("|") and not re.match(r"\|[-:| ]+\|$", line)
-    ]
+    lines = [line for line in text.splitlines() if line.startswith("|") and not re.match(r"\|[-:| ]+\|$", line)]
     return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
 
 
@@ -425,13 +393,8 @@ def test_numbers_of_the_diagnostics():
     assert sum(counts) == len(ends)
     assert "Of {} errors, {} are right, {} are flagged and {} are refused".format(len(ends), *counts) in page
     samples = [row for row in table("random_defects.md") if row[0] and "from its beginning" not in row[0]]
-    good, flagged, defective, undetected = (
-        sum(int(row[i].split(",")[0]) for row in samples) for i in (1, 2, 4, 6)
-    )
-    assert (
-        f"has {good + defective:,} random recordings" in page
-        and f"{defective:,} of them with a defect" in page
-    )
+    good, flagged, defective, undetected = (sum(int(row[i].split(",")[0]) for row in samples) for i in (1, 2, 4, 6))
+    assert f"has {good + defective:,} random recordings" in page and f"{defective:,} of them with a defect" in page
     assert f"the {good:,} good ones, {flagged} were flagged by mistake" in page
     assert f"without a diagnostic. {undetected} did" in page
 

@@ -20,9 +20,7 @@ WRITES = {
     "--stream", "--save-system",
 }  # fmt: skip
 """Options whose value is a file that the command makes."""
-FILE = re.compile(
-    r"[\w./-]+\.(?:toml|nc|csv|cihx|mraw|wav|uff|tdms|mat|h5|map|checkpoint|tif|tiff|mp4|py|json)"
-)
+FILE = re.compile(r"[\w./-]+\.(?:toml|nc|csv|cihx|mraw|wav|uff|tdms|mat|h5|map|checkpoint|tif|tiff|mp4|py|json)")
 REFERENCE = {"command_line", "parameters", "variables", "api"}
 """Written from the program; each example of a command stands alone."""
 OWN = {
@@ -100,9 +98,7 @@ def test_files_are_there_before_they_are_read(page) -> None:
 def test_a_missing_file_is_found() -> None:
     """What the test before is for."""
     file = "```toml\n# own.toml\n[beam]\n```\n\n"
-    command = (
-        "```\nsnapbeam map --config own.toml -o a.nc --plot a.png\nsnapbeam info a.nc --export a.csv\n```\n"
-    )
+    command = "```\nsnapbeam map --config own.toml -o a.nc --plot a.png\nsnapbeam info a.nc --export a.csv\n```\n"
     assert missing_files("page", file + command) == []
     assert missing_files("page", command) == ["own.toml"]
     assert missing_files("page", command + file) == ["own.toml"]

@@ -18,16 +18,7 @@ from snapbeam.cli.app import app
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 PLAIN = " ".join(TEXT.split())
-SMALLER = [
-    "--modes",
-    "1",
-    "--cycles",
-    "5",
-    "--frequency-ratio",
-    "0.8:2:3",
-    "--velocity-amplitude",
-    "0.1:0.4:2",
-]
+SMALLER = ["--modes", "1", "--cycles", "5", "--frequency-ratio", "0.8:2:3", "--velocity-amplitude", "0.1:0.4:2"]
 
 
 def command(name: str) -> list[str]:
@@ -85,10 +76,7 @@ def test_numbers_of_the_comparison():
     text = (ROOT / "docs" / "images" / "fixed_steps.inc").read_text(encoding="utf-8")
     again = [float(line.split("|")[6]) for line in text.splitlines() if line.startswith("| 32 |")]
     assert len(again) == 2  # of the same points
-    assert (
-        f"takes {1e3 * seconds:.0f} to {max(again):.0f} ms on one core, averaged over twelve test points"
-        in PLAIN
-    )
+    assert f"takes {1e3 * seconds:.0f} to {max(again):.0f} ms on one core, averaged over twelve test points" in PLAIN
     page = (ROOT / "docs" / "accuracy_and_speed.md").read_text(encoding="utf-8")
     first, second = re.search(r"dop853 took ([\d.]+) and ([\d.]+) times", page).groups()
     assert float(second) == min(ratio["numbalsoda dop853"], ratio["numbalsoda lsoda"])

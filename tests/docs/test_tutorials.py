@@ -70,12 +70,7 @@ def follow(name: str, capsys: pytest.CaptureFixture[str], end: str = "") -> None
         "tutorial_beam",
         *(
             pytest.param(each, marks=pytest.mark.slow)
-            for each in (
-                "tutorial_waveform",
-                "howto_harvester",
-                "mems_arch",
-                "mems_switch",
-            )
+            for each in ("tutorial_waveform", "howto_harvester", "mems_arch", "mems_switch")
         ),
     ],
 )

@@ -42,13 +42,7 @@ def test_twenty_problems_state_what_they_are():
         for case in problem.cases:
             assert problem.references[case.name]["agreement"] < 1e-6, (name, case.name)
             assert case.scale > 0
-            sizes = {
-                len(case.stiffness),
-                len(case.damping),
-                len(case.start),
-                len(case.speed),
-                len(case.output),
-            }
+            sizes = {len(case.stiffness), len(case.damping), len(case.start), len(case.speed), len(case.output)}
             assert sizes == {len(case.stiffness)}
             if problem.kind == "trajectory":
                 assert len(problem.references[case.name]["values"]) == case.samples
@@ -106,9 +100,7 @@ def test_matrices_are_those_of_the_data_files(modes):
     for key in ("stiffness", "damping", "gradient", "coupling"):
         assert np.allclose(made["structure"][key], stored["structure"][key], rtol=1e-9, atol=1e-6)
     # 83.933 Hz with one mode, 81.92 Hz with eight (the source's frequencies).
-    assert 1 / stored["unit_of_time_s"] / (2 * math.pi) == pytest.approx(
-        {1: 83.933, 8: 81.92}[modes], abs=5e-3
-    )
+    assert 1 / stored["unit_of_time_s"] / (2 * math.pi) == pytest.approx({1: 83.933, 8: 81.92}[modes], abs=5e-3)
 
 
 def test_replicas_are_those_of_the_formula_and_their_intervals_cover():
@@ -139,9 +131,7 @@ def test_scipy_runner_reproduces_the_references(problem):
 
 def test_events_are_needed_for_restitution():
     with pytest.raises(CannotRun):
-        runner("SciPy").prepare(
-            load("two_stops").cases[0], {"method": "RK45", "tolerance": 1e-6, "events": False}
-        )()
+        runner("SciPy").prepare(load("two_stops").cases[0], {"method": "RK45", "tolerance": 1e-6, "events": False})()
 
 
 def test_unknown_name_is_refused():
@@ -160,8 +150,7 @@ def test_runner_of_the_readme_runs():
     case = problem.cases[0]
     stored = np.array(problem.references["stop"]["values"])
     errors = [
-        float(np.max(np.abs(own["prepare"](case, setting)().values - stored)))
-        for setting in own["settings"](case)
+        float(np.max(np.abs(own["prepare"](case, setting)().values - stored))) for setting in own["settings"](case)
     ]
     assert errors[1] < 1e-3
     assert errors[1] < errors[0] / 5

@@ -94,14 +94,7 @@ class Alone:
         """Install the archive, with an extra or none."""
         named = f"{archive.resolve()}[{extra}]" if extra else str(archive.resolve())
         # by the pip that is there; what is never imported need not be compiled
-        pip = [
-            sys.executable,
-            "-m",
-            "pip",
-            "--python",
-            str(self._binaries / "python"),
-            "--disable-pip-version-check",
-        ]
+        pip = [sys.executable, "-m", "pip", "--python", str(self._binaries / "python"), "--disable-pip-version-check"]
         words = ["install", "--quiet", "--no-compile", "--constraint", str(CONSTRAINTS), named]
         done = subprocess.run([*pip, *words], capture_output=True, text=True, cwd=self.folder)
         if done.returncode:

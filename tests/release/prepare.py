@@ -87,12 +87,7 @@ def prepare(version: str, repository: str = "", day: str = "", root: Path = ROOT
             "Changelog": f"{repository}/blob/main/CHANGELOG.md",
         }
         for name, url in urls.items():
-            _state_line(
-                root / "pyproject.toml",
-                rf"^{name} = .*$",
-                f'{name} = "{url}"',
-                r"^\[project\.urls\]$",
-            )
+            _state_line(root / "pyproject.toml", rf"^{name} = .*$", f'{name} = "{url}"', r"^\[project\.urls\]$")
 
 
 if __name__ == "__main__":

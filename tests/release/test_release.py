@@ -37,9 +37,7 @@ def test_metadata_agree():
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert (meta["name"], meta["description"]) == (project["name"], project["description"])
     assert meta["keywords"] == project["keywords"]
-    assert (
-        meta["license"].endswith("/" + project["license"]) and f"license: {project['license']}\n" in citation
-    )
+    assert meta["license"].endswith("/" + project["license"]) and f"license: {project['license']}\n" in citation
     author = project["authors"][0]["name"]
     assert meta["author"][0]["name"] == author and f'name: "{author}"' in citation
     bibtex = (ROOT / "docs" / "getting-started.md").read_text(encoding="utf-8")
@@ -70,9 +68,7 @@ def test_a_release_is_prepared(copied):
     assert "\n## Unreleased\n\n## 0.2.0 (" in (copied / "CHANGELOG.md").read_text(encoding="utf-8")
     prepare("0.3.0", address, "2027-01-15", copied)
     citation = (copied / "CITATION.cff").read_text(encoding="utf-8")
-    assert (
-        "version: 0.3.0\ndate-released: 2027-01-15\n" in citation and citation.count("repository-code:") == 1
-    )
+    assert "version: 0.3.0\ndate-released: 2027-01-15\n" in citation and citation.count("repository-code:") == 1
     meta = json.loads((copied / "codemeta.json").read_text(encoding="utf-8"))
     assert (meta["version"], meta["dateModified"], meta["codeRepository"]) == ("0.3.0", "2027-01-15", address)
     urls = tomllib.loads((copied / "pyproject.toml").read_text(encoding="utf-8"))["project"]["urls"]
@@ -219,10 +215,7 @@ def test_the_conda_recipe_has_the_dependencies_of_the_package():
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     recipe = (ROOT / "recipe" / "recipe.yaml").read_text(encoding="utf-8")
     run = re.search(r"  run:\n((?:    - [^\n]*\n)+)", recipe).group(1)
-    held = {
-        line.strip("- ").replace("matplotlib-base", "matplotlib").replace(" ", "")
-        for line in run.splitlines()
-    }
+    held = {line.strip("- ").replace("matplotlib-base", "matplotlib").replace(" ", "") for line in run.splitlines()}
     assert held == {*stated["dependencies"], "python" + stated["requires-python"]}
 
 
@@ -230,9 +223,7 @@ def test_the_paper_cites_what_its_bibliography_has():
     """Each citation resolves, each entry is cited and has a DOI, and the text has at most 1,000 words."""
     text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
     entries = dict(
-        re.findall(
-            r"@\w+\{(\w+),(.*?)\n\}", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.DOTALL
-        )
+        re.findall(r"@\w+\{(\w+),(.*?)\n\}", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.DOTALL)
     )
     body = text.split("---", 2)[2]
     assert set(re.findall(r"@([a-z]+\d{4})", body)) == set(entries)
@@ -246,8 +237,6 @@ def test_the_paper_states_the_verdicts_that_are_stored():
     numbers = re.search(r"Of (\d+) statements (\d+) hold, (\d+) hold in part and (\d+) fail", first).groups()
     text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
     assert (
-        re.search(
-            r"Of (\d+) testable statements (\d+) hold, (\d+) hold in part and (\d+) fail", text
-        ).groups()
+        re.search(r"Of (\d+) testable statements (\d+) hold, (\d+) hold in part and (\d+) fail", text).groups()
         == numbers
     )

@@ -93,9 +93,7 @@ def python():
 
     def run(script, path, timeout=300, **environment):
         env = os.environ | {"PYTHONPATH": str(path), "PYTHONDONTWRITEBYTECODE": "1"} | environment
-        return subprocess.run(
-            [sys.executable, "-c", script], env=env, capture_output=True, text=True, timeout=timeout
-        )
+        return subprocess.run([sys.executable, "-c", script], env=env, capture_output=True, text=True, timeout=timeout)
 
     run.package = PACKAGE.parent
     return run

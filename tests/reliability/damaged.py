@@ -143,9 +143,7 @@ def peak_memory() -> float:
 if __name__ == "__main__":
     fuzz._limit_memory(4.0)
     report = Path(sys.argv[3]).absolute()
-    made, wrong = fuzz_files(
-        int(sys.argv[1]), int(sys.argv[2]), *map(float, sys.argv[4:5]), only="".join(sys.argv[5:])
-    )
+    made, wrong = fuzz_files(int(sys.argv[1]), int(sys.argv[2]), *map(float, sys.argv[4:5]), only="".join(sys.argv[5:]))
     found = {"files": made, "peak memory, bytes": peak_memory()}
     found["wrong"] = {name: {"times": len(each), "example": each[0]} for name, each in wrong.items()}
     report.write_text(json.dumps(found, indent=1))

@@ -112,12 +112,8 @@ _OF_RESULTS = ("run", "dataset", "data", "result", "measured", "simulated", "sig
 def _results() -> list[Any]:
     """A run, its dataset, a map, a threshold and a measured signal."""
     run = sb.simulate(SYSTEM, SHORT)
-    field = sb.sweep(
-        SYSTEM, {"drive.frequency_ratio": [0.9, 1.0], "drive.velocity_amplitude": [0.1, 0.2]}, SHORT
-    )
-    limit = sb.threshold(
-        SYSTEM, "drive.velocity_amplitude", [0.1, 0.2], {"drive.frequency_ratio": [0.9, 1.0]}, SHORT
-    )
+    field = sb.sweep(SYSTEM, {"drive.frequency_ratio": [0.9, 1.0], "drive.velocity_amplitude": [0.1, 0.2]}, SHORT)
+    limit = sb.threshold(SYSTEM, "drive.velocity_amplitude", [0.1, 0.2], {"drive.frequency_ratio": [0.9, 1.0]}, SHORT)
     signal = sb.lab.make_signal(np.sin(np.arange(500.0)), sampling_frequency=1e3, units="m/s")
     return [run, run, run.dataset, field, limit, signal]
 
@@ -141,21 +137,13 @@ def public() -> dict[str, Any]:
     for where, room in rooms:
         for name in room.__all__:
             value = getattr(room, name)
-            if not callable(value) or (
-                inspect.isclass(value) and issubclass(value, (BaseException, enum.Enum))
-            ):
+            if not callable(value) or (inspect.isclass(value) and issubclass(value, (BaseException, enum.Enum))):
                 continue
             if getattr(value, "_is_protocol", False) or inspect.isabstract(value):
                 continue
             found[f"{where}.{name}"] = value
-            if (
-                inspect.isclass(value)
-                and not inspect.isabstract(value)
-                and value not in (sb.ContactLaw, sb.Drive)
-            ):
-                for own in vars(
-                    value
-                ):  # static methods are functions of the solver, which take numbers alone
+            if inspect.isclass(value) and not inspect.isabstract(value) and value not in (sb.ContactLaw, sb.Drive):
+                for own in vars(value):  # static methods are functions of the solver, which take numbers alone
                     method = inspect.getattr_static(value, own)
                     if not own.startswith("_") and isinstance(method, classmethod):
                         found[f"{where}.{name}.{own}"] = getattr(value, own)
@@ -318,9 +306,7 @@ def fuzz_calls(
     programs = {name: each for name, each in programs.items() if name not in _LONG_COMMANDS}
     names, wrong, made, start = list(functions), collections.defaultdict(list), 0, time.monotonic()
     for each in (None, [0.1, 0.2]):  # libraries are loaded before anything is timed
-        sb.simulate(SYSTEM, SHORT) if each is None else sb.sweep(
-            SYSTEM, {"drive.velocity_amplitude": each}, SHORT
-        )
+        sb.simulate(SYSTEM, SHORT) if each is None else sb.sweep(SYSTEM, {"drive.velocity_amplitude": each}, SHORT)
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)

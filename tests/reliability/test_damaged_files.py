@@ -19,15 +19,12 @@ def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("written")
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     system = sb.System(
-        model,
-        contacts=[
-            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1))
-        ],
+        model, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1))]
     )
     sb.simulate(system, sb.Integration(cycles=2)).save(folder / "run.nc")
-    swept(
-        model, default_values.CONTACT, frequency_ratio=[1.0, 1.5], velocity_amplitude=[0.1, 0.2], cycles=5
-    ).to_netcdf(folder / "map.nc", engine="h5netcdf")
+    swept(model, default_values.CONTACT, frequency_ratio=[1.0, 1.5], velocity_amplitude=[0.1, 0.2], cycles=5).to_netcdf(
+        folder / "map.nc", engine="h5netcdf"
+    )
     return folder
 
 

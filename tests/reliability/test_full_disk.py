@@ -36,9 +36,7 @@ def test_a_dataset_that_does_not_fit(mounted, tmp_path, monkeypatch, tried, size
     try:
         write_netcdf(dataset, disk / "a.nc")
     except NoRoomError as error:
-        found = re.search(
-            r"it needs ([0-9.e+]+) MB, [0-9.e+-]+ MB are free; it was written to '(.*)' inst", str(error)
-        )
+        found = re.search(r"it needs ([0-9.e+]+) MB, [0-9.e+-]+ MB are free; it was written to '(.*)' inst", str(error))
         kept = Path(found[2])
         assert float(found[1]) == pytest.approx(kept.stat().st_size / 1e6, rel=0.01)
         assert os.listdir(disk) == []
@@ -59,9 +57,7 @@ def test_it_fits_and_is_what_xarray_writes(tmp_path):
     dataset = random_set(1000)
     write_netcdf({None: dataset, "more": dataset.isel(x=0)}, tmp_path / "a.nc")
     dataset.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
-    xr.testing.assert_identical(
-        read_back(tmp_path / "a.nc"), xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf")
-    )
+    xr.testing.assert_identical(read_back(tmp_path / "a.nc"), xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf"))
     more = xr.load_dataset(tmp_path / "a.nc", engine="h5netcdf", group="more")
     xr.testing.assert_identical(more, dataset.isel(x=0))
 
@@ -71,9 +67,7 @@ def test_no_room_anywhere(mounted, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(disk))
     before = disk / "a.nc"
     before.write_text("a file of before", encoding="utf-8")
-    with pytest.raises(
-        NoRoomError, match=r"needs 0\.8\d+ MB, 0\.00\d+ MB are free: make room and give the same"
-    ):
+    with pytest.raises(NoRoomError, match=r"needs 0\.8\d+ MB, 0\.00\d+ MB are free: make room and give the same"):
         write_netcdf(random_set(100_000), before)
     assert os.listdir(disk) == ["a.nc"] and before.read_text(encoding="utf-8") == "a file of before"
 
@@ -98,9 +92,7 @@ def test_blocks_that_do_not_fit(mounted, tmp_path, monkeypatch, tried):
 
 def test_a_run_that_cannot_be_saved_is_not_lost(mounted, tmp_path, monkeypatch, model, contact):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    system = sb.System(
-        model, contacts=[sb.Contact(contact, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))]
-    )
+    system = sb.System(model, contacts=[sb.Contact(contact, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))])
     run = sb.simulate(system, sb.Integration(cycles=5))
     with pytest.raises(NoRoomError) as refused:
         run.save(mounted("disk", "size=20k") / "run.nc")
@@ -126,24 +118,13 @@ def test_commands_on_a_full_disk(mounted, tmp_path, tried, place):
     disk = mounted("disk", "size=20k")
     paths = {name: tmp_path / name for name in ("output", "plot", "store", "log", "save")}
     paths[place] = disk / place
-    grid = [
-        "--frequency-ratio",
-        "0.5:2:24",
-        "--velocity-amplitude",
-        "0.05:0.6:24",
-        "--modes",
-        "1",
-        "--cycles",
-        "2",
-    ]
+    grid = ["--frequency-ratio", "0.5:2:24", "--velocity-amplitude", "0.05:0.6:24", "--modes", "1", "--cycles", "2"]
     command = ["map", *grid, "-o", f"{paths['output']}.nc", "--plot", f"{paths['plot']}.png"]
     command += ["--checkpoint", str(paths["store"])] if place == "store" else []
     if place == "save":
         command = ["simulate", "--modes", "1", "--cycles", "20", "-o", f"{paths['save']}.nc"]
     env = os.environ | {"PYTHONFAULTHANDLER": "1"}
-    done = subprocess.run(
-        [sys.executable, "-c", RUN, *command], capture_output=True, text=True, env=env, cwd=tmp_path
-    )
+    done = subprocess.run([sys.executable, "-c", RUN, *command], capture_output=True, text=True, env=env, cwd=tmp_path)
     early = place != "plot"  # the size of a figure is not known before it is drawn
     assert done.returncode == (2 if early else 1), (done.returncode, done.stderr)
     assert ("make room" if early else "No space left on device") in done.stderr
@@ -187,6 +168,4 @@ def test_every_netcdf_file_is_written_that_way():
     package = Path(sb.__file__).parent
     for file in package.rglob("*.py"):
         text = file.read_text(encoding="utf-8")
-        assert not re.search(
-            r"\.to_netcdf\(|h5netcdf\.File\((?!stream)|h5py\.File\((?!stream).*[\"'](w|a)", text
-        ), file
+        assert not re.search(r"\.to_netcdf\(|h5netcdf\.File\((?!stream)|h5py\.File\((?!stream).*[\"'](w|a)", text), file

@@ -56,9 +56,7 @@ def at_most():
 
 def frame(size, *, says_size):
     """A Zstandard frame of zeros: 4 bytes for each 128 KiB of contents."""
-    header = (
-        struct.pack("<IBQ", 0xFD2FB528, 0xE0, size) if says_size else struct.pack("<IBB", 0xFD2FB528, 0, 0x58)
-    )
+    header = struct.pack("<IBQ", 0xFD2FB528, 0xE0, size) if says_size else struct.pack("<IBB", 0xFD2FB528, 0, 0x58)
     block = 2**17
     blocks = [((block << 3) | (1 << 1)).to_bytes(3, "little") + b"\0"] * (size // block)
     last = blocks[-1]
@@ -91,9 +89,7 @@ def test_chunks_that_fill_the_memory(store, small, at_most, tried, name, which):
     tried("hostile files of a checkpoint")
 
 
-@pytest.mark.parametrize(
-    "change", [{"codecs": [{"name": "bytes"}]}, {"shape": [10**9, 8]}, {"data_type": "string"}]
-)
+@pytest.mark.parametrize("change", [{"codecs": [{"name": "bytes"}]}, {"shape": [10**9, 8]}, {"data_type": "string"}])
 def test_foreign_descriptions_of_arrays_are_not_used(store, tried, change):
     file = store / "runs.zarr/base/numbers/zarr.json"
     file.write_text(json.dumps(json.loads(file.read_text(encoding="utf-8")) | change), encoding="utf-8")
@@ -184,9 +180,7 @@ def test_a_checkpoint_of_too_many_points(store, tried):
     """20,000 numbers describe 10^8 points."""
     file = store / "map.json"
     held = json.loads(file.read_text(encoding="utf-8"))
-    held["parameters"]["points"] = {
-        name: np.linspace(0.1, 0.6, 10_000).tolist() for name in (RATIO, VELOCITY)
-    }
+    held["parameters"]["points"] = {name: np.linspace(0.1, 0.6, 10_000).tolist() for name in (RATIO, VELOCITY)}
     held["parameter_hash"] = parameter_hash(held["parameters"])
     file.write_text(json.dumps(held), encoding="utf-8")
     with pytest.raises(InputError, match=r"100000000 points would take 65\.2 GiB"):

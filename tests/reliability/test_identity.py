@@ -39,9 +39,7 @@ def system(**changes):
     model = sb.ReducedModel.from_matrices(**MATRICES | changes)
     return sb.System(
         model,
-        contacts=[
-            sb.Contact(sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
-        ],
+        contacts=[sb.Contact(sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))],
     )
 
 
@@ -50,9 +48,7 @@ def test_a_store_gives_back_no_other_structures_numbers(tmp_path):
     store, how = tmp_path / "store", sb.Integration(cycles=2)
     first = sb.sweep(system(), AXES, how, checkpoint=sb.CheckpointOptions(store))
     for name, value in OTHERS.items():
-        with pytest.raises(
-            InputError, match=rf"(?s)contains a sweep with other parameters.*system\.model\.{name}"
-        ):
+        with pytest.raises(InputError, match=rf"(?s)contains a sweep with other parameters.*system\.model\.{name}"):
             sb.sweep(system(**{name: value}), AXES, how, checkpoint=sb.CheckpointOptions(store))
     again = sb.sweep(system(), AXES, how, checkpoint=sb.CheckpointOptions(store))
     np.testing.assert_array_equal(first["peak_force"], again["peak_force"])
@@ -76,18 +72,14 @@ def test_representations_are_short():
     )  # fmt: skip
     whole = sb.System(
         model,
-        contacts=[
-            sb.Contact(sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
-        ],
+        contacts=[sb.Contact(sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))],
     )
     assert max(len(repr(each)) for each in (model, whole)) < 1000
 
 
 def test_what_computed_stands_in_the_store(tmp_path):
     """The versions, the code, the rounding and the processor of each task, and in the result's words."""
-    found = sb.sweep(
-        system(), AXES, sb.Integration(cycles=2), checkpoint=sb.CheckpointOptions(tmp_path / "store")
-    )
+    found = sb.sweep(system(), AXES, sb.Integration(cycles=2), checkpoint=sb.CheckpointOptions(tmp_path / "store"))
     (record,) = TaskLog(tmp_path / "store" / "tasks.jsonl").records.values()
     assert record.code == code_hash() and record.arithmetic == arithmetic_hash()
     assert f"numpy {np.__version__}" in record.libraries
@@ -99,11 +91,7 @@ def test_what_computed_stands_in_the_store(tmp_path):
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
-        (
-            "libraries",
-            "numpy 2.0.0, python 3.11.2",
-            r"to rounding.*version of NumPy or Python",
-        ),
+        ("libraries", "numpy 2.0.0, python 3.11.2", r"to rounding.*version of NumPy or Python"),
         ("arithmetic", "0" * 16, "to rounding.*kind of rounding in NumPy"),
         ("code", "f" * 16, "as far as the code agrees.*state of its code"),
         ("model", "e" * 64, "to rounding.*reduction of the model"),

@@ -34,8 +34,7 @@ def limited(words, megabytes, folder, **variables):
 
 
 @pytest.mark.parametrize(
-    "megabytes",
-    [170, 290, 420, *(pytest.param(size, marks=pytest.mark.slow) for size in (230, 340, 520, 610))],
+    "megabytes", [170, 290, 420, *(pytest.param(size, marks=pytest.mark.slow) for size in (230, 340, 520, 610))]
 )
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_without_memory_says_so_in_one_line(command, megabytes, tmp_path):

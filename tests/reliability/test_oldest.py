@@ -27,9 +27,7 @@ def test_other_bounds_are_refused(tmp_path, text):
 
 
 def test_the_source_distribution_holds_what_builds_and_tests_it():
-    excluded = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["tool"]["scikit-build"]["sdist"][
-        "exclude"
-    ]
+    excluded = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["tool"]["scikit-build"]["sdist"]["exclude"]
     for name in (
         "Makefile",
         "src",

@@ -68,9 +68,7 @@ def test_a_range_that_fills_the_memory(system):
     assert sb.sweep(system, {"model.modes": range(1, 3)}, SHORT).sizes["modes"] == 2
 
 
-@pytest.mark.parametrize(
-    "window", [(), 3, "ab", (1, 2, 3), (5, 2), (0, np.inf), {}, np.datetime64(1, "s"), SHORT]
-)
+@pytest.mark.parametrize("window", [(), 3, "ab", (1, 2, 3), (5, 2), (0, np.inf), {}, np.datetime64(1, "s"), SHORT])
 def test_windows_of_figures(run, window):
     with pytest.raises(InputError, match="window"):
         sb.plot.plot_spectrum(run, window=window)

@@ -50,9 +50,9 @@ def test_refused_by_name(call, words, tried):
 
 
 def vars_of(beam):
-    return {
-        name: getattr(beam, name) for name in ("length", "thickness", "width", "density", "young_modulus")
-    } | {"buckling_level": beam.buckling_level}
+    return {name: getattr(beam, name) for name in ("length", "thickness", "width", "density", "young_modulus")} | {
+        "buckling_level": beam.buckling_level
+    }
 
 
 NONE = {

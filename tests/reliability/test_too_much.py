@@ -26,9 +26,7 @@ def system(frequency_ratio=1.0, modes=2):
     return sb.System(
         model,
         contacts=[
-            sb.Contact(
-                default_values.CONTACT, sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=0.3)
-            )
+            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=0.3))
         ],
     )
 
@@ -46,11 +44,7 @@ def quick(function, *arguments, **options):
 @pytest.mark.parametrize(
     ("how", "ratio", "words"),
     [
-        (
-            {"step": 1e-10},
-            1.0,
-            r"a run of 2.*e\+10 steps of 1e-10 s, some .* hours on one core: must be at most",
-        ),
+        ({"step": 1e-10}, 1.0, r"a run of 2.*e\+10 steps of 1e-10 s, some .* hours on one core: must be at most"),
         ({"cycles": 10**6}, 1e-3, r"steps of .* s, some .* on one core: must be at most"),
         ({"cycles": 200, "max_steps": 1000}, 1.0, r"must be at most 1e\+03 steps \(max_steps\)"),
         ({"step": 1e3}, 1.0, "does not resolve a cycle of excitation"),
@@ -91,10 +85,7 @@ def test_fast_drives_take_no_memory():
 
 def test_too_many_sample_times_are_refused():
     said = quick(
-        sb.simulate,
-        system(modes=64),
-        sb.Integration(cycles=10),
-        sample_times=np.linspace(0.0, 1e-2, 3_000_000),
+        sb.simulate, system(modes=64), sb.Integration(cycles=10), sample_times=np.linspace(0.0, 1e-2, 3_000_000)
     )
     assert "GiB" in said
 
@@ -122,10 +113,7 @@ def test_axes_of_too_many_points():
 def test_an_interrupt_ends_a_long_run(command, tmp_path, tried):
     """Ctrl-C in the middle of steps that would take days: an end, with words."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "snapbeam", *command, "-o", "x.nc"],
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        text=True,
+        [sys.executable, "-m", "snapbeam", *command, "-o", "x.nc"], cwd=tmp_path, stderr=subprocess.PIPE, text=True
     )
     time.sleep(60)
     assert process.poll() is None, process.stderr.read()

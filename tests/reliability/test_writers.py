@@ -104,9 +104,7 @@ def test_a_name_of_a_holder_that_is_gone_is_not_told(stored, work):
     assert (path / "lock").read_text(encoding="utf-8") == ""
 
 
-def test_a_whole_store_is_read_where_nothing_can_be_written(
-    mounted, read_only, work, whole, small, tmp_path, tried
-):
+def test_a_whole_store_is_read_where_nothing_can_be_written(mounted, read_only, work, whole, small, tmp_path, tried):
     """A complete store on read-only media is exported; one that is not says so."""
     disk = mounted("media", "size=4m")
     stage = Stage("base", work.setup.points, CHUNK)

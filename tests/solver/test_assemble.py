@@ -15,8 +15,7 @@ from snapbeam.util.validation import InputError
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=5)
 SYSTEM = sb.System(
-    MODEL,
-    contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))],
+    MODEL, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))]
 )
 
 
@@ -42,9 +41,7 @@ def test_structure_is_the_model_about_its_well(side: str) -> None:
     # the centre, and the other well
     center = structure.center_rest + q @ structure.center
     np.testing.assert_allclose(center, sign * (alpha @ MODEL.midspan_shape), rtol=0.0, atol=1e-16)
-    np.testing.assert_allclose(
-        structure.amplitudes(structure.shift), -structure.equilibrium, rtol=1e-9, atol=1e-16
-    )
+    np.testing.assert_allclose(structure.amplitudes(structure.shift), -structure.equilibrium, rtol=1e-9, atol=1e-16)
 
 
 def test_structures_are_told_apart_by_their_numbers() -> None:
@@ -58,9 +55,7 @@ def test_structures_are_told_apart_by_their_numbers() -> None:
 
 
 def test_ticks_make_whole_periods() -> None:
-    ensemble = make_ensemble(
-        SYSTEM, sb.Integration(cycles=7), {"drive.frequency_ratio": np.array([0.3, 1.0, 3.7])}
-    )
+    ensemble = make_ensemble(SYSTEM, sb.Integration(cycles=7), {"drive.frequency_ratio": np.array([0.3, 1.0, 3.7])})
     runs = ensemble.runs
     period = 1.0 / (MODEL.reference_frequency * np.array([0.3, 1.0, 3.7]))
     np.testing.assert_allclose(runs["period"] * runs["tick"], period, rtol=1e-15)
@@ -104,9 +99,7 @@ def test_a_column_that_is_the_systems_own_changes_nothing() -> None:
 
 def test_an_ensemble_holds_no_layout() -> None:
     """Modes are counted as the model counts them; padding is an engine's own affair."""
-    ensemble = make_ensemble(
-        SYSTEM, sb.Integration(cycles=1), {"contact.location": np.array([0.3, 0.4, 0.3])}
-    )
+    ensemble = make_ensemble(SYSTEM, sb.Integration(cycles=1), {"contact.location": np.array([0.3, 0.4, 0.3])})
     assert ensemble.structure.omega.shape == (5,)
     assert ensemble.starts.shape == (1, 2, 5)
     assert ensemble.contact_rows.shape == (2, 5)
@@ -119,10 +112,7 @@ def test_an_ensemble_holds_no_layout() -> None:
 @pytest.mark.parametrize(
     ("points", "message"),
     [
-        (
-            {"beam.thickness": np.array([1e-4])},
-            r"beam\.thickness: no parameter that may differ between the runs",
-        ),
+        ({"beam.thickness": np.array([1e-4])}, r"beam\.thickness: no parameter that may differ between the runs"),
         ({"contact.coefficient": np.array([0.5])}, r"contact\.coefficient: no parameter that may differ"),
     ],
 )
@@ -133,6 +123,4 @@ def test_refusals(points, message: str) -> None:
 
 def test_more_steps_than_can_be_counted() -> None:
     with pytest.raises(InputError, match=r"makes .* steps, must be at most 2\.2e\+12"):
-        make_ensemble(
-            SYSTEM.replace(**{"drive.frequency_ratio": 1e-5}), sb.Integration(cycles=10**7, step=1e-7)
-        )
+        make_ensemble(SYSTEM.replace(**{"drive.frequency_ratio": 1e-5}), sb.Integration(cycles=10**7, step=1e-7))

@@ -51,13 +51,7 @@ def own(tmp_path_factory):
     before = package_hash()
     statistic, law = tmp_path_factory.mktemp("statistic"), tmp_path_factory.mktemp("law")
     drive = tmp_path_factory.mktemp("drive")
-    folders = {
-        "deepest": statistic,
-        "my_statistics": statistic,
-        "own_law": law,
-        "own_loss": law,
-        "own_memory": law,
-    }
+    folders = {"deepest": statistic, "my_statistics": statistic, "own_law": law, "own_loss": law, "own_memory": law}
     for text in BLOCKS:
         name = text.split()[1]
         (folders.get(name.removesuffix(".py"), drive) / name).write_text(text, encoding="utf-8")
@@ -112,9 +106,7 @@ def test_impact_on_a_surface_that_yields(own) -> None:
     """What is given back is the elastic energy at the yield force, f_y^2/(2 k); the rest is in the indentation."""
     law = import_module("own_memory").YieldingContact(1e6, 0.5)
     try:
-        run = sb.simulate(
-            thrown(lambda _: law, 0.0), sb.Integration(cycles=1, accuracy="reference", engine="native")
-        )
+        run = sb.simulate(thrown(lambda _: law, 0.0), sb.Integration(cycles=1, accuracy="reference", engine="native"))
         rebound = 0.5 / math.sqrt(1e6 * MASS)
         assert run.dataset.modal_velocity.values[-1, 0] == pytest.approx(rebound, rel=1e-7)
         lost = 0.5 * MASS * (SPEED**2 - rebound**2)
@@ -200,8 +192,7 @@ def test_a_law_that_loses_energy_stops_a_mass(own) -> None:
     law = import_module("own_loss").RubberContact
     for loss in (0.0, 2e5, 2e6):
         run = sb.simulate(
-            thrown(lambda spring, loss=loss: law(spring, loss), 1e6),
-            sb.Integration(cycles=1, accuracy="reference"),
+            thrown(lambda spring, loss=loss: law(spring, loss), 1e6), sb.Integration(cycles=1, accuracy="reference")
         )
         released = lambda t, y: 1e6 * y[0] + loss * y[0] * y[1]  # noqa: B023, E731
         released.terminal, released.direction = True, -1.0
@@ -252,9 +243,7 @@ def test_a_circuit_brakes_a_mass(own) -> None:
 def test_a_motion_of_ones_own_moves_a_base(own) -> None:
     """Of a free mass in the frame of the base: minus the displacement of the base."""
     pulse = import_module("own_drive").SmoothPulse(displacement_amplitude=0.7, pulse_periods=3.0)
-    system = free_mass(
-        base_excitation=sb.BaseExcitation(motion=pulse), initial_state=sb.State(amplitude=[0.0])
-    )
+    system = free_mass(base_excitation=sb.BaseExcitation(motion=pulse), initial_state=sb.State(amplitude=[0.0]))
     run = sb.simulate(system, sb.Integration(cycles=2, accuracy="reference"))
     moved = 0.5 * 0.7 * (1.0 - math.cos(2.0 * math.pi * 2.0 / 3.0)) * 0.335e-3
     assert abs(run.dataset.modal_amplitude.values[-1, 0]) == pytest.approx(moved, rel=1e-7)
@@ -288,9 +277,7 @@ def test_forces_of_the_velocity_act_together(own) -> None:
 
 def test_the_script_of_friction(own, capsys) -> None:
     import_module("run_friction")
-    printed = re.search(
-        r"run_friction\.py.*?```\n\n```\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL
-    )
+    printed = re.search(r"run_friction\.py.*?```\n\n```\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     assert capsys.readouterr().out == printed[1]
 
 
@@ -378,15 +365,7 @@ def test_documented_hooks_are_those_that_are_read(base) -> None:
     for name in re.findall(r"``(\w+)\((?:law|drive)", written):
         assert name in base.hooks
     page = PAGE.read_text(encoding="utf-8")
-    described = {
-        "frequencies",
-        "mirrored_bounds",
-        "diagnostics",
-        "unit",
-        "file_keys",
-        "file_gives",
-        "numbers",
-    }
+    described = {"frequencies", "mirrored_bounds", "diagnostics", "unit", "file_keys", "file_gives", "numbers"}
     for name in set(base.hooks) - described:
         assert re.search(rf"\b{name}\b", written + page), name
     for name in described & set(base.hooks) - {"file_keys", "file_gives"}:

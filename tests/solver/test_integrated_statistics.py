@@ -64,9 +64,7 @@ def test_random_runs_with_contact(modes: int, accuracy: str) -> None:
         drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=rng.uniform(0.05, 0.6))
         system = sb.System(
             model,
-            contacts=[
-                sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=rng.uniform(0.3, 0.5)))
-            ],
+            contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=rng.uniform(0.3, 0.5)))],
         )
         how = sb.Integration(cycles=5, accuracy=accuracy, high_frequency_ratio=ratio_of_high)
         run = assert_integrated(system, how, 1.0 / (ratio * model.reference_frequency))
@@ -80,9 +78,7 @@ def test_random_runs_with_contact(modes: int, accuracy: str) -> None:
 def test_the_time_of_the_last_crossing(ratio: float) -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3, damping_ratio=0.01)
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=0.6)
-    system = sb.System(
-        model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=0.4))]
-    )
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=0.4))])
     run = sb.simulate(system, sb.Integration(cycles=6, accuracy="reference", early_termination=False))
     last = run.summary.last_zero_crossing
     times = last + np.linspace(-1e-6, 1e-6, 201)
@@ -102,9 +98,7 @@ def test_unequal_wells(accuracy: str) -> None:
     reached = 0
     for ratio, velocity in ((1.1, 0.5), (1.4, 0.1)):
         drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
-        system = sb.System(
-            model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=0.45))]
-        )
+        system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=0.45))])
         how = sb.Integration(cycles=5, accuracy=accuracy, high_frequency_ratio=2.0)
         run = assert_integrated(system, how, 1.0 / (ratio * model.reference_frequency))
         wanted = share(run, wells, model.dividing_height)
@@ -118,10 +112,7 @@ def test_a_statistic_that_is_registered_after_a_run() -> None:
     """The results are the same."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
     striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.2))
-    system, how = (
-        sb.System(model, contacts=[sb.Contact(default_values.CONTACT, striker)]),
-        sb.Integration(cycles=3),
-    )
+    system, how = (sb.System(model, contacts=[sb.Contact(default_values.CONTACT, striker)]), sb.Integration(cycles=3))
     before = sb.simulate(system, how).summary
     row = Statistic(
         "steps_counted", "float64", "1", "steps of the run", lambda reading, held: held, update=lambda held, _: held + 1.0
@@ -158,9 +149,7 @@ def test_peaks_are_low_by_at_most_what_they_state(modes: int) -> None:
             system = sb.System(model, contacts=[contact], harvesters=around)
             end = 4 / (ratio * model.reference_frequency) * (1.0 - 1e-13)
             fine = sb.simulate(
-                system,
-                sb.Integration(cycles=4, accuracy="reference"),
-                sample_times=np.linspace(0.0, end, 40_001),
+                system, sb.Integration(cycles=4, accuracy="reference"), sample_times=np.linspace(0.0, end, 40_001)
             )
             for name, variable in peaks.items():
                 exact = float(np.abs(fine.dataset[variable].values).max())

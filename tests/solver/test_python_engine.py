@@ -47,13 +47,7 @@ def test_the_papers_system(modes):
         assert np.abs(one - other).max() < 1e-7, name
     own, core = (each.summary for each in runs)
     assert own.impacts == core.impacts > 1
-    exact = (
-        "impulse",
-        "striker_work",
-        "contact_time_fraction",
-        "rms_midspan_displacement",
-        "energy_dissipated",
-    )
+    exact = ("impulse", "striker_work", "contact_time_fraction", "rms_midspan_displacement", "energy_dissipated")
     for name in (*exact, "high_frequency_energy_fraction"):
         assert own[name] == pytest.approx(core[name], rel=1e-6), name
     for name in ("peak_force", "max_midspan_displacement", "peak_midspan_velocity"):
@@ -68,12 +62,7 @@ def test_the_papers_system(modes):
     [
         (1, Features(1, (("hertz", "sine", False),), base="acceleration_sine", uneven=True)),
         (2, Features(2, (("power", "displacement_sine", True),), load="sine", circuits=("piezo", "coil"))),
-        (
-            3,
-            Features(
-                3, external=("harmonic_force",), local=("quadratic_damping", "magnetic_force"), started=True
-            ),
-        ),
+        (3, Features(3, external=("harmonic_force",), local=("quadratic_damping", "magnetic_force"), started=True)),
     ],
 )
 def test_systems_of_many_parts_against_the_reference(seed, features):
@@ -85,9 +74,7 @@ def test_systems_of_many_parts_against_the_reference(seed, features):
 def test_energy_of_high_modes_across_the_wells(midspan_amplitude):
     """Counted from the well on whose side mid-span is, equal or not."""
     imperfection = sb.Imperfection(midspan_amplitude=midspan_amplitude) if midspan_amplitude else None
-    model = sb.ReducedModel.from_beam(
-        default_values.BEAM, modes=3, damping_ratio=0.01, imperfection=imperfection
-    )
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3, damping_ratio=0.01, imperfection=imperfection)
     drive = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.6)
     system = sb.System(model, contacts=[striking(drive=drive, location=0.4)])
     own, core = (sb.simulate(system, how(engine, 3)).summary for engine in ("python", "native"))
@@ -105,9 +92,7 @@ def test_random_systems(seed):
 def several():
     """Three strikers, of which the second loses energy and is released by its force."""
     stops = [(sb.KelvinVoigt(2e5, 1.0), 0.4, 5e-5), (default_values.CONTACT, 0.6, 1e-5)]
-    further = [
-        striking(law, drive=sb.FixedStop(), side="above", location=at, gap=gap) for law, at, gap in stops
-    ]
+    further = [striking(law, drive=sb.FixedStop(), side="above", location=at, gap=gap) for law, at, gap in stops]
     return sb.System(beam(2), contacts=[striking(), *further])
 
 
@@ -135,16 +120,11 @@ def test_energies_of_several_contacts_are_balanced_at_every_sample(engine):
 
 
 def test_a_statistic_that_needs_every_step_is_refused_by_name():
-    row = sb.Statistic(
-        "deepest", "float64", "m", "penetration", lambda r, held: held, update=lambda held, step: held
-    )
+    row = sb.Statistic("deepest", "float64", "m", "penetration", lambda r, held: held, update=lambda held, step: held)
     sb.register_statistic(row)
     try:
         system = sb.System(beam(1), contacts=[striking()])
-        for call in (
-            sb.simulate,
-            lambda *given: sb.sweep(given[0], {"drive.velocity_amplitude": [0.1]}, given[1]),
-        ):
+        for call in (sb.simulate, lambda *given: sb.sweep(given[0], {"drive.velocity_amplitude": [0.1]}, given[1])):
             with pytest.raises(InputError, match=r"statistic 'deepest'.*'python'.*engine = 'native'"):
                 call(system, how("python"))
         assert sb.simulate(system, how("native")).summary.deepest == 0.0
@@ -167,14 +147,7 @@ def test_energy_of_everything_at_once_is_balanced():
         harvesters=[sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0)],
     )  # fmt: skip
     run = sb.simulate(system, how())
-    works = (
-        "striker_work",
-        "base_work",
-        "load_work",
-        "force_work",
-        "local_force_work",
-        "energy_lost_contact",
-    )
+    works = ("striker_work", "base_work", "load_work", "force_work", "local_force_work", "energy_lost_contact")
     assert all(run.summary[name] != 0.0 for name in (*works, "energy_harvested"))
     assert abs(run.dataset.attrs["energy_error"]) < 1e-8
 
@@ -198,9 +171,7 @@ def test_a_law_with_a_force_alone():
     law, d = system.contact_law.numbers(), 3e-6
     assert Stiffening.energy(law, d) == pytest.approx(0.5 * 2e5 * d**2 + 0.25 * 1e15 * d**4, rel=1e-12)
     assert Stiffening.slope(law, d) == pytest.approx(2e5 + 3e15 * d**2, rel=1e-8)
-    with pytest.warns(
-        sb.DiagnosticWarning, match="Numba cannot compile force"
-    ):  # its functions are beyond Numba
+    with pytest.warns(sb.DiagnosticWarning, match="Numba cannot compile force"):  # its functions are beyond Numba
         native = sb.simulate(system, how("native", cycles=2))
     ends = [each.dataset.modal_amplitude.values[-1] for each in (native, run)]
     assert ends[0] == pytest.approx(ends[1], rel=1e-9)
@@ -256,11 +227,7 @@ def test_settings_that_it_does_not_have_are_refused_by_name(given):
 
 
 def test_impacts_without_a_duration_and_perturbed_drives_are_refused():
-    with pytest.raises(
-        InputError, match=r"contact.law = Restitution.*engine = 'python'; use engine = 'native'"
-    ):
+    with pytest.raises(InputError, match=r"contact.law = Restitution.*engine = 'python'; use engine = 'native'"):
         sb.simulate(sb.System(beam(1), contacts=[striking(sb.Restitution(0.6))]), how())
-    with pytest.raises(
-        InputError, match=r"engine = 'python': does not change a drive.*use engine = 'native'"
-    ):
+    with pytest.raises(InputError, match=r"engine = 'python': does not change a drive.*use engine = 'native'"):
         sb.perturbation_growth(sb.System(beam(1), contacts=[striking()]), how())

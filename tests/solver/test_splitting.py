@@ -38,9 +38,7 @@ def state_after(model: sb.ReducedModel, accuracy: str, steps: int) -> np.ndarray
     ).dataset.modal_amplitude.values
 
 
-@pytest.mark.parametrize(
-    ("modes", "steps"), [(1, (8, 10, 12, 16)), (2, (8, 10, 12, 16)), (8, (48, 64, 96, 128))]
-)
+@pytest.mark.parametrize(("modes", "steps"), [(1, (8, 10, 12, 16)), (2, (8, 10, 12, 16)), (8, (48, 64, 96, 128))])
 @pytest.mark.parametrize(("accuracy", "order"), [("standard", 4), ("reference", 6)])
 def test_measured_order_in_free_flight(modes: int, steps: tuple[int, ...], accuracy: str, order: int) -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes)
@@ -50,9 +48,7 @@ def test_measured_order_in_free_flight(modes: int, steps: tuple[int, ...], accur
     assert slope > order - 0.3, (slope, errors)
 
 
-@pytest.mark.parametrize(
-    ("modes", "pair"), [(1, (1.4, 0.02)), (1, (1.21, 0.05)), (2, (1.4, 0.02)), (32, (1.21, 0.05))]
-)
+@pytest.mark.parametrize(("modes", "pair"), [(1, (1.4, 0.02)), (1, (1.21, 0.05)), (2, (1.4, 0.02)), (32, (1.21, 0.05))])
 def test_measured_order_with_contact(modes: int, pair: tuple[float, float]) -> None:
     """The mean over four halvings of the default step; measured 2.4 to 3.1.  The d^1.5 edge allows no more
     than about 2.5 in the end.

@@ -57,10 +57,7 @@ def test_peaks(runs) -> None:
     ):
         assert outcome[f"peak_{name}"] == pytest.approx(float(abs(values).max()), abs=2e-3)
         assert outcome[f"peak_{name}"] == max(abs(outcome[f"min_{name}"]), abs(outcome[f"max_{name}"]))
-    for name, values in (
-        ("velocity", shown.velocity_at_striker),
-        ("midspan_velocity", shown.midspan_velocity),
-    ):
+    for name, values in (("velocity", shown.velocity_at_striker), ("midspan_velocity", shown.midspan_velocity)):
         peak = float(abs(values).max())
         # taken at the ends of steps
         assert 0.9 * peak < outcome[f"peak_{name}"] < 1.0001 * peak
@@ -75,9 +72,7 @@ def test_root_mean_squares(runs) -> None:
         ("velocity", shown.velocity_at_striker),
         ("midspan_velocity", shown.midspan_velocity),
     ):
-        assert outcome[f"rms_{name}"] == pytest.approx(math.sqrt(mean(shown, values.values**2)), rel=2e-2), (
-            name
-        )
+        assert outcome[f"rms_{name}"] == pytest.approx(math.sqrt(mean(shown, values.values**2)), rel=2e-2), name
 
 
 def test_impulse_work_and_power(runs) -> None:
@@ -125,10 +120,7 @@ def test_share_of_the_energy_in_high_modes() -> None:
 
 def test_a_map_has_the_statistics_of_its_runs() -> None:
     system = sb.System(
-        MODEL,
-        contacts=[
-            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
-        ],
+        MODEL, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))]
     )
     integration = sb.Integration(cycles=4)
     ds = sb.sweep(system, {"velocity_amplitude": [0.18, 0.3]}, integration)
@@ -170,10 +162,7 @@ def test_a_formula_of_what_is_kept_needs_no_update() -> None:
         lambda reading: reading.seen("total_impulse") / reading.duration,
     )  # fmt: skip
     system = sb.System(
-        MODEL,
-        contacts=[
-            sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.02))
-        ],
+        MODEL, contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.02))]
     )
     register_statistic(row)
     try:

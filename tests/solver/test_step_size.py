@@ -14,9 +14,7 @@ from snapbeam.solver import step_size
 from snapbeam.solver.step_size import choose_base_step, flight_step
 
 
-@pytest.mark.parametrize(
-    "modes", [1, 2, 5, 16, 32, *(pytest.param(n, marks=pytest.mark.slow) for n in (48, 64, 128))]
-)
+@pytest.mark.parametrize("modes", [1, 2, 5, 16, 32, *(pytest.param(n, marks=pytest.mark.slow) for n in (48, 64, 128))])
 @pytest.mark.parametrize("accuracy", ["standard", "reference"])
 def test_steps_in_contact_resolve_the_impact_and_the_fastest_mode(modes: int, accuracy: str) -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes)
@@ -65,9 +63,7 @@ def test_a_step_does_not_depend_on_what_was_chosen_before(monkeypatch) -> None:
     """A reference frequency that is given, as the paper's, moves the step; the matrices are equal with and without it."""
     monkeypatch.setattr(step_size, "_CHOSEN", type(step_size._CHOSEN)())
     own = sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.005)
-    given = sb.ReducedModel.from_beam(
-        default_values.BEAM, modes=4, damping_ratio=0.005, reference_frequency=82.75
-    )
+    given = sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.005, reference_frequency=82.75)
     alone = flight_step(own, 4, 2.5e-7)
     step_size._CHOSEN.clear()
     assert flight_step(given, 4, 2.5e-7) != alone

@@ -67,10 +67,7 @@ OWN = {"own_time": _time, "own_touch": _in_touch, "own_depth": _deepest, "own_sq
 def test_an_own_statistic_is_the_package_s_own(layout, monkeypatch):
     """Of runs of different lengths and numbers of steps; those that end leave a lane to others."""
     monkeypatch.setenv("SNAPBEAM_LAYOUT", layout)
-    points = {
-        "drive.velocity_amplitude": np.linspace(0.05, 0.9, 5),
-        "drive.frequency_ratio": np.linspace(0.5, 1.7, 4),
-    }
+    points = {"drive.velocity_amplitude": np.linspace(0.05, 0.9, 5), "drive.frequency_ratio": np.linspace(0.5, 1.7, 4)}
     with registered(**OWN):
         found = sb.sweep(struck(), points, HOW)
     found = getattr(found, "dataset", found)
@@ -122,9 +119,7 @@ def test_an_error_in_an_update_is_raised_with_the_step(update, kind):
             lambda: sb.sweep(struck(), {"drive.velocity_amplitude": [0.1, 0.4, 0.6]}, HOW),
         ):
             _seen.clear()
-            with pytest.raises(
-                InputError, match=rf"{update.__name__}\(0.5, CompletedStep.*{kind.__name__}"
-            ) as raised:
+            with pytest.raises(InputError, match=rf"{update.__name__}\(0.5, CompletedStep.*{kind.__name__}") as raised:
                 call()
             assert isinstance(raised.value.__cause__, kind)
             assert len(_seen.get("called", [None])) == 1

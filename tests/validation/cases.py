@@ -61,9 +61,7 @@ def impact_oscillator() -> list[Row]:
     rows = []
     for force, phase, velocity in ((1.0, 0.0759522, -1.3565864), (0.2, 0.4992441, -0.2388903)):
         e, damping = 0.8, 0.1
-        model = sb.ReducedModel.from_matrices(
-            [[1.0]], [1.0], contact_shape=[1.0], damping_ratio=0.5 * damping
-        )
+        model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], damping_ratio=0.5 * damping)
         stop = sb.Striker(
             drive=sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=force / damping), gap=1.0
         )
@@ -94,15 +92,7 @@ def mass_on_a_stop() -> list[Row]:
         Row(source, FORMULA, "peak force (N)", 9950.372, float(first["peak_force"]), 1e-6),
         Row(source, FORMULA, "contact duration (s)", 0.03126002, float(first["duration"]), 1e-6),
         Row(source, FORMULA, "time of the second peak (s)", 0.3610493, middle, 1e-6),
-        Row(
-            source,
-            FORMULA,
-            "impulse (N s)",
-            198.0198,
-            float(first["impulse"]),
-            1e-6,
-            "The source prints 198.05 N s.",
-        ),
+        Row(source, FORMULA, "impulse (N s)", 198.0198, float(first["impulse"]), 1e-6, "The source prints 198.05 N s."),
     ]
 
 
@@ -118,15 +108,7 @@ def bouncing_ball() -> list[Row]:
             found = _ball(e, published, holds)
             remark = "Bisected to 0.4 %; the contact lasts 1/400 of a period."
             rows.append(
-                Row(
-                    "Bouncing ball, Tufillaro",
-                    FORMULA,
-                    f"e = {e:g}: {words} G =",
-                    published,
-                    found,
-                    0.01,
-                    remark,
-                )
+                Row("Bouncing ball, Tufillaro", FORMULA, f"e = {e:g}: {words} G =", published, found, 0.01, remark)
             )
     return rows
 
@@ -149,21 +131,13 @@ def _flights(e: float, strength: float, holds: Callable[[NDArray[np.float64]], b
     Unit mass, gravity and angular frequency: the table moves by G sin t; an orbit of period 1 leaves it with the speed
     pi at the phase where cos = pi (1 - e)/((1 + e) G).
     """
-    ball = sb.ReducedModel.from_matrices(
-        [[1.0]], [0.0], contact_shape=[1.0], reference_frequency=0.5 / math.pi
-    )
+    ball = sb.ReducedModel.from_matrices([[1.0]], [0.0], contact_shape=[1.0], reference_frequency=0.5 / math.pi)
     stiffness = 200.0**2  # a contact lasts about pi/200
     law = sb.KelvinVoigt.from_restitution(stiffness, e, 1.0)
     phase = math.acos(min(1.0, math.pi * (1.0 - e) / ((1.0 + e) * strength)))
-    table = sb.Striker(
-        drive=sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=strength, phase=phase)
-    )
+    table = sb.Striker(drive=sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=strength, phase=phase))
     weight = sb.ExternalForce(history=sb.ConstantForce(force=-1.0))
-    start = sb.State(
-        amplitude=[strength * math.sin(phase)],
-        velocity=[1.001 * math.pi],
-        striker_position=0.0,
-    )
+    start = sb.State(amplitude=[strength * math.sin(phase)], velocity=[1.001 * math.pi], striker_position=0.0)
     system = sb.System(ball, contacts=[sb.Contact(law, table)], forces=[weight], initial_state=start)
     run = sb.simulate(system, sb.Integration(cycles=60))
     onset = run.impacts[IMPACT_TIME].values
@@ -208,22 +182,8 @@ def basin_shares(points: int = 100) -> list[Row]:
     share = float(left.mean())
     grid = "Of a grid; the source has 1000 random starts, a standard error of .016."
     return [
-        Row(
-            source,
-            COMPUTED,
-            "attractor in the left well, x at t = 0",
-            -0.779,
-            float(np.median(at[left])),
-            1e-3,
-        ),
-        Row(
-            source,
-            COMPUTED,
-            "attractor in the right well, x at t = 0",
-            1.210,
-            float(np.median(at[~left])),
-            1e-3,
-        ),
+        Row(source, COMPUTED, "attractor in the left well, x at t = 0", -0.779, float(np.median(at[left])), 1e-3),
+        Row(source, COMPUTED, "attractor in the right well, x at t = 0", 1.210, float(np.median(at[~left])), 1e-3),
         Row(source, PRINTED, "share of the left basin", 0.488, share, 0.04, grid),
         Row(source, PRINTED, "share of the right basin", 0.512, 1.0 - share, 0.04, grid),
     ]
@@ -233,9 +193,7 @@ def lyapunov(runs: int = 64) -> list[Row]:
     """x'' + .25 x' - x + x^3 = .4 sin t: the mean of many runs of 600 periods each."""
     system = duffing(0.25, 0.4, 0.0)
     random = np.random.default_rng(1)
-    begun = sb.State(
-        amplitude=random.uniform(-1.5, 1.5, (runs, 1)), velocity=random.uniform(-1.0, 1.0, (runs, 1))
-    )
+    begun = sb.State(amplitude=random.uniform(-1.5, 1.5, (runs, 1)), velocity=random.uniform(-1.0, 1.0, (runs, 1)))
     one = sb.dynamics.lyapunov_spectrum(system, k=1, periods=600, transient=100, states=begun)["exponent"]
     both = sb.dynamics.lyapunov_spectrum(system, k=2, periods=100, transient=100)["exponent"]
     error = float(one.std()) / math.sqrt(runs)
@@ -286,11 +244,7 @@ def preshaped_beam() -> list[Row]:
         ):  # fmt: skip
             found, depth = _snap(6.0, modes, held)
             for quantity, published, ours, differs in zip(
-                ("greatest force", "displacement there over h"),
-                (force, at),
-                (found, depth),
-                expected,
-                strict=True,
+                ("greatest force", "displacement there over h"), (force, at), (found, depth), expected, strict=True
             ):
                 own = f"Q = 6, {words}, {modes} modes: {quantity}"
                 rows.append(Row(source, FORMULA, own, published, ours, tolerance, remark, differs))
@@ -307,9 +261,7 @@ def _pushed(ratio: float, modes: int, held: bool, force: float) -> sb.ReducedMod
     length, thickness = 0.2, 2e-4
     beam = sb.Beam(**STEEL, length=length, thickness=thickness, axial_load=0.0)
     height = ratio * thickness
-    made = sb.ReducedModel.from_beam(
-        beam, modes=modes, imperfection=sb.Imperfection(midspan_amplitude=height)
-    )
+    made = sb.ReducedModel.from_beam(beam, modes=modes, imperfection=sb.Imperfection(midspan_amplitude=height))
     kept = np.arange(0, modes, 2) if held else np.arange(modes)
     center = made.midspan_shape[kept]
     assert made.transverse_force is not None
@@ -368,12 +320,7 @@ def timoshenko_beams() -> list[Row]:
         first = float(np.asarray(exact_natural_frequencies(beam, count=1))[0])
         rows.append(
             Row(
-                "Timoshenko 1913",
-                COMPUTED,
-                f"L = {100 * length:g} cm: first period (ms)",
-                published,
-                1e3 / first,
-                0.01,
+                "Timoshenko 1913", COMPUTED, f"L = {100 * length:g} cm: first period (ms)", published, 1e3 / first, 0.01
             )
         )
     return rows
