@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from snapbeam.lab.diagnostics import KINDS_COMPARISON
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.proportions import proportion
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, axis, finite, instance
 
@@ -70,8 +71,9 @@ class MapComparison:
 
     @property
     def agreement_interval(self) -> tuple[float, float]:
-        """Wilson's 95 % interval of the agreement."""
-        return _wilson(int(np.trace(self.confusion)), self.used)
+        """Wilson's 95 % interval of the agreement; 0 to 1 if no point counts."""
+        _, low, high = proportion(int(np.trace(self.confusion)), self.used)
+        return float(low), float(high)
 
     @property
     def snap_agreement(self) -> float:
@@ -95,16 +97,6 @@ class MapComparison:
             "notes": list(self.notes),
             "diagnostics": [one.plain() for one in self.diagnostics],
         }
-
-
-def _wilson(successes: int, total: int) -> tuple[float, float]:
-    if total == 0:
-        return math.nan, math.nan
-    z = 1.959964
-    share = successes / total
-    middle = (share + z * z / (2 * total)) / (1.0 + z * z / total)
-    half = z / (1.0 + z * z / total) * math.sqrt(share * (1.0 - share) / total + z * z / (4.0 * total**2))
-    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -> MapComparison:
