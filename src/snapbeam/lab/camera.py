@@ -70,11 +70,9 @@ class Recording:
     >>> time = np.arange(60) / 10e3  # s
     >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
     >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 64))
-    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
     >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> path = synthetic.write("test.cihx")
-    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
     ...     tracked = lab.track(recording, buckling_level=0.335e-3)
     >>> recording.frame_rate
     10000.0
@@ -231,11 +229,9 @@ def open_recording(
     >>> time = np.arange(60) / 10e3  # s
     >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
     >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 64))
-    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
     >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> path = synthetic.write("test.cihx")
-    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
     ...     tracked = lab.track(recording, buckling_level=0.335e-3)
     >>> recording.pixel_size
     1.2e-05

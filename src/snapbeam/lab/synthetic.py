@@ -658,8 +658,7 @@ def render_recording(
     >>> time = np.arange(60) / 10e3  # s
     >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
     >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 64))
-    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
     >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
     >>> dict(synthetic.truth["displacement_mm"].sizes)
     {'time': 69}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from snapbeam import _core
+from snapbeam.solver.native import Progress
 from snapbeam.util.packages import needing, needs
 from snapbeam.util.validation import InputError
-
-Progress = Callable[[int, int], object]
 
 _BLOCK = 512
 """Threads of a block."""

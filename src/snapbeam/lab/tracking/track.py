@@ -284,11 +284,9 @@ def track(
     >>> time = np.arange(60) / 10e3  # s
     >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
     >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 64))
-    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
     >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> path = synthetic.write("test.cihx")
-    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
     ...     tracked = lab.track(recording, buckling_level=0.335e-3)
     >>> list(tracked.data_vars)[:2]
     ['valid', 'displacement_at_striker']
@@ -438,11 +436,9 @@ def tracking_quality(dataset: xr.Dataset) -> dict[str, Any]:
     >>> time = np.arange(60) / 10e3  # s
     >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
     >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 64))
-    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
     >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> path = synthetic.write("test.cihx")
-    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
     ...     tracked = lab.track(recording, buckling_level=0.335e-3)
     >>> sorted(lab.tracking_quality(tracked))[:3]
     ['beam_stderr_px', 'confidence', 'counts']
@@ -489,11 +485,9 @@ def tracking_report(dataset: xr.Dataset, *, diagnostics: bool = True) -> str:
     >>> time = np.arange(60) / 10e3  # s
     >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
     >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 64))
-    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
     >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> path = synthetic.write("test.cihx")
-    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
     ...     tracked = lab.track(recording, buckling_level=0.335e-3)
     >>> print(lab.tracking_report(tracked).splitlines()[0])
     69 frames at 10000 Hz, 12 um per pixel; 100.00 % measured, 0.00 % flagged
@@ -562,11 +556,9 @@ def contact_onsets(dataset: xr.Dataset, *, tolerance: float | None = None, minim
     >>> time = np.arange(60) / 10e3  # s
     >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
     >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera = lab.SyntheticCamera(shape=(160, 64))
-    >>> stage = lab.SyntheticStage(shaker_width=0.4e-3)
+    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
     >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> path = synthetic.write("test.cihx")
-    >>> with lab.open_recording(path, frame_rate=10e3, pixel_size=12e-6) as recording:
+    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
     ...     tracked = lab.track(recording, buckling_level=0.335e-3)
     >>> lab.contact_onsets(tracked).sizes["impact"]
     0
