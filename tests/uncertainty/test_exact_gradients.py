@@ -165,7 +165,8 @@ def test_jumps_that_move_take_differences() -> None:
     assert found["derivative"].values[1] == pytest.approx(one["derivative"].values[0], rel=1e-4)
 
 
-def test_chaos_is_said() -> None:
+def test_chaos_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("snapbeam.util.diagnostics._told", set())  # the same words are said once a process
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     drive = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.3)
     system = sb.System(model, [sb.Contact(paper.CONTACT, sb.Striker(drive=drive))])
