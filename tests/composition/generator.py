@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -85,13 +85,17 @@ class Composition:
 
 
 def laws() -> list[str]:
-    """The laws that take part, in the order of the alphabet."""
-    return sorted(set(LAWS) - SEPARATE)
+    """The laws of the package that take part, in the order of the alphabet; those of other tests are not drawn."""
+    return sorted(_of_package(LAWS) - SEPARATE)
 
 
 def local_forces() -> list[str]:
     """The local forces that take part."""
-    return [*KNOWN_FORCES, *sorted(set(LOCAL_FORCES) - set(KNOWN_FORCES))]
+    return [*KNOWN_FORCES, *sorted(_of_package(LOCAL_FORCES) - set(KNOWN_FORCES))]
+
+
+def _of_package(kinds: Mapping[str, type]) -> set[str]:
+    return {name for name, kind in kinds.items() if kind.__module__.startswith("snapbeam.")}
 
 
 def features_of(seed: int) -> Features:

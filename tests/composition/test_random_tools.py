@@ -271,7 +271,8 @@ def edge(system: sb.System, rng: np.random.Generator) -> None:
     low, high = kicked(flow, None, 6)
     found = dynamics.edge_tracking(flow, low, high, periods=4, horizon=6)
     went = flow.advance(found.states).states
-    for k in np.flatnonzero(found.distance[:-1] <= 1e-5):
+    # where no bisection narrows the two bounds after a period, their distance grows
+    for k in np.flatnonzero((found.distance[:-1] <= 1e-5) & (found.distance[1:] > found.distance[:-1])):
         np.testing.assert_allclose(went[k], found.states[k + 1], rtol=0.0, atol=found.distance[k + 1] + 1e-8)
 
 

@@ -339,7 +339,7 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
             follow(z, c, z.late[i], a[i], v[i]);
             if (first) assign(c.follows, settled[i], c.z - force_at(c, c.x, v[i]));
         }
-        impulse[i] = lost[i] = twice[i] = Number(0.0);
+        impulse[i] = lost[i] = twice[i] = f[i] = Number(0.0);
         if (c.impulsive) ++held, wanted[i] = signal_bend(z, c) - a[i] - linear_acceleration(s, c.row, z.q1, z.p1);
         tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
         elastic[i] = c.contact ? force_at(c, c.x, Number(0.0)) : Number(0.0);
