@@ -71,7 +71,7 @@ def host(monkeypatch, tmp_path):
     def compiled(architecture, defined):
         text, module = tmp_path / "kernel.cpp", tmp_path / "kernel.so"
         text.write_text(HOST + cuda.source(), encoding="utf-8")
-        fused = ["-mfma"] if platform.machine() in ("x86_64", "AMD64") else []
+        fused = ["-mfma"] if {"avx2", "avx512"} & set(_core.instruction_sets()) else []
         macros = [f"-D{name}={value}" for name, value in defined.items()]
         words = ["g++", "-std=c++20", "-O1", "-ffp-contract=off", *fused, "-w", "-fPIC", "-shared", *macros]
         try:
@@ -168,3 +168,13 @@ def test_a_single_run_stays_on_the_cpu():
     system = sb.System(beam(1), contacts=[striker()])
     run = sb.simulate(system, sb.Integration(cycles=2, engine="cuda"))
     assert run.dataset.attrs["engine"] == "native"
+
+
+def test_a_gpu_without_room_names_the_way_out(monkeypatch):
+    def allocate(size, stream):
+        raise RuntimeError("CUDA_ERROR_OUT_OF_MEMORY: not enough memory")
+
+    card = SimpleNamespace(allocate=allocate, create_stream=lambda: None)
+    monkeypatch.setattr(cuda, "_device", lambda: card)
+    with pytest.raises(InputError, match=r"no room for 2 GB more.*points_per_task"):
+        cuda._Memory().room(2_000_000_000)

@@ -54,7 +54,7 @@ def gradient(
     """Compute derivatives of statistics of a run by parameters, with their errors.
 
     A derivative is per unit of the parameter as the file gives it: per Hz, or per um of a gap of "20 um".  A class or a count has
-    none, and the command says so.  The growth is the change of the state at the end of the run, over the distance of the wells, per
+    none: the reason is printed.  The growth is the change of the state at the end of the run, over the distance of the wells, per
     relative change of the parameter: a derivative holds for changes well below its reciprocal.
 
     Example: snapbeam gradient system.toml --parameters velocity_amplitude,location --statistic peak_force,impulse

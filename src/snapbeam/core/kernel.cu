@@ -5,9 +5,6 @@
 // word of all threads.
 #include "control.hpp"
 
-#ifndef SNAPBEAM_PHASE
-#define SNAPBEAM_PHASE __syncthreads()
-#endif
 namespace SNAPBEAM_SET {
 typedef Thread<SNAPBEAM_FIXED> L;
 
@@ -43,12 +40,12 @@ extern "C" __global__ void __launch_bounds__(SNAPBEAM_BLOCK) go_on(Shared *share
     group.lay_out(*reinterpret_cast<Structure<L> *>(place), shared->batch, none);
     if (begins) group.begin();
     else group.key = -1.0;  // flows lie elsewhere
-    // the warps of a block keep together, so that they fetch the same instructions
+    // The warps of a block take each step together.
     for (int step = 0; step < budget && __syncthreads_or(group.alive); ++step) {
         if (group.alive) group.propose();
-        SNAPBEAM_PHASE;
+        __syncthreads();
         if (group.alive) take_step(group.z);
-        SNAPBEAM_PHASE;
+        __syncthreads();
         if (group.alive) group.inspect();
     }
 #pragma unroll 1

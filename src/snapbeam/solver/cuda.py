@@ -102,7 +102,15 @@ class _Memory:
 
     def room(self, size: int) -> int:
         """The address of so many bytes."""
-        self._held.append(_device().allocate(max(size, 1), stream=self.stream))
+        try:
+            self._held.append(_device().allocate(max(size, 1), stream=self.stream))
+        except Exception as error:
+            if "OUT_OF_MEMORY" not in str(error):
+                raise
+            raise InputError(
+                f"engine = 'cuda': the GPU has no room for {size / 1e9:.3g} GB more; compute fewer points at a time "
+                "(points_per_task of a checkpoint), or use engine = 'native'"
+            ) from error
         self.stream.sync()
         return int(self._held[-1].handle)
 
