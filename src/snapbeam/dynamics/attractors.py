@@ -272,7 +272,7 @@ def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
     is added, of at most 0.2 omega_1/omega_j in amplitude and 0.2 in velocity.  State s comes from Philox with the key
     (seed, s) alone.
     """
-    model, n = flow.system.model, flow.space.modes
+    model, n = flow.system.struck_model, flow.space.modes
     rows = np.zeros((count, flow.dimension))
     reach = 0.2 * flow.space.scales[0] / np.sqrt((model.linear_modes**2).sum(axis=0))
     reach = reach * np.stack([model.omega[0] / model.omega, np.full(n, model.omega[0])])

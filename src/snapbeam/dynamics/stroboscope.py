@@ -313,7 +313,7 @@ def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tup
     """
     known = [float(rate) for rate in np.ravel(np.asarray(rates, dtype=np.float64))]
     if isinstance(flow, Stroboscope):
-        model = flow.system.model
+        model = flow.system.struck_model
         rates = model.damping_ratio * model.omega if model.damping is None else -flow.system.poles().real
         known.append(float(np.min(rates)))
     if not known:

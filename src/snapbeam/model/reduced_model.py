@@ -576,7 +576,8 @@ class ReducedModel(Wells):
         modes : int
             Number of modes N, 1 to 256.
         damping_ratio : float or array of shape (N,)
-            Damping ratio of the linear modes about a well, each in [0, 1).
+            Damping ratio of the linear modes about a well, each in [0, 1): of unequal wells the one that the first striker
+            pushes away from, the one of minimum energy without a striker.
         reference_frequency : float, optional
             Frequency that normalises the excitation, Hz; the first natural frequency by default, of unequal wells about
             the one of minimum energy.

@@ -325,6 +325,17 @@ class System:
             )
         return State(amplitude=local.wells[well].amplitude)
 
+    @property
+    def struck_model(self) -> ReducedModel:
+        """The model about the well that the first striker pushes away from: with it above, the mirror image.
+
+        Without a striker it is the one about the well of minimum energy.  Damping ratios are those of this model's linear
+        modes, about whichever well the beam vibrates.
+        """
+        if self.striker is None:
+            return self.model.about_reference_well
+        return self.model.mirrored if self.striker.side == "above" else self.model
+
     def poles(self, equilibrium: Equilibrium | str | int | None = None) -> NDArray[np.complex128]:
         """Poles of small oscillations about an equilibrium, with damping, local forces and circuits.
 
@@ -359,7 +370,7 @@ class System:
             equilibrium = potential.well(checked_well("equilibrium", equilibrium))
         alpha = self._start_at_rest.amplitude if equilibrium is None else equilibrium.amplitude
         n, modes = model.modes, model.linear_modes
-        damping = modes.T @ model.damping_matrix @ modes
+        damping = modes.T @ self.struck_model.damping_matrix @ modes
         for force in self.local_forces:
             row = force.row(model)
             if force.dissipative:

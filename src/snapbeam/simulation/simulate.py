@@ -59,7 +59,7 @@ _ENDED = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED)
 def describe_system(system: System, plan: Plan) -> dict[str, Any]:
     """Return the parameters of a system, except those of its drive and striker, and its steps as attributes."""
     model = system.model
-    damping = model.damping_ratio
+    damping = system.struck_model.damping_ratio
     attrs: dict[str, Any] = {
         "modes": model.modes,
         "damping_ratio": float(damping[0]) if np.all(damping == damping[0]) else damping.tolist(),

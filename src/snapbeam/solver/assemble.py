@@ -17,7 +17,6 @@ from snapbeam.model.early_termination import decidable_energy, passed_heights
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import numbered, quantities, section_of, split_name
-from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.solver.channels import channels_of
@@ -429,7 +428,7 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     masses = [each.striker.mass for each in system.contacts if each.striker.mass is not None]
     if not masses:
         return plans
-    mass = _struck(system).lightest_contact_mass
+    mass = system.struck_model.lightest_contact_mass
     more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / min(masses)) - 1e-9))
     return [
         each._replace(
@@ -452,7 +451,7 @@ def _depends_on_velocity(system: System) -> bool:
 
 def _longest_with_local_forces(system: System, accuracy: str) -> float:
     """Longest step with local forces, s: their stiffness and damping are in the kicks."""
-    model, scale = _struck(system), system.scale
+    model, scale = system.struck_model, system.scale
     at_center = abs(float(model.midspan_shape @ model.well_amplitude)) or scale.length
     squared, decay = 0.0, 0.0
     for force in system.local_forces:
@@ -471,7 +470,7 @@ def _with_circuits(plans: list[Plan], system: System, columns: Mapping[str, _Arr
     The stiffness t.t of circuits with inertia, and the damping rate t.t of those without, are in the kicks.  The decay lam h of a
     circuit in a step is at most 3, or over 8: then it follows the beam.
     """
-    model, runs = _struck(system), len(plans)
+    model, runs = system.struck_model, len(plans)
     squared, decay, longest = 0.0, np.zeros(runs), np.full(runs, math.inf)
     step = np.array([each.step for each in plans])
     for harvester, circuit in zip(system.harvesters, _circuits(system, columns, runs), strict=True):
@@ -485,12 +484,6 @@ def _with_circuits(plans: list[Plan], system: System, columns: Mapping[str, _Arr
     exchange = np.maximum(np.maximum(math.sqrt(squared), decay), 1e-300)
     longest = np.minimum(longest, 2.0 * _TAPPED[accuracy] / exchange)
     return [each._replace(step=min(each.step, own)) for each, own in zip(plans, longest.tolist(), strict=True)]
-
-
-def _struck(system: System) -> ReducedModel:
-    """The model as the striker sees it, so that mirror images are stepped alike."""
-    above = system.striker is not None and system.striker.side == "above"
-    return system.model.mirrored if above else system.model
 
 
 def _serving(plans: Sequence[Plan]) -> Plan:
@@ -521,12 +514,12 @@ def _plans_of(
     step, accuracy = integration.step, integration.accuracy
     runs = next(iter(columns.values())).size if columns else 1
     if contact is None or not of_contact:
-        return [choose_base_step(_struck(system), contact, step=step, accuracy=accuracy)] * runs
+        return [choose_base_step(system.struck_model, contact, step=step, accuracy=accuracy)] * runs
     table = np.stack(list(of_contact.values()), axis=1)
     different, which = np.unique(table, axis=0, return_inverse=True)
     plans = [
         choose_base_step(
-            _struck(system),
+            system.struck_model,
             dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))),  # type: ignore[type-var]
             step=step,
             accuracy=accuracy,
@@ -537,8 +530,12 @@ def _plans_of(
 
 
 def _side(system: System, state: State, goes_on: bool) -> str:
+    model = system.model
     if system.striker is not None:
         return system.striker.side
+    if model.is_bistable and model.mirrored is not model:
+        # one damping matrix, whichever well the beam starts in
+        return "below" if system.struck_model is model else "above"
     if goes_on:
         # the same from call to call, whichever well it comes to
         return "below"

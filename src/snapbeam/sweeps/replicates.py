@@ -69,7 +69,7 @@ def perturbed_start(system: System, replicates: Replicates, repeat: int, state: 
     linear mode gets a normally distributed displacement and velocity of equal mean energy, q_j ~ N(0, s/omega_j) and
     q_j' ~ N(0, s).  The factor s gives the mid-span displacement its root mean square, ``perturbation_rms``.
     """
-    model = system.model
+    model = system.struck_model
     rest = state if state is not None else system.start_state
     sign = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
     moving = model.omega > 0.0
