@@ -78,8 +78,11 @@ class ReferenceBeam:
         straight[0] = math.sqrt((load - critical) / self.gamma)
         self.wells = {sign: self.settle(sign * straight, ()) for sign in (-1.0, 1.0)}
         self.damping_ratio = given.damping_ratio
-        deepest = min((-1.0, 1.0), key=lambda sign: self.energy(self.wells[sign]))
-        self.omega = float(self.frequencies(deepest)[0][0])
+        self.deepest = min((-1.0, 1.0), key=lambda sign: self.energy(self.wells[sign]))
+        """Well of lowest energy, whose damping a beam without strikers has."""
+        self.fabricated = 1.0 if initial[0] > 0.0 else -1.0
+        """Well on the side of the initial shape, where a beam without strikers begins."""
+        self.omega = float(self.frequencies(self.deepest)[0][0])
         """First natural frequency about the deeper well, rad/s."""
 
     def shape(self, place: float) -> Array:
@@ -225,8 +228,9 @@ class Solution:
     ) -> None:
         self.beam, self.parts, n = beam, parts, beam.k.size
         tips, circuits = parts.tips, parts.circuits
-        sign = -tips[0].side if tips else -1.0
-        self.damping, self.rest = beam.damping(sign), beam.settle(beam.wells[sign], parts.local)
+        sign = -tips[0].side if tips else beam.fabricated
+        self.rest = beam.settle(beam.wells[sign], parts.local)
+        self.damping = beam.damping(sign if tips else beam.deepest)
         self.bodies = {j: 2 * n + 2 * i for i, j in enumerate(j for j, tip in enumerate(tips) if tip.body)}
         self.live = {i: 0 for i, each in enumerate(circuits) if each.inertia > 0.0}
         first = 2 * n + 2 * len(self.bodies)

@@ -606,9 +606,7 @@ def composed(seed: int, features: Features | None = None, mirror: bool = False) 
         initial_state=state,
     )  # fmt: skip
     parts = Parts(tips, rows, local, shaking, features.carried, load, circuits, start, tuple(sorted(breaks)))
-    # without a striker the damping is that of the lower well, also of the mirror image
     known = set(features.local) <= {*KNOWN_FORCES, *ATTRACTIVE}
-    known = known and bool(features.contacts or not features.uneven)
     places = [tip.location for tip in tips] + [i / 8.0 for i in range(1, 8)]
     return Composition(features, system, beam, parts, volts, known, places)
 

@@ -42,6 +42,7 @@ QUICK = (
         local=("attracting_magnet", "softening_spring"),
         circuits=("piezo",),
     ),
+    Features(3, external=("harmonic_force",), uneven=True),
 )
 """Parts whose numbers are drawn in the quick tests."""
 LIMIT = {"standard": 1e-3, "reference": 5e-7}
