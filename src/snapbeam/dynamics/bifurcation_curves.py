@@ -130,19 +130,22 @@ class _Curve(OrbitEquations):
         self._approaches = {y.tobytes(): found}
         return found
 
-    def _slope_of_test(self, y: _Array, moves: _Array, beside: list[Return]) -> _Array:
-        """Derivative of the test function by state and parameters, from the return map at y + moves and y - moves."""
+    def _slope_of_test(self, y: _Array, moves: _Array, came: Return, beside: list[Return]) -> _Array:
+        """Derivative of the test function by state and parameters, from the return map at y, y + moves and y - moves."""
+        places = np.concatenate([y[None], y + moves, y - moves])
         if self.kind != "grazing":
-            tests = [self.test(*each) for each in zip(np.concatenate([y + moves, y - moves]), beside, strict=True)]
+            tests = [self.test(*each) for each in zip(places, [came, *beside], strict=True)]
         else:
             # the instant of a turning point changes the gap in second order only
             time, contact, _ = self._approach(y)
             tests = [
-                -penetrations(self._seen(each), each[:-2], self.period, np.array([time]))[0, contact]
-                for each in np.concatenate([y + moves, y - moves])
+                -penetrations(self._seen(each), each[:-2], self.period, np.array([time]))[0, contact] for each in places
             ]
-        above, below = np.array(tests).reshape(2, -1)
-        slope: _Array = (above - below) / (2.0 * self.difference)
+        sides = (np.array(tests[1:]) - tests[0]).reshape(2, -1) * [[1.0], [-1.0]] / self.difference
+        # across a touch the motion is another one: the derivative is that of the side without it
+        alike = np.reshape([each.impacts == came.impacts for each in beside], (2, -1)) | (self.kind != "grazing")
+        weights = np.where(alike.any(axis=0), alike, True)
+        slope: _Array = (sides * weights).sum(axis=0) / weights.sum(axis=0)
         return slope
 
     def _seen(self, y: _Array) -> Stroboscope:
@@ -162,9 +165,9 @@ class _Curve(OrbitEquations):
         came, *beside = self._all(np.concatenate([y[None], y + moves, y - moves]))
         table = np.empty((size + 1, size + 2))
         table[:size, :size] = came.jacobian - np.eye(size)
-        for k in (size, size + 1):
-            table[:size, k] = (beside[k].x - beside[k + size + 2].x) / (2.0 * self.difference)
-        table[size] = self._slope_of_test(y, moves, beside)
+        slope = self.family.slope(y[:-2], self.period, self.values(y), self.difference * self.spans)
+        table[:size, size:] = slope * self.spans
+        table[size] = self._slope_of_test(y, moves, came, beside)
         return np.append(came.x - y[:-2], self.test(y, came)), came, table
 
     def _all(self, y: _Array) -> list[Return]:

@@ -209,8 +209,8 @@ class _Orbits(OrbitEquations):
 
     def derivative(self, y: _Array) -> tuple[_Array, Return, _Array]:
         """Residual, return map and derivative, shape (d, d + 1)."""
-        came, span = jacobian(self.family, y[:-1], self.period, self.values(y)), float(self.spans[0])
-        slope = self.family.slope(y[:-1], self.period, self._value(y), _DIFFERENCE * span) * span
+        came = jacobian(self.family, y[:-1], self.period, self.values(y))
+        slope = self.family.slope(y[:-1], self.period, self.values(y), _DIFFERENCE * self.spans) * self.spans
         return came.x - y[:-1], came, np.column_stack([came.jacobian - np.eye(len(came.x)), slope])
 
     def orbit(self, point: Point) -> PeriodicOrbit:

@@ -84,12 +84,17 @@ class Family:
         """The flow at values of the parameters, shape (k,)."""
         return self.flow.changed(dict(zip(self.names, np.asarray(values).tolist(), strict=True)))
 
-    def slope(self, x: _Array, periods: int, value: float, step: float) -> _Array:
-        """Derivative by the one parameter of where the flow brings one state, shape (d,)."""
+    def slope(self, x: _Array, periods: int, values: _Array, step: _Array) -> _Array:
+        """Derivative by the parameters of where the flow brings one state, shape (d, k), with the *step* of each."""
         if self._beside and isinstance(self.flow, Stroboscope):
-            return self.flow.slope(x, periods, self.names[0], value, step)
-        above, below = (self.advance(x[None], periods, [value + sign * step]).states[0] for sign in (1.0, -1.0))
-        change: _Array = (above - below) / (2.0 * step)
+            given = dict(zip(self.names, values.tolist(), strict=True))
+            flow, steps = self.flow, zip(self.names, step.tolist(), strict=True)
+            return np.stack([flow.slope(x, periods, given, name, own) for name, own in steps], axis=1)
+        above, below = (
+            np.stack([self.advance(x[None], periods, each).states[0] for each in values + sign * np.diag(step)])
+            for sign in (1.0, -1.0)
+        )
+        change: _Array = (above - below).T / (2.0 * step)
         return change
 
 

@@ -211,25 +211,23 @@ class Stroboscope:
         how = self.during(periods)
         return make_ensemble(self.system, how, own, start=begun.flat(), periods=how.cycles)
 
-    def slope(self, x: _Array, periods: int, name: str, value: float, step: float) -> _Array:
-        """Derivative by a parameter of the runs of where the map brings one state, shape (d,).
+    def slope(self, x: _Array, periods: int, values: Mapping[str, float], name: str, step: float) -> _Array:
+        """Derivative by one of the parameters of the runs of where the map brings one state, shape (d,).
 
         The numbers of a run are differentiated by a difference over twice the *step*, the run itself exactly.  A motion whose table of
         pieces depends on the parameter, or that jumps, takes differences between runs.
         """
         begun, moved = self._begun(x[None]), np.zeros((1, 1, self.dimension))
+        given = {key: np.array([value]) for key, value in values.items()}
+        points = [given, *(given | {name: np.array([values[name] + sign * step])} for sign in (1.0, -1.0))]
         for _ in range(periods):
-            here, above, below = (
-                self._ensemble(begun, 1, {name: np.array([at])}) for at in (value, value + step, value - step)
-            )
+            here, above, below = (self._ensemble(begun, 1, each) for each in points)
             if not native.differentiable(above, below):
-                ends = [
-                    self.advance(x[None], periods, points={name: np.array([at])}) for at in (value + step, value - step)
-                ]
+                ends = [self.advance(x[None], periods, points=each) for each in points[1:]]
                 change: _Array = (ends[0].states - ends[1].states)[0] / (2.0 * step)
                 return change
             moved = self._moved(here, moved, np.zeros(1, bool), (above, below, 2.0 * step))
-            begun = self._advance_part(begun, 1, False, {name: np.array([value])}, None).hidden
+            begun = self._advance_part(begun, 1, False, given, None).hidden
             # the gap says where the tip is, whatever the parameter moves
             begun = replace(begun, striker_position=np.array(np.nan), modal=None)
         found: _Array = moved[0, 0]
