@@ -67,15 +67,15 @@ def test_fractions_means_and_quantiles_are_those_of_the_runs(one_by_one) -> None
 def test_runs_do_not_end_early_where_a_statistic_is_asked_for() -> None:
     """Over many cycles a run whose end is certain would end early, with fewer impacts."""
     many = sb.Integration(cycles=60, early_termination=True)
-    system = small_system().replace(**{"drive.velocity_amplitude": 0.03})
-    ds = U.probability_map(system, {"velocity_amplitude": [0.03]}, SPREAD, 4, statistics="impacts", integration=many)
+    system = small_system().replace(**{"drive.velocity_amplitude": 0.55})
+    ds = U.probability_map(system, {"velocity_amplitude": [0.55]}, SPREAD, 4, statistics="impacts", integration=many)
     runs = [sb.simulate(each, sb.Integration(cycles=60)) for each in U.sample_systems(system, SPREAD, 4)]
     assert float(ds["impacts"].item()) == np.mean([run.summary.impacts for run in runs])
 
 
 def test_a_quantity_given_as_an_object_is_of_whole_runs() -> None:
     """The statistic by name and as an object gives the same; the object's runs ended early."""
-    system, how = small_system().replace(**{"drive.velocity_amplitude": 0.03}), sb.Integration(cycles=60)
+    system, how = small_system().replace(**{"drive.velocity_amplitude": 0.55}), sb.Integration(cycles=60)
     spread = U.ParameterUncertainty(of={"contact.stiffness": U.LogNormal(0.3)})
     found = [
         U.sensitivity(system, each, spread, samples=2, integration=how)["effect"].values
