@@ -49,7 +49,7 @@ def test_they_are_the_poles_of_circuits_without_loss(tmp_path) -> None:
             pytest.approx(each) for each in system.circuit_frequencies(well)
         ]
         for kind, ohms in (("open", 1e8), ("short", 1e-6)):
-            poles = system.replace(**{f"harvester{n}.resistance": ohms for n in ("", "_2")}).poles(well)
+            poles = system.replace(**{f"harvester{n}.resistance": ohms for n in ("", ".2")}).poles(well)
             moving = np.abs(poles[(poles.imag > 1.0) & (np.abs(poles.real) < 1e-2 * np.abs(poles))]) / (2.0 * np.pi)
             assert wells[name][kind] == pytest.approx(np.sort(moving), rel=1e-6)
     opened, short = system.circuit_frequencies()
