@@ -207,7 +207,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
                     check_writable(asked.json, "json", (".json",))
                 _check_texts(kwargs)
                 try:
-                    with _styled(style):
+                    with _styled(None if style is None else str(style)):
                         return command(*args, **kwargs)
                 finally:
                     if asked.json is not None and asked.found:

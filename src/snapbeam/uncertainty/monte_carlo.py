@@ -91,7 +91,7 @@ class Trials:
     progress: Progress | None = field(default=None, repr=False)
     """Called with the runs of a round, unless the round has a report of its own."""
     scaled: bool = False
-    """Whether statistics have beside them the length and the velocity of the sample that they are over."""
+    """True if statistics have beside them the length and the velocity of the sample that they are over."""
 
     def columns(self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None) -> Columns:
         """The parameters of the samples: those of the points, and those that are sampled around them.
