@@ -8,13 +8,16 @@ from PIL import Image
 from typer.testing import CliRunner
 
 import snapbeam as sb
-from snapbeam import paper
 from snapbeam.cli.app import app
 
 
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
-    system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
+    beam = sb.Beam(
+        length=0.161, thickness=4e-4, width=0.015, density=7850.0, young_modulus=200e9, buckling_level=3.35e-4
+    )
+    contact = sb.Contact(sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18))
+    system = sb.System(sb.ReducedModel.from_beam(beam, modes=1, damping_ratio=0.02), contacts=[contact])
     path = tmp_path_factory.mktemp("style") / "map.nc"
     sb.write_netcdf(
         sb.sweep(system, {"drive.velocity_amplitude": np.linspace(0.05, 0.2, 3)}, sb.Integration(cycles=3)), path
