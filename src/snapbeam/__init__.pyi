@@ -74,6 +74,7 @@ from .sweeps.compute import SweepReport as SweepReport
 from .sweeps.measured_points import MeasuredPoints as MeasuredPoints
 from .sweeps.measured_points import read_measured_points as read_measured_points
 from .sweeps.replicates import Replicates as Replicates
+from .sweeps.seeds import mean_over_seeds as mean_over_seeds
 from .sweeps.sweep import sweep as sweep
 from .sweeps.threshold import threshold as threshold
 from .util.diagnostics import Diagnostic as Diagnostic

@@ -156,6 +156,7 @@ RESULTS = {
     "largest_lyapunov": "Lyapunov exponents", "lyapunov_spectrum": "Lyapunov exponents", "lifetime_map": "lifetimes",
     "poincare_section": "section", "gradient": "gradient", "optimize_design": "designs",
     "probability_map": "probability map", "quantile_threshold": "quantiles of a threshold",
+    "mean_over_seeds": "means over seeds",
     "score_measurements": "measured classes", "sensitivity": "sensitivities",
     "equilibrium_branches": "equilibrium branches",
 }  # fmt: skip

@@ -78,6 +78,14 @@ _FORCE = Annotated[
     ),
 ]  # fmt: skip
 
+_STYLE = Annotated[
+    str | None,
+    typer.Option(
+        "--style", help="Widths and letters of figures: elsevier, ieee or talk, as of snapbeam.plot.plot_style.",
+        rich_help_panel="Output", metavar="NAME",
+    ),
+]  # fmt: skip
+
 
 def _print_all_options(ctx: typer.Context, wanted: bool) -> None:
     if wanted:
@@ -187,7 +195,7 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
             force=bool(kwargs.pop("force", False)),
         )
         kwargs.pop("help_all", None)
-        quiet, path = bool(kwargs.pop("quiet", False)), kwargs.pop("json", None)
+        quiet, path, style = bool(kwargs.pop("quiet", False)), kwargs.pop("json", None), kwargs.pop("style", None)
         asked = _OutputOptions(quiet, path if isinstance(path, Path) else None)
         token = _OUTPUT_OPTIONS.set(asked)
         try:
@@ -199,7 +207,8 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
                     check_writable(asked.json, "json", (".json",))
                 _check_texts(kwargs)
                 try:
-                    return command(*args, **kwargs)
+                    with _styled(None if style is None else str(style)):
+                        return command(*args, **kwargs)
                 finally:
                     if asked.json is not None and asked.found:
                         write_json(asked.json, asked.found | {"notes": asked.notes})
@@ -237,12 +246,42 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
         for name, kind in (("quiet", _QUIET), ("force", _FORCE), ("help_all", _HELP_ALL))
     ]
+    if _draws(signature):
+        more.append(inspect.Parameter("style", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_STYLE))
     more.append(inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context))
     more.append(inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_JSON))
     mine = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values()]
     guarded.__signature__ = inspect.Signature(mine + more)  # type: ignore[attr-defined]
     guarded.__annotations__ = {}
     return guarded
+
+
+def _draws(signature: inspect.Signature) -> bool:
+    """Return whether an option of a command names a figure."""
+    texts = (getattr(each, "help", "") for own in signature.parameters.values() for each in _metadata(own.annotation))
+    return any(str(text).startswith("Figure ") for text in texts)
+
+
+def _metadata(annotation: Any) -> tuple[Any, ...]:
+    return getattr(annotation, "__metadata__", ())
+
+
+@contextmanager
+def _styled(style: str | None) -> Iterator[None]:
+    """Draw in a style of :func:`snapbeam.plot.plot_style` in the block."""
+    if style is None:
+        yield
+        return
+    from snapbeam.plot.style import plot_style
+
+    try:
+        plot_style(style)
+    except InputError as error:
+        raise InputError(str(error).replace("name", "style", 1)) from None
+    try:
+        yield
+    finally:
+        plot_style("elsevier")
 
 
 def _check_texts(arguments: Mapping[str, Any]) -> None:
@@ -256,7 +295,7 @@ def _check_texts(arguments: Mapping[str, Any]) -> None:
 
 
 _NO_PARAMETERS = frozenset(
-    "output plot variable measurements quasi_static_line statistic picture frame report video video_every figure json "
+    "output plot variable measurements quasi_static_line statistic picture frame report video video_every figure style json "
     "quiet force help_all threads yes estimate_cost checkpoint check_checkpoint cluster points_per_task log".split()
 )
 """Arguments of commands that do not change the numbers of a result."""

@@ -11,6 +11,7 @@ from snapbeam.cli.console import add_json, cli_command, out
 from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, configured, with_parameters
 
 if TYPE_CHECKING:
+    from snapbeam.model.parameter_file import Config
     from snapbeam.model.potential import Potential
 
 
@@ -23,7 +24,7 @@ def frequencies(
 
     The exact ones solve the eigenvalue problem of the buckled beam (Nayfeh, Kreider and Anderson 1995);
     the error of the reduced model is relative to them.  They are of a perfect beam: with an imperfection the command prints
-    the frequencies of the reduced model about each well.
+    the frequencies of the reduced model about each well.  With harvesters it prints those with open and with shorted loads too.
     """
     from rich.table import Table
 
@@ -40,6 +41,7 @@ def frequencies(
     assert beam is not None
     if model.imperfection is not None or not potential.is_of_the_structure_alone:
         _print_wells(potential, count, modal_error(settings.static_system))
+        _print_circuits(settings, count)
         return
     reduced = model.natural_frequencies
     exact = exact_natural_frequencies(beam, count=count)
@@ -65,6 +67,7 @@ def frequencies(
             f"{straight[at]:.3f}",
         )
     console.print(table)
+    _print_circuits(settings, count)
 
 
 def modal_error_text(quantity: str, error: float, modes: int) -> str:
@@ -73,6 +76,26 @@ def modal_error_text(quantity: str, error: float, modes: int) -> str:
 
     advice = "; use more modes, or --modes auto" if error > AUTO_ERROR else ""
     return f"{quantity}: estimated error of {modes} modes {100.0 * error:.2g} %{advice}"
+
+
+def _print_circuits(settings: Config, count: int) -> None:
+    """Print the frequencies about each well with open and with shorted loads, of a system with harvesters."""
+    from rich.table import Table
+
+    from snapbeam.model.quantity import numbered
+
+    if not any(numbered(name)[0] == "harvester" for name in settings.given):
+        return
+    system = settings.system
+    found = [[each[:count] for each in system.circuit_frequencies(well)] for well in system.potential.wells]
+    names = system.potential.well_names
+    add_json(circuits={name: {"open": own[0], "short": own[1]} for name, own in zip(names, found, strict=True)})
+    table = Table(box=None, pad_edge=False)
+    for title in ("", *(f"{name}, {state} (Hz)" for name in names for state in ("load open", "shorted"))):
+        table.add_column(title, justify="right")
+    for at in range(found[0][0].size):
+        table.add_row(str(at + 1), *(f"{each[at]:.3f}" for own in found for each in own))
+    out().print(table)
 
 
 def _print_wells(potential: Potential, count: int, error: float) -> None:

@@ -50,9 +50,9 @@ def compute_map(
     stored = opt.kept_config(settings, keeping)
     set_request([settings.system.hash, settings.integration, axes, stored["options"]])
     check_outputs(output, plot)
-    if plot is not None:
-        _check_two_axes(plot, axes)
     _check_variable(variable, plot, overlaid=measurements is not None or quasi_static_line)
+    if plot is not None:
+        _check_two_axes(plot, axes, variable)
     system = settings.system
     beam = system.model.beam
     overlay = read_overlay(
@@ -149,12 +149,15 @@ def _check_variable(variable: str | None, plot: Path | None, *, overlaid: bool) 
         )
 
 
-def _check_two_axes(path: Path, axes: dict[str, Any]) -> None:
+def _check_two_axes(path: Path, axes: dict[str, Any], variable: str | None) -> None:
     from snapbeam.model.parameters import lookup
+    from snapbeam.solver.statistics import STATISTICS
     from snapbeam.util.validation import InputError
 
     many = [lookup(name).short for name, values in axes.items() if len(values) > 1]
-    if len(many) != 2:
+    real = variable is not None and STATISTICS[variable].dtype == "float64"
+    others = [name for name in many if not lookup(name).name.endswith(".seed")]  # of which the mean is drawn
+    if len(many) != 2 and not (real and 1 <= len(others) <= 2):
         raise InputError(
             f"plot = {str(path)!r}: a map is drawn over two axes, not {len(many)} ({', '.join(many)}); "
             "leave --plot out, and plot a slice with snapbeam plot map.nc --at location=0.3"

@@ -18,6 +18,7 @@ from snapbeam.cli.parameter_options import point_text
 from snapbeam.model.parameters import lookup, parameters
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.plot.units import in_units, ratio_name, scale_text
+from snapbeam.sweeps.seeds import mean_over_seeds, seed_axes
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass, RunStatus, wells_of
 from snapbeam.util.validation import InputError, printable
@@ -99,16 +100,24 @@ def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any],
         name = "harvested_power_last_quarter"
     if name is None or name not in dataset or dataset[name].dtype.kind != "f":
         return None
-    values = dataset[name]
-    unknown = int(values.isnull().sum())
-    if unknown == values.size:
+    unknown, total = int(dataset[name].isnull().sum()), dataset[name].size
+    if unknown == total:
         return None
+    seeds = seed_axes(dataset)
+    means = mean_over_seeds(dataset) if seeds else dataset
+    values = means[name]
     at = np.unravel_index(int(np.nanargmax(values.values)), values.shape)
     point = _point(values, dict(zip(values.dims, at, strict=True)))
     where = ", ".join(coordinate_text(dataset, each, point[each]) for each in point)
-    line = f"Highest {statistic_text(dataset, name, values.values[at])}"
+    line = f"Highest {statistic_text(means, name, values.values[at])}"
+    if seeds:
+        ends = [float(means[f"{name}{end}"].values[at]) for end in ("_low", "_high")]
+        line += f" ({' to '.join(value_text(means, name, each) for each in ends)}, 95 % interval of the mean)"
+        near = int((means[f"{name}_high"] >= ends[0]).sum()) - 1
+        where += f"; {near} of {values.size - 1} other points may have as much" if values.size > 1 else ""
+        point |= {each: dataset[each].values[0].item() for each in seeds}
     line += f" at {where}" if where else ""
-    return point, line + (f"; not known at {unknown} of {values.size} points" if unknown else "")
+    return point, line + (f"; not known at {unknown} of {total} points" if unknown else "")
 
 
 def _ranges(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:

@@ -97,18 +97,18 @@ def agreed(cost: CostEstimate, yes: bool, stop: bool) -> bool:
 
 def _compute(
     question: Any, words: tuple[str, str], arguments: tuple[Any, ...], settings: Config, estimate_cost: bool, yes: bool,
-    threads: int | None, checkpoint: Path | None,
+    threads: int | None, checkpoint: Path | None, **options: Any,
 ) -> tuple[xr.Dataset, float] | None:  # fmt: skip
     """The result of a computation and its time, s; None if only its cost is wanted or the user does not agree."""
     from snapbeam.uncertainty.cost import estimate_cost as cost_of
 
     how = settings.integration.replace(threads=threads)
-    cost = cost_of(question, *arguments, integration=how, trial=10.0 if estimate_cost else 2.0)
+    cost = cost_of(question, *arguments, integration=how, trial=10.0 if estimate_cost else 2.0, **options)
     if not agreed(cost, yes, estimate_cost):
         return None
     begun = time.monotonic()
     with progress(None, *words) as report:
-        dataset = question(*arguments, integration=how, checkpoint=checkpoint, progress=report)
+        dataset = question(*arguments, integration=how, checkpoint=checkpoint, progress=report, **options)
     return dataset, time.monotonic() - begun
 
 
@@ -245,34 +245,57 @@ def probability(
     yes: Yes = False,
     law: opt.Law = None,
     threads: opt.Threads = None,
+    outcome: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Statistic beyond a value, such as 'peak_force > 60 N', whose probability is wanted too; the first is drawn. "
+            "Repeat for further ones.",
+            rich_help_panel="Output",
+            metavar="TEXT",
+        ),
+    ] = None,
+    statistic: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Statistic whose mean and quantiles are wanted, such as harvested_power; repeat for further ones.",
+            rich_help_panel="Output",
+            metavar="NAME",
+        ),
+    ] = None,
 ) -> None:
-    """Map the probability of snap-through and final wells, under parameter uncertainty.
+    """Map the probability of snap-through, final wells and statistics beyond values, under parameter uncertainty.
 
-    The TOML file has the sections of a parameter file, [uncertainty], the axes in [sweep], and the sampling plan in
-    [probability].
+    The TOML file has the sections of a parameter file, [uncertainty], the axes in [sweep], and in [probability] the
+    sampling plan, outcomes, statistics and quantiles.
 
-    Example: snapbeam probability switch.toml -o probability.nc --plot probability.png
+    Example: snapbeam probability switch.toml --outcome 'peak_force > 60 N' -o probability.nc --plot probability.png
     """
     from snapbeam.plot.uncertainty import plot_probability
     from snapbeam.plot.units import in_units
+    from snapbeam.uncertainty.monte_carlo import outcome_named
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
 
     settings, uncertainty, asked = read(file, "probability", law)
     check_outputs(output, plot)
+    options: dict[str, Any] = {
+        name: asked.pop(name) for name in ("outcomes", "statistics", "quantiles") if name in asked
+    }
+    options |= {"outcomes": outcome} if outcome else {}
+    options |= {"statistics": statistic} if statistic else {}
     runs: Any = asked["runs"] if set(asked) == {"runs"} else taken(SamplingPlan, asked, "probability")
     arguments = (settings.system, settings.axes() or _default_axes(settings.system), uncertainty, runs)
     words = ("probability map", "runs")
-    found = _compute(probability_map, words, arguments, settings, estimate_cost, yes, threads, checkpoint)
+    found = _compute(probability_map, words, arguments, settings, estimate_cost, yes, threads, checkpoint, **options)
     if found is None:
         return
     dataset, elapsed = found
-    small = {name: dataset[name].values for name in ("probability", "probability_low", "probability_high", "runs")
-             if dataset[name].size <= 4000}  # fmt: skip
+    small = {str(name): each.values for name, each in dataset.variables.items()
+             if name not in dataset["runs"].dims and each.size <= 4000}  # fmt: skip
     told = in_units(dataset)
     axes = {str(dim): told[dim].values for dim in told["runs"].dims if dim in told.coords}
     add_json(results=small, axes=axes)
-    outcome = str(dataset.attrs["watched_outcome"])
-    finish(dataset, output, plot, lambda ds: plot_probability(ds, outcome), _lines_probability(told, elapsed))
+    drawn = outcome_named(outcome[0])[0] if outcome else str(dataset.attrs["watched_outcome"])
+    finish(dataset, output, plot, lambda ds: plot_probability(ds, drawn), _lines_probability(told, elapsed))
 
 
 def _default_axes(system: System) -> dict[str, Any]:
@@ -293,21 +316,22 @@ _MOST_PRINTED = 24
 """Points up to which the command prints the probability of each."""
 
 
-def _probabilities(one: xr.Dataset) -> list[str]:
-    """Probability and interval of each point of one outcome; the range of all, where there are many points."""
-    from snapbeam.cli.summary import coordinate_text
+def _intervals(one: xr.Dataset, name: str = "probability") -> list[str]:
+    """Value and interval of a variable at each point; the range of all, where there are many points."""
+    from snapbeam.cli.summary import coordinate_text, value_text
 
-    found = one["probability"]
+    found = one[name]
     if found.size > _MOST_PRINTED:
-        low, high = float(found.min()), float(found.max())
-        return [f"  probability from {low:.4g} to {high:.4g}; each point is in the file"]
+        low, high = (value_text(one, name, float(each)) for each in (found.min(), found.max()))
+        return [f"  {name.replace('_', ' ')} from {low} to {high}; each point is in the file"]
     lines = []
     for at in np.ndindex(found.shape):
         point = one.isel(dict(zip(found.dims, at, strict=True)))
         values = {dim: point[dim].values.item() for dim in found.dims if dim in point.coords}
         where = ", ".join(coordinate_text(one, str(dim), value) for dim, value in values.items())
-        low, high = float(point["probability_low"]), float(point["probability_high"])
-        lines.append(f"  {where or 'probability'}: {float(point['probability']):.4g} ({low:.4g} to {high:.4g})")
+        ends = [float(point[f"{name}{end}"]) for end in ("", "_low", "_high")]
+        middle, low, high = (value_text(one, name, each) if np.isfinite(each) else "unbounded" for each in ends)
+        lines.append(f"  {where or name}: {middle} ({low} to {high})")
     return lines
 
 
@@ -319,7 +343,12 @@ def _lines_probability(dataset: xr.Dataset, elapsed: float) -> list[str]:
         sure = int((one["probability_low"] > 0.95).sum())
         never = int((one["probability_high"] < 0.05).sum())
         lines.append(f"{name}: lower limit above 0.95 at {sure} points, upper limit below 0.05 at {never}")
-        lines += _probabilities(one)
+        lines += _intervals(one)
+    for name in [str(name)[: -len("_quantile")] for name in dataset.data_vars if str(name).endswith("_quantile")]:
+        lines += [f"{dataset[name].attrs['long_name']}:", *_intervals(dataset, name)]
+        for level in dataset["quantile"].values:
+            one = dataset.sel(quantile=level)
+            lines += [f"{level:g} {one[f'{name}_quantile'].attrs['long_name']}:", *_intervals(one, f"{name}_quantile")]
     if not bool(dataset["reached"].all()):
         lines.append(f"interval wider than requested at {int((~dataset['reached']).sum())} points")
     lines.append(f"stopped: {dataset.attrs['termination_reason']}")

@@ -365,10 +365,7 @@ class System:
         >>> print(abs(sb.System(model, harvesters=[layer]).poles())[-1].round(6))
         1.118034
         """
-        model, potential = self.model, self.potential
-        if equilibrium is not None and not isinstance(equilibrium, Equilibrium):
-            equilibrium = potential.well(checked_well("equilibrium", equilibrium))
-        alpha = self._start_at_rest.amplitude if equilibrium is None else equilibrium.amplitude
+        model, potential, alpha = self.model, self.potential, self._amplitude_at(equilibrium)
         n, modes = model.modes, model.linear_modes
         damping = modes.T @ self.struck_model.damping_matrix @ modes
         for force in self.local_forces:
@@ -391,6 +388,51 @@ class System:
             matrix[n : 2 * n, i], matrix[i, n : 2 * n], matrix[i, i] = theta, -theta, -rate
         found = np.linalg.eigvals(matrix)
         return np.asarray(found[np.lexsort((found.imag, np.abs(found)))])
+
+    def circuit_frequencies(
+        self, equilibrium: Equilibrium | str | int | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Natural frequencies about an equilibrium with all loads open, and with all loads shorted.
+
+        Of m a'' + (K + sum_j theta_j theta_j^T/M_j) a = 0 with the circuits that lose nothing: those of layers with an open
+        circuit, and those of coils with an inductance and no resistance with a shorted one.
+
+        Parameters
+        ----------
+        equilibrium : Equilibrium, {"lower", "upper"} or int, optional
+            As in :meth:`poles`.
+
+        Returns
+        -------
+        open, short : arrays of shape (N,)
+            Hz, ascending; 0 in an unstable direction.
+
+        Examples
+        --------
+        >>> import snapbeam as sb
+        >>> model = sb.ReducedModel.from_matrices(
+        ...     [[1.0]], [1.0], contact_shape=[1.0], patch_shape=[1.0], reference_frequency=1.0
+        ... )
+        >>> layer = sb.PiezoelectricHarvester(moment_per_volt=0.5, capacitance=1.0, resistance=1.0)
+        >>> opened, short = sb.System(model, harvesters=[layer]).circuit_frequencies()
+        >>> print((opened / short).round(6))
+        [1.118034]
+        """
+        stiffness = self.potential.in_modes(self.potential.tangent(self._amplitude_at(equilibrium)))
+        found = [np.array(stiffness), np.array(stiffness)]
+        for each in self.harvesters:
+            if each.inertia > 0.0:
+                theta = self.model.linear_modes.T @ each.row(self.model)
+                little, much = (float(each.loss(np.array([ohms]))[0]) for ohms in (1e-9, 1e9))
+                found[int(little < much)] += np.outer(theta, theta) / each.inertia
+        opened, short = (np.sqrt(np.maximum(np.linalg.eigvalsh(each), 0.0)) / (2.0 * np.pi) for each in found)
+        return opened, short
+
+    def _amplitude_at(self, equilibrium: Equilibrium | str | int | None) -> NDArray[np.float64]:
+        """Amplitudes of an equilibrium, by default of the well that runs begin in."""
+        if equilibrium is not None and not isinstance(equilibrium, Equilibrium):
+            equilibrium = self.potential.well(checked_well("equilibrium", equilibrium))
+        return self._start_at_rest.amplitude if equilibrium is None else equilibrium.amplitude
 
     @property
     def _start_at_rest(self) -> State:

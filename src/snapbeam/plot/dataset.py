@@ -99,6 +99,14 @@ def _map(dataset: xr.Dataset) -> dict[str, _Draws]:
     return {"response_class": plot_response_map} | {name: partial(plot_statistic, name=name) for name in others}
 
 
+def _means(dataset: xr.Dataset) -> dict[str, _Draws]:
+    """Statistics with an interval, over the axes of the runs."""
+    names = [
+        str(n) for n, item in dataset.data_vars.items() if f"{n}_low" in dataset and item.dims == dataset["runs"].dims
+    ]
+    return {name: partial(plot_statistic, name=name) for name in sorted(names, key="snap".__ne__)}
+
+
 def _swept(dataset: xr.Dataset) -> dict[str, _Draws]:
     figures = {name: function for name, function in _map(dataset).items() if name != "response_class"}
     return dict(sorted(figures.items(), key=lambda each: each[0] != "peak_midspan_displacement"))
@@ -142,8 +150,9 @@ _KINDS = (
     _Kind("quantiles of a threshold", {"threshold"}, {"quantile"}, lambda _: {"threshold": uncertainty.plot_quantiles}),
     _Kind(
         "probability map", {"probability"}, {"outcome"},
-        lambda ds: {str(name): partial(uncertainty.plot_probability, outcome=str(name)) for name in ds["outcome"].values},
+        lambda ds: {str(name): partial(uncertainty.plot_probability, outcome=str(name)) for name in ds["outcome"].values} | _means(ds),
     ),
+    _Kind("means over seeds", {"snap", "snap_low"}, set(), lambda ds: _means(ds)),
     _Kind("sensitivities", {"effect"}, {"parameter"}, lambda _: {"effect": uncertainty.plot_tornado}),
     _Kind("sensitivity indices", {"first_order"}, {"parameter"}, lambda _: {"first_order": uncertainty.plot_tornado}),
     _Kind("gradient", {"elasticity"}, {"parameter"}, _gradient),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import textwrap
 import warnings
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,7 @@ from snapbeam.plot.style import (
 from snapbeam.plot.units import in_units, ratio_along, scale_text
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.sweeps.seeds import mean_over_seeds, seed_axes
 from snapbeam.util.si_prefixes import scale_of
 from snapbeam.util.status_codes import ResponseClass, wells_of
 from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, shown
@@ -319,7 +321,8 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
     dataset : xarray.Dataset
         A map, or a result of :func:`snapbeam.dynamics.hysteresis`, whose two sweeps are drawn as two lines.
     name : str
-        One of :data:`snapbeam.STATISTICS`, or any other variable over the axes.
+        One of :data:`snapbeam.STATISTICS`, or any other variable over the axes; over an axis of seeds its mean, with
+        the interval as a band over one other axis.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     log : bool, optional
@@ -338,7 +341,7 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
         raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     if dataset[name].dims == ("point",):
         return plot_points(dataset, name, ax)
-    dataset = in_units(dataset)
+    dataset = in_units(_of_any_seed(dataset, name))
     values = dataset[name].squeeze(
         [each for each, size in dataset[name].sizes.items() if size == 1 and each != "sweep"]
     )
@@ -359,7 +362,11 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
                 _swept(ax, dataset, data, dims[1])
             else:
                 points, _ = positions(dataset, dims[0])
-                ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=1.5 * marker_size(points.size))
+                ax.plot(
+                    points, data.values, ".-", color=BEAM_COLOR, markersize=1.5 * marker_size(points.size), label="mean"
+                )
+                if f"{name}_low" in dataset:
+                    _band(ax, dataset.squeeze(), name, points)
             dress(ax.xaxis, dataset, dims[-1])
             ax.set_ylabel(label)
             ax.set_yscale("log" if log else "linear")
@@ -378,6 +385,27 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
             dress(ax.yaxis, dataset, upward)
         set_title(ax, caption(dataset, 2, dims))
     return ax
+
+
+def _of_any_seed(dataset: xr.Dataset, name: str) -> xr.Dataset:
+    """The means over seeds of a map that has other axes too; otherwise the map itself."""
+    seeds = seed_axes(dataset)
+    others = [each for each, size in dataset[name].sizes.items() if size > 1 and each not in seeds]
+    return mean_over_seeds(dataset) if seeds and others and dataset[name].dtype.kind == "f" else dataset
+
+
+def _band(ax: Axes, dataset: xr.Dataset, name: str, points: _Array) -> None:
+    """Draw the interval of a mean, and the quantiles beside it."""
+    factor, _ = _label(dataset, name, dataset[name].values)
+    low, high = (dataset[f"{name}{end}"].values / factor for end in ("_low", "_high"))
+    known = np.isfinite(low) & np.isfinite(high)
+    share = f"{100.0 * float(dataset.attrs.get('confidence', 0.95)):g} % interval of the mean"
+    ax.fill_between(points, low, high, where=known, color=BEAM_COLOR, alpha=0.25, linewidth=0.0, label=share)
+    if f"{name}_quantile" in dataset:
+        for level, dashes in zip(dataset["quantile"].values, itertools.cycle(("--", "-.", ":"))):
+            values = dataset[f"{name}_quantile"].sel(quantile=level).values / factor
+            ax.plot(points, values, dashes, color=SHAKER_COLOR, label=f"{level:g} quantile")
+    legend_below(ax)
 
 
 def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None:

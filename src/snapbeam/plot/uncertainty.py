@@ -133,6 +133,12 @@ _WORDS = {
     "first_well": "Probability of ending in the first well",
     "other_well": "Probability of ending in the other well",
 }
+
+
+def _words_of(outcome: str) -> str:
+    return _WORDS.get(outcome) or textwrap.fill(f"Probability that {outcome.replace('_', ' ')}", 40)
+
+
 _DASHES: dict[float, Any] = {0.05: ":", 0.5: "-", 0.95: "--"}
 
 
@@ -198,7 +204,7 @@ def _line(data: xr.Dataset, ax: Axes, name: str, outcome: str) -> None:
     share = 100.0 * float(data.attrs.get("confidence", 0.95))
     ax.fill_between(x, low, high, color=_BLUE, alpha=0.25, linewidth=0.0, label=f"{share:g} % interval")
     ax.plot(x, data["probability"].values, "o-", color=_BLUE, markersize=2.2, label="fraction of the runs")
-    ax.set(ylim=(-0.02, 1.02), ylabel=_WORDS.get(outcome, outcome))
+    ax.set(ylim=(-0.02, 1.02), ylabel=_words_of(outcome))
     legend_below(ax)
     dress(ax.xaxis, data, name)
 
@@ -210,7 +216,7 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
     cells = ax.pcolormesh(
         *edges, values, cmap=colors, norm=BoundaryNorm(np.linspace(0.0, 1.0, 11), 10), rasterized=True
     )
-    color_bar(cells, ax, _WORDS.get(outcome, outcome), ticks=np.linspace(0.0, 1.0, 6))
+    color_bar(cells, ax, _words_of(outcome), ticks=np.linspace(0.0, 1.0, 6))
     x, y = (positions(data, name)[0] for name in dims)
     drawn = [level for level in levels if np.nanmin(values) < level < np.nanmax(values)]
     handles: list[Any] = []

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from snapbeam.model.integration import Integration
 from snapbeam.sweeps.points import Columns, PointList, points_of
 from snapbeam.sweeps.sweep import sweep
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, trials_of
+from snapbeam.uncertainty.monte_carlo import Trials, outcome_named, trials_of
 from snapbeam.uncertainty.optimization import OptimizerSettings, optimize_design
-from snapbeam.uncertainty.probability import SamplingPlan, allocation_of, probability_map
+from snapbeam.uncertainty.probability import SamplingPlan, allocation_of, outcomes_of, probability_map, statistics_of
 from snapbeam.uncertainty.quantiles import QuantileSearchSettings, quantile_threshold
 from snapbeam.util.proportions import proportion
 from snapbeam.util.validation import InputError, checked, within
@@ -151,7 +151,10 @@ def _of_probability(
     trial: float, system: Any, axes: Any, uncertainty: Any = None, runs: Any = None, **options: Any
 ) -> CostEstimate:
     allocation = allocation_of(runs)
-    trials = trials_of(system, uncertainty, options.get("integration"))
+    event = outcome_named(allocation.outcome)[1]
+    asked = outcomes_of(options.get("outcomes", ()), allocation).values()
+    needed = [*(each.statistic for each in asked), *statistics_of(options.get("statistics", ()))]
+    trials = trials_of(system, uncertainty, options.get("integration"), statistics=needed)
     points = points_of(axes, system)
     where: list[NDArray[np.int64]] = []
 
@@ -160,7 +163,7 @@ def _of_probability(
         return points.take(where[-1])
 
     made, seconds, found = _trial(trials, point, trial)
-    happened = np.asarray(OUTCOMES[allocation.outcome].happened(found))
+    happened = event.happened(found)
     expected = _expected(allocation, np.concatenate(where), happened, points.size)
     most = points.size * (allocation.initial_runs if allocation.half_width is None else allocation.max_runs)
     if allocation.half_width is not None:
@@ -201,7 +204,8 @@ def _of_threshold(
     options: Any = None, **more: Any,
 ) -> CostEstimate:  # fmt: skip
     options = QuantileSearchSettings() if options is None else options
-    trials = trials_of(system, uncertainty, more.get("integration"))
+    statistics = [outcome_named(options.outcome)[1].statistic]
+    trials = trials_of(system, uncertainty, more.get("integration"), statistics=statistics)
     points = points_of(axes, system) if axes else None
     low, high = bounds
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,7 @@ from snapbeam.model.parameters import PHYSICAL, lookup, physical_names, ratio_of
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.model.state import amplitude_scale
 from snapbeam.model.system import System
-from snapbeam.solver.statistics import STATISTICS, rows_for
+from snapbeam.solver.statistics import STATISTICS, Statistic, of_one_named, rows_for
 from snapbeam.sweeps.compute import CheckpointOptions, compute_table
 from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
@@ -27,7 +28,8 @@ from snapbeam.sweeps.tasks import PointWork
 from snapbeam.uncertainty.distributions import Distribution, Normal, ParameterUncertainty, UniformTolerance
 from snapbeam.util.diagnostics import DiagnosticWarning
 from snapbeam.util.status_codes import ResponseClass, RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, checked, integer, shown
+from snapbeam.util.units import number_in_unit, unit_in_text
+from snapbeam.util.validation import InputError, InputTypeError, checked, choice, integer, shown, text
 
 Statistics = dict[str, NDArray[Any]]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
@@ -88,6 +90,8 @@ class Trials:
     """Systems of the structures that were sampled so far."""
     progress: Progress | None = field(default=None, repr=False)
     """Called with the runs of a round, unless the round has a report of its own."""
+    scaled: bool = False
+    """True if statistics have beside them the length and the velocity of the sample that they are over."""
 
     def columns(self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None) -> Columns:
         """The parameters of the samples: those of the points, and those that are sampled around them.
@@ -148,7 +152,10 @@ class Trials:
         table, _ = compute_table(work, keeping, cluster=self.cluster, progress=progress or self.progress)
         self.rounds += 1
         self.runs += setup.points.size
-        return {name: work.values(name, table) for name in (*work.integers, *work.numbers)}
+        found = {name: work.values(name, table) for name in (*work.integers, *work.numbers)}
+        if self.scaled:
+            found |= dict(zip((key for key, _ in _SCALES.values()), setup.scales_of(columns), strict=True))
+        return found
 
     def _setup(self, columns: Columns) -> SweepSetup:
         """The runs as a sweep; every structure among them is made before any run, and once."""
@@ -298,8 +305,9 @@ def trials_of(
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     cluster: str | None = None,
     early: bool = True,
+    statistics: Iterable[str] = (),
 ) -> Trials:
-    """Check what is sampled of a system.
+    """Check what is sampled of a system; with *statistics*, which need whole runs, none ends early.
 
     Raises
     ------
@@ -324,7 +332,10 @@ def trials_of(
     if uncertainty.moves_start and system.striker is not None and "contact.gap" not in uncertainty.of:
         if system.parameters.get("contact.gap") is None:
             system = held_in_space(system)
-    return Trials(system, integration.replace(early_termination=early), uncertainty, keeping, cluster)
+    needed = [each for each in statistics if each]
+    require_held(needed, system)
+    how = integration.replace(early_termination=early and not needed)
+    return Trials(system, how, uncertainty, keeping, cluster, scaled=bool(needed))
 
 
 @checked
@@ -400,6 +411,13 @@ class Event(NamedTuple):
 
     long_name: str
     happened: Callable[[Statistics], NDArray[np.bool_]]
+    statistic: str = ""
+    """Statistic of the whole run that is compared with a value; empty where the response class tells."""
+
+    def failed(self, found: Statistics) -> NDArray[np.bool_]:
+        """Mask of the runs of which it is not known."""
+        lost = ~reached(found)
+        return lost | np.isnan(found[self.statistic].astype(np.float64)) if self.statistic else lost
 
 
 OUTCOMES: dict[str, Event] = {
@@ -415,6 +433,62 @@ OUTCOMES: dict[str, Event] = {
     ),
 }
 """Outcomes that every probability map has.  The last three exclude each other and one of them happens."""
+
+_BEYOND = re.compile(r"\s*(\w+)\s*(>=|<=|>|<)\s*(\S.*?)\s*")
+_COMPARED = {">": np.greater, "<": np.less, ">=": np.greater_equal, "<=": np.less_equal}
+_SCALES = {"b": ("length_scale", "m"), "b omega_1": ("velocity_scale", "m/s")}
+"""Keys of :meth:`Trials.of_columns` with the values that statistics are over, and their units."""
+
+
+def outcome_named(given: Any, name: str = "outcome") -> tuple[str, Event]:
+    """Return an outcome and its name: one of :data:`OUTCOMES`, or a statistic beyond a value, such as ``"peak_force > 60 N"``.
+
+    Raises
+    ------
+    InputError
+        If there is none, the statistic is no number, or the unit of the value does not fit.
+    """
+    short = " ".join(text(name, given).split()) if isinstance(given, str) else ""
+    if short in OUTCOMES:
+        return short, OUTCOMES[short]
+    found = _BEYOND.fullmatch(short)
+    if found is None:
+        allowed = ", ".join(map(repr, OUTCOMES))
+        raise (InputError if isinstance(given, str) else InputTypeError)(
+            f"{name} = {shown(given)}: must be one of {allowed}, or a statistic beyond a value, as 'peak_force > 60 N'"
+        )
+    statistic, sign, value = found.groups()
+    row = number_statistic(name, statistic)
+    key, unit = _SCALES.get(row.normalised_by, ("", row.unit)) if unit_in_text(value) else ("", row.unit)
+    try:
+        limit = number_in_unit(value, unit)
+    except InputError as error:
+        raise InputError(f"{name} = {shown(given)}: {error}") from None
+    if limit is None or not np.isfinite(limit):
+        raise InputError(f"{name} = {shown(given)}: {value!r} is not a number")
+
+    def happened(found: Statistics) -> NDArray[np.bool_]:
+        return np.asarray(_COMPARED[sign](found[statistic] * (found[key] if key else 1.0), limit))
+
+    words = row.long_name.removesuffix(f", over {row.normalised_by}") if key else row.long_name
+    return f"{statistic} {sign} {value}", Event(f"{words} {sign} {value}", happened, statistic)
+
+
+def metres_key(statistic: str) -> str:
+    """Key of the value that a statistic is over in the columns of :meth:`Trials.of_columns`; empty for others."""
+    return _SCALES.get(STATISTICS[statistic].normalised_by, ("", ""))[0]
+
+
+def number_statistic(name: str, statistic: Any) -> Statistic:
+    """Return the row of a statistic that is a number.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(statistic, str) or of_one_named(statistic) is None:
+        choice(name, statistic, tuple(each for each, row in STATISTICS.items() if row.dtype in ("float64", "int32")))
+    return STATISTICS[statistic]
 
 
 def reached(found: Statistics) -> NDArray[np.bool_]:

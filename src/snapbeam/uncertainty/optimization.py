@@ -21,7 +21,7 @@ from snapbeam.uncertainty.differential_evolution import DifferentialEvolution, f
 from snapbeam.uncertainty.distributions import ParameterUncertainty
 from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, trials_of
 from snapbeam.util.diagnostics import Diagnostic, counting, tell
-from snapbeam.util.proportions import proportion
+from snapbeam.util.proportions import mean_interval, proportion
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.validation import (
     InputError,
@@ -212,9 +212,8 @@ class Objective:
         if self.quantile is None:
             if not np.isfinite(values).all():
                 return np.inf, -np.inf, np.inf
-            reach = float(stats.t.ppf(0.5 * (1.0 + confidence), n - 1) * values.std(ddof=1) / np.sqrt(n))
-            middle = float(values.mean())
-            return middle, middle - reach, middle + reach
+            middle, low, high = map(float, mean_interval(values, confidence))
+            return middle, low, high
         return _quantile(np.sort(values), self.quantile, confidence)
 
 

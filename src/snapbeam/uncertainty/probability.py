@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +15,22 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Points, points_of
-from snapbeam.sweeps.setup import SweepSetup, sweep_setup
+from snapbeam.sweeps.setup import SweepSetup, sweep_setup, variable_attributes
 from snapbeam.uncertainty.distributions import ParameterUncertainty
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, trials_of
+from snapbeam.uncertainty.monte_carlo import (
+    OUTCOMES,
+    Event,
+    Trials,
+    metres_key,
+    number_statistic,
+    outcome_named,
+    trials_of,
+)
+from snapbeam.uncertainty.optimization import Objective
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.proportions import proportion
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.validation import InputError, InputTypeError, checked, choice, integer, shown, within
+from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,7 +56,8 @@ class SamplingPlan:
         Half the width of the interval of *outcome* that every point is to reach, in (0, 0.5); None: *initial_runs* runs for
         every point.
     outcome : str
-        Outcome whose interval is used: ``"snap"``, ``"continuous"``, ``"first_well"`` or ``"other_well"``.
+        Outcome whose interval is used: ``"snap"``, ``"continuous"``, ``"first_well"``, ``"other_well"``, or a statistic beyond
+        a value, such as ``"peak_force > 60 N"``.
     initial_runs : int
         Runs that every point has to begin with, at least 8 where more follow.
     max_runs : int
@@ -77,7 +87,7 @@ class SamplingPlan:
     confidence: float = 0.95
 
     def __post_init__(self) -> None:
-        choice("outcome", self.outcome, tuple(OUTCOMES))
+        object.__setattr__(self, "outcome", outcome_named(self.outcome)[0])
         if self.half_width is not None:
             within("half_width", self.half_width, 0.0, 0.5)
         integer("initial_runs", self.initial_runs, 1 if self.half_width is None else 8, 10**7)
@@ -110,15 +120,16 @@ class Counts:
 
 
 def allocate(
-    ask: Ask, points: int, allocation: SamplingPlan, tell: Callable[[int, int], object] | None = None
-) -> Counts:
+    ask: Ask, points: int, allocation: SamplingPlan, tell: Callable[[int, int], object] | None = None,
+    outcomes: Iterable[str] = OUTCOMES,
+) -> Counts:  # fmt: skip
     """Spend runs on points until the interval of each is narrow enough.
 
     In every round each point that is too wide is given half of the runs that it seems to lack, at most as many as it
     has: the number of looks at the data stays small, and with it what stopping at a lucky one costs in coverage.
     Failed runs count as runs made, and widen the interval.
     """
-    outcomes = list(OUTCOMES)
+    outcomes = list(outcomes)
     watched = outcomes.index(allocation.outcome)
     zeros = np.zeros(points, dtype=np.int64)
     counts = Counts(np.zeros((len(outcomes), points), dtype=np.int64), zeros.copy(), zeros.copy())
@@ -189,6 +200,9 @@ def probability_map(
     uncertainty: ParameterUncertainty | None = None,
     runs: SamplingPlan | int | None = None,
     *,
+    outcomes: str | Iterable[str] = (),
+    statistics: str | Iterable[str] = (),
+    quantiles: float | Iterable[float] = (0.05, 0.5, 0.95),
     integration: Integration | None = None,
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     cluster: str | None = None,
@@ -211,8 +225,16 @@ def probability_map(
     runs : SamplingPlan or int, optional
         Sampling plan, or the same number of runs for every point; by default until the half width of the 95 %
         interval of P(snap) is 0.05 everywhere.
+    outcomes : str or sequence of str
+        Further outcomes: statistics beyond values, such as ``"peak_force > 60 N"``.  A value without a unit is in that of the
+        statistic; with a unit of length or velocity it is compared with the displacement or velocity of each sample.
+    statistics : str or sequence of str
+        Statistics whose mean and quantiles are wanted, such as ``"harvested_power"``.
+    quantiles : float or sequence of float
+        Probabilities of these quantiles, increasing, each in (0, 1).
     integration : Integration, optional
-        Early termination is always used, also if ``integration.early_termination`` is False.
+        Early termination is always used, also if ``integration.early_termination`` is False, but never where a statistic is
+        asked for, which is of the whole run.
     checkpoint : path or CheckpointOptions, optional
         Checkpoint folder; an existing one is resumed.
     cluster, progress
@@ -223,7 +245,9 @@ def probability_map(
     xarray.Dataset
         ``probability`` with ``probability_low`` and ``probability_high`` over the axes and ``outcome``: ``snap``,
         ``continuous``, ``first_well`` and ``other_well``, of which the last three add up to 1.  ``hits``; ``runs`` and
-        ``runs_failed``, which widen the intervals; ``reached``, whether the half width was.
+        ``runs_failed``, which widen the intervals; ``reached``, whether the half width was.  Of each statistic its mean, with
+        Student's interval (``peak_force``, ``peak_force_low``, ``peak_force_high``), and over ``quantile``
+        ``peak_force_quantile`` with that of order statistics, infinite where the runs are too few or one failed.
 
     Raises
     ------
@@ -255,13 +279,48 @@ def probability_map(
     array([0., 0., 1.])
     """
     allocation = allocation_of(runs)
-    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, cluster=cluster)
+    asked, wanted = outcomes_of(outcomes, allocation), statistics_of(statistics)
+    levels = levels_of(quantiles)
+    needed = [*(each.statistic for each in asked.values()), *wanted]
+    trials = trials_of(
+        system, uncertainty, integration, checkpoint=checkpoint, cluster=cluster, statistics=needed
+    )  # fmt: skip
     if trials.uncertainty.is_empty:
         raise InputError("uncertainty: nothing is uncertain, so every probability is 0 or 1; use sb.sweep")
     points = points_of(axes, trials.system)
     setup = sweep_setup(trials.system, points, trials.integration)
-    counts = _counted(trials, points, allocation, counting(progress, "probability map", "runs"))
-    return _dataset(setup, trials, counts, allocation)
+    counts, values = _counted(trials, points, allocation, asked, wanted, counting(progress, "probability map", "runs"))
+    dataset = _dataset(setup, trials, counts, allocation, asked)
+    return _with_statistics(dataset, points, values, counts, levels, allocation.confidence)
+
+
+def _several(given: Any) -> list[Any]:
+    return [given] if np.ndim(given) == 0 else list(given)
+
+
+def outcomes_of(given: Any, allocation: SamplingPlan) -> dict[str, Event]:
+    """All outcomes of a map by name: those of every map, those *given*, and the one whose interval is used."""
+    return OUTCOMES | dict(outcome_named(each, "outcomes") for each in (*_several(given), allocation.outcome))
+
+
+def statistics_of(given: Any) -> list[str]:
+    """Names of statistics that are numbers, each once."""
+    return [number_statistic("statistics", each).name for each in dict.fromkeys(_several(given))]
+
+
+def levels_of(given: Any) -> tuple[float, ...]:
+    """Probabilities of quantiles, increasing, each in (0, 1).
+
+    Raises
+    ------
+    InputError
+    """
+    found = tuple(
+        within("quantiles", each, 0.0, 1.0) for each in np.atleast_1d(finite_array("quantiles", given)).ravel()
+    )
+    if not found or (np.diff(found) <= 0.0).any():
+        raise InputError(f"quantiles = {shown(given)}: must be increasing numbers, at least one")
+    return found
 
 
 def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
@@ -281,9 +340,17 @@ def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
 
 
 def _counted(
-    trials: Trials, points: Points, allocation: SamplingPlan, tell: Callable[[int, int], object] | None
-) -> Counts:
+    trials: Trials,
+    points: Points,
+    allocation: SamplingPlan,
+    outcomes: dict[str, Event],
+    statistics: list[str],
+    tell: Callable[[int, int], object] | None,
+) -> tuple[Counts, dict[str, list[_Array]]]:
+    """Count outcomes, and keep the values of statistics by point; those of runs that failed are left out."""
     told = [0, 0]
+    values: dict[str, list[_Array]] = {name: [] for name in statistics}
+    places: list[_Index] = []
 
     def ask(which: NDArray[np.int64], numbers: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         def report(done: int, total: int) -> None:
@@ -292,14 +359,62 @@ def _counted(
 
         found = trials.statistics(points.take(which), numbers, report)
         told[0] += which.size
-        return np.stack([each.happened(found) for each in OUTCOMES.values()]), ~reached(found)
+        failed = np.any([each.failed(found) for each in outcomes.values()], axis=0)
+        places.append(which)
+        for name, parts in values.items():
+            parts.append(np.where(failed, np.nan, found[name] * found.get(metres_key(name), 1.0)))
+        return np.stack([each.happened(found) for each in outcomes.values()]), failed
 
     def more(made: int, expected: int) -> None:
         told[:] = made, expected
         if tell is not None:
             tell(made, expected)
 
-    return allocate(ask, points.size, allocation, more)
+    counts = allocate(ask, points.size, allocation, more, outcomes)
+    order = np.argsort(at := np.concatenate(places), kind="stable")
+    ends = np.searchsorted(at[order], np.arange(1, points.size))
+    return counts, {name: np.split(np.concatenate(parts)[order], ends) for name, parts in values.items()}
+
+
+def _with_statistics(
+    dataset: xr.Dataset,
+    points: Points,
+    found: dict[str, list[_Array]],
+    counts: Counts,
+    levels: tuple[float, ...],
+    confidence: float,
+) -> xr.Dataset:
+    """Add the mean and the quantiles of statistics with their intervals; displacements and velocities in m and m/s."""
+    if found:
+        dataset["quantile"] = (
+            ("quantile",),
+            list(levels),
+            {"units": "1", "long_name": "probability of not being more"},
+        )
+    for name, runs in found.items():
+        labels = variable_attributes(name, metres=True)
+        for ending, dims, words, wanted in (
+            ("", points.dims, "mean", [Objective(quantity=name)]),
+            (
+                "_quantile",
+                (*points.dims, "quantile"),
+                "quantile",
+                [Objective(quantity=name, quantile=q) for q in levels],
+            ),
+        ):
+            table = []
+            for own, made in zip(runs, counts.runs + counts.failed, strict=True):
+                good = own[~np.isnan(own)]
+                table.append([each.estimate(good, int(made) - good.size, confidence) for each in wanted])
+            numbers = np.array(table)  # points, quantiles, value and limits
+            for k, (limit, text) in enumerate((("", ""), ("_low", "lower limit: "), ("_high", "upper limit: "))):
+                own = points.arranged(numbers[..., k] if ending else numbers[:, 0, k])
+                dataset[f"{name}{ending}{limit}"] = (
+                    dims,
+                    own,
+                    labels | {"long_name": f"{text}{words} of {labels['long_name']}"},
+                )
+    return dataset
 
 
 def _reason(counts: Counts, allocation: SamplingPlan) -> str:
@@ -317,7 +432,9 @@ def _reason(counts: Counts, allocation: SamplingPlan) -> str:
     )
 
 
-def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: SamplingPlan) -> xr.Dataset:
+def _dataset(
+    setup: SweepSetup, trials: Trials, counts: Counts, allocation: SamplingPlan, outcomes: dict[str, Event]
+) -> xr.Dataset:
     from snapbeam.util.datasets import xr
 
     points = setup.points
@@ -334,9 +451,9 @@ def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Samp
     if allocation.half_width is not None:
         more["half_width"] = allocation.half_width
     dataset = xr.Dataset(coords=setup.coordinates(), attrs=setup.attributes(TITLE, more))
-    labels = {"long_name": "; ".join(f"{name}: {each.long_name}" for name, each in OUTCOMES.items())}
-    dataset[OUTCOME] = ((OUTCOME,), list(OUTCOMES), labels)
-    found = [counts.limits(allocation, i) for i in range(len(OUTCOMES))]
+    labels = {"long_name": "; ".join(f"{name}: {each.long_name}" for name, each in outcomes.items())}
+    dataset[OUTCOME] = ((OUTCOME,), list(outcomes), labels)
+    found = [counts.limits(allocation, i) for i in range(len(outcomes))]
     for k, (ending, text) in enumerate((("", ""), ("_low", "lower limit: "), ("_high", "upper limit: "))):
         table = np.stack([points.arranged(each[k]) for each in found], axis=-1)
         labels = {"units": "1", "long_name": f"{text}probability of an outcome"}

@@ -18,11 +18,11 @@ from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Grid, PointList, points_of
 from snapbeam.sweeps.setup import sweep_setup
 from snapbeam.uncertainty.distributions import ParameterUncertainty
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, trials_of
+from snapbeam.uncertainty.monte_carlo import Trials, outcome_named, trials_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.proportions import proportion
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.validation import InputError, InputTypeError, checked, choice, finite_array, integer, shown, within
+from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -274,7 +274,7 @@ class QuantileSearchSettings:
         integer("rounds", self.rounds, 1, 50)
         within("confidence", self.confidence, 0.5, 0.99, closed="both")
         integer("seed", self.seed, 0, 2**63 - 1)
-        choice("outcome", self.outcome, tuple(OUTCOMES))
+        object.__setattr__(self, "outcome", outcome_named(self.outcome)[0])
 
 
 @dataclass
@@ -380,7 +380,8 @@ def quantile_threshold(
     options : QuantileSearchSettings, optional
         Probabilities, runs and rounds.
     integration : Integration, optional
-        Early termination is always used, also if ``integration.early_termination`` is False.
+        Early termination is always used, also if ``integration.early_termination`` is False, but never where the outcome is
+        a statistic beyond a value.
     checkpoint : path or CheckpointOptions, optional
         Checkpoint folder; an existing one is resumed.
     progress : callable, optional
@@ -427,7 +428,8 @@ def quantile_threshold(
     options = QuantileSearchSettings() if options is None else options
     if not isinstance(options, QuantileSearchSettings):
         raise InputTypeError(f"options = {shown(options)}: must be a QuantileSearchSettings")
-    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint)
+    watched = outcome_named(options.outcome)[1].statistic
+    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, statistics=[watched])
     if axes is not None and not isinstance(axes, Mapping):
         raise InputTypeError(f"axes = {shown(axes)}: must map parameters to arrays of values")
     points = points_of(axes, trials.system) if axes else PointList({row.name: np.array([low])})
@@ -469,7 +471,7 @@ def _searched(
     options: QuantileSearchSettings,
     report: Callable[[int, int], object] | None,
 ) -> list[Runs]:
-    total, before = points.size * options.runs, [0]
+    total, before, event = points.size * options.runs, [0], outcome_named(options.outcome)[1]
 
     def ask(
         columns: NDArray[np.int64], values: NDArray[np.float64], numbers: NDArray[np.int64]
@@ -480,7 +482,7 @@ def _searched(
 
         found = trials.statistics(points.take(columns) | {parameter: values}, numbers, tell)
         before[0] += columns.size
-        return np.asarray(OUTCOMES[options.outcome].happened(found)), ~reached(found)
+        return event.happened(found), event.failed(found)
 
     return search(ask, points.size, bounds, options, report)
 

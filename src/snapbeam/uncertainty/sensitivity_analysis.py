@@ -503,7 +503,7 @@ def sensitivity(
     choice("method", method, METHODS)
     within("confidence", confidence, 0.0, 1.0)
     asked = quantity_of_interest(quantity)
-    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, early=not isinstance(quantity, str))
+    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, early=isinstance(asked, ThresholdQoI))
     trials.progress = counting(progress, "sensitivity", "runs")
     names = trials.uncertainty.parameters
     if not names:

@@ -1,4 +1,4 @@
-"""A probability from counts, with Wilson's score interval: the interval of every proportion of the package."""
+"""A probability from counts with Wilson's score interval, and a mean with Student's: the intervals of the package."""
 
 from __future__ import annotations
 
@@ -31,6 +31,25 @@ def proportion(
     share = np.divide(good, total, where=total > 0, out=np.full(total.shape, np.nan))
     low, high = _limits(good, total + lost, z)[0], _limits(good + lost, total + lost, z)[1]
     return share, low, high
+
+
+def mean_interval(values: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:
+    """Return the mean along the last axis with Student's interval; NaN are left out, and make the interval infinite.
+
+    Returns
+    -------
+    mean, low, high : arrays
+        The mean is NaN without values, the limits are infinite with fewer than two.
+    """
+    given = np.asarray(values, dtype=np.float64)
+    known = ~np.isnan(given)
+    count = known.sum(axis=-1)
+    mean = np.divide(np.where(known, given, 0.0).sum(axis=-1), count, where=count > 0, out=np.full(count.shape, np.nan))
+    squares = np.where(known, (given - mean[..., None]) ** 2, 0.0).sum(axis=-1)
+    freedom = np.maximum(count - 1, 1)
+    half = special.stdtrit(freedom, 0.5 * (1.0 + confidence)) * np.sqrt(squares / freedom / np.maximum(count, 1))
+    half = np.where((count > 1) & known.all(axis=-1), half, np.inf)
+    return mean, np.where(half < np.inf, mean - half, -np.inf), np.where(half < np.inf, mean + half, np.inf)
 
 
 def _limits(good: _Array, total: _Array, z: float) -> tuple[_Array, _Array]:

@@ -1,0 +1,65 @@
+"""Means over the seeds of a random motion, in Python, in a figure and in the summary of a map."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import snapbeam as sb
+from snapbeam.cli.summary import map_summary
+from snapbeam.util.proportions import mean_interval
+from snapbeam.util.validation import InputError
+
+AXES = {"base_excitation.rms_g": [0.1, 0.2, 0.3], "base_excitation.seed": [0, 1, 2, 3]}
+
+BEAM = sb.Beam(length=0.161, thickness=4e-4, width=0.015, density=7850.0, young_modulus=200e9, buckling_level=3.35e-4)
+
+
+@pytest.fixture(scope="module")
+def shaken():
+    motion = sb.RecordedAcceleration.from_psd([(20, 0.01), (200, 0.01)], duration_s=1.0, ramp_up_s=0.05)
+    model = sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=0.02)
+    layers = sb.PiezoelectricHarvester(moment_per_volt=-1e-4, capacitance=1e-7, resistance=1e4)
+    system = sb.System(model, base_excitation=sb.BaseExcitation(motion=motion), harvesters=[layers])
+    return sb.sweep(system, AXES, sb.Integration(cycles=20))
+
+
+def test_means_and_intervals_are_scipys(shaken) -> None:
+    found = sb.mean_over_seeds(shaken, confidence=0.9)
+    assert found.attrs["seeds"] == 4 and found["peak_voltage"].dims == ("base_excitation_rms_g",)
+    values = shaken["peak_voltage"].values
+    low, high = stats.t.interval(0.9, 3, values.mean(axis=1), stats.sem(values, axis=1))
+    assert found["peak_voltage"].values == pytest.approx(values.mean(axis=1))
+    assert found["peak_voltage_low"].values == pytest.approx(low)
+    assert found["peak_voltage_high"].values == pytest.approx(high)
+    assert found["snap"].values == pytest.approx((shaken["response_class"].values > 0).mean(axis=1))
+
+
+def test_a_mean_with_a_missing_value_has_no_limits() -> None:
+    mean, low, high = mean_interval([[1.0, np.nan, 3.0], [2.0, 2.0, 5.0], [np.nan] * 3])
+    assert mean[:2].tolist() == [2.0, 3.0] and np.isnan(mean[2])
+    assert low[0] == -np.inf and high[0] == np.inf and np.isfinite([low[1], high[1]]).all() and high[2] == np.inf
+    assert mean_interval([4.0])[1] == -np.inf
+
+
+def test_the_figure_and_the_summary_have_the_mean(shaken) -> None:
+    """The highest single run is not reported, nor drawn."""
+    best, mean = (float(each["harvested_power_last_quarter"].max()) for each in (shaken, sb.mean_over_seeds(shaken)))
+    assert best > 1.05 * mean
+    words = " ".join(str(each) for each in map_summary(shaken, []).renderables)
+    assert "4 seeds" in words and f"{1e6 * mean:.4g} µW" in words and "95 % interval of the mean" in words
+    ax = sb.plot.plot_statistic(shaken, "harvested_power_last_quarter")
+    (line,) = (each for each in ax.lines if each.get_label() == "mean")
+    drawn = np.asarray(line.get_ydata())
+    assert drawn / drawn.max() == pytest.approx(
+        shaken["harvested_power_last_quarter"].mean("base_excitation_seed") / mean
+    )
+    assert "seeds" in ax.get_ylabel() and len(ax.collections) == 1
+    only = shaken.isel(base_excitation_rms_g=1)
+    assert len(sb.plot.plot_statistic(only, "peak_voltage").lines[0].get_xdata()) == 4
+
+
+def test_a_map_without_seeds_is_refused(shaken) -> None:
+    with pytest.raises(InputError, match="no map with an axis of seeds"):
+        sb.mean_over_seeds(shaken.isel(base_excitation_seed=0))
