@@ -51,7 +51,7 @@ REFUSALS = [
     (("map", "-o", "none/map.nc"), "cannot be written, 'none' is not an existing folder"),
     (("map", "-o", "map.txt"), "must end in .nc"),
     (("map", "--plot", "map.gif"), "must end in .png or .pdf or .svg"),
-    (("map", "--plot", "map.png", "--location", "0.2:0.5:3"), "drawn over two axes, not 3"),
+    (("map", "--plot", "map.png", "--location", "0.2:0.5:3"), "drawn over one or two axes, not 3"),
     (("map", "--measurements", "none.csv"), "none.csv': cannot be read"),
     (("map", "--config", "none.toml"), "cannot be read, No such file"),
     (("map", "--axial-load", "1.0"), "axial_load"),

@@ -42,6 +42,52 @@ CASES = {
 }
 
 
+def test_parts_of_a_run(tmp_path) -> None:
+    """Without the modes or all samples a file has the same statistics, impacts and final state, and says what it lacks."""
+    run = sb.simulate(*CASES["plain"])
+    sizes = []
+    for content in ("samples", "waveforms", "statistics"):
+        path = tmp_path / f"{content}.nc"
+        run.save(path, content)
+        sizes.append(path.stat().st_size)
+        again = sb.load(path)
+        np.testing.assert_equal(dict(again.summary), dict(run.summary))
+        xr.testing.assert_identical(again.impacts, run.impacts)
+        assert again.system == run.system
+        np.testing.assert_array_equal(again.final_state.amplitude, run.final_state.amplitude)
+        if content == "waveforms":
+            kept = run.dataset.drop_vars(["modal_amplitude", "modal_velocity", "mode"])
+            xr.testing.assert_identical(again.dataset, kept)
+            assert len(again.plot("spectrum").lines) > 0
+            with pytest.raises(InputError, match="without modal_amplitude"):
+                again.plot("modal_amplitudes")
+    assert sizes[0] > 1.2 * sizes[1] > 1.4 * sizes[2]
+    for kind in ("run", "spectrum"):
+        with pytest.raises(InputError, match="run with 0 samples: has no figures"):
+            again.plot(kind)
+    with pytest.raises(InputError, match="content = 'states': must be one of"):
+        run.save(path, "states")
+
+
+def test_save_of_the_command(tmp_path) -> None:
+    from typer.testing import CliRunner
+
+    from snapbeam.cli.app import app
+
+    words = ["simulate", "--modes", "3", "--cycles", "5", "-o", str(tmp_path / "run.nc"), "--save"]
+    done = CliRunner().invoke(app, [*words, "statistics"])
+    assert done.exit_code == 0, done.output
+    again = sb.load(tmp_path / "run.nc")
+    whole = sb.simulate(again.system, again.integration)
+    np.testing.assert_equal(dict(again.summary), dict(whole.summary))
+    xr.testing.assert_equal(again.impacts, whole.impacts)
+    assert again.dataset.sizes["time"] == 0
+    figure = CliRunner().invoke(app, ["plot", str(tmp_path / "run.nc"), "-o", str(tmp_path / "run.png")])
+    assert figure.exit_code == 2 and "run with 0 samples: has no figures" in figure.output
+    for more in (["states"], ["waveforms", "--stream"]):
+        assert CliRunner().invoke(app, [*words, *more]).exit_code == 2
+
+
 QUICK = ("tolerance", "decided", "failed", "no impact ends")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 
 import pytest
@@ -41,6 +42,37 @@ def test_progress_in_words(system, capsys):
     for check in (counting, sharing):
         with pytest.raises(sb.InputTypeError, match="progress = 3: must be True or callable"):
             check(3, "a")
+
+
+def test_progress_that_nobody_asked_for(system, capsys, monkeypatch):
+    """A terminal shows the call of a user that takes long, once; not what is a part of it, and nothing with False."""
+    axes = {"velocity_amplitude": [0.1, 0.2]}
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    sb.sweep(system, axes, sb.Integration(cycles=3))
+    assert capsys.readouterr().err == ""  # in less than two seconds
+    monkeypatch.setattr("snapbeam.util.diagnostics._WAIT", 0.0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    sb.sweep(system, axes, sb.Integration(cycles=3))
+    assert capsys.readouterr().err.count("\n") == 1
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    sb.sweep(system, axes, sb.Integration(cycles=3), progress=False)
+    sb.simulate(system, sb.Integration(cycles=3), progress=lambda share: None)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    sb.dynamics.find_attractors(system, 4, progress=False)
+    sb.simulate([system, system], sb.Integration(cycles=3))
+    lines = capsys.readouterr().err.rstrip().split("\n")
+    assert [line.split("\r")[-1].strip() for line in lines] == ["simulate: 2 of 2 runs"]
+
+
+def test_codes_in_words(system):
+    found = sb.sweep(system, {"velocity_amplitude": [0.01, 0.5]}, sb.Integration(cycles=3))
+    found["status"][0] = sb.RunStatus.STEP_LIMIT
+    assert found.snapbeam.meanings("status").values.tolist() == ["step_limit", "ok"]
+    assert found.snapbeam.meanings("response_class").values[0] == "intrawell"
+    assert (found.snapbeam.meanings("status") == "step_limit").dims == ("velocity_amplitude",)
+    with pytest.raises(sb.InputError, match="name = 'impacts': must be a variable of codes: response_class, status"):
+        found.snapbeam.meanings("impacts")
 
 
 def test_several_systems_at_once(system):

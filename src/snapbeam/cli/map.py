@@ -52,7 +52,7 @@ def compute_map(
     check_outputs(output, plot)
     _check_variable(variable, plot, overlaid=measurements is not None or quasi_static_line)
     if plot is not None:
-        _check_two_axes(plot, axes, variable)
+        _check_axes(plot, axes, variable)
     system = settings.system
     beam = system.model.beam
     overlay = read_overlay(
@@ -149,7 +149,7 @@ def _check_variable(variable: str | None, plot: Path | None, *, overlaid: bool) 
         )
 
 
-def _check_two_axes(path: Path, axes: dict[str, Any], variable: str | None) -> None:
+def _check_axes(path: Path, axes: dict[str, Any], variable: str | None) -> None:
     from snapbeam.model.parameters import lookup
     from snapbeam.solver.statistics import STATISTICS
     from snapbeam.util.validation import InputError
@@ -157,8 +157,8 @@ def _check_two_axes(path: Path, axes: dict[str, Any], variable: str | None) -> N
     many = [lookup(name).short for name, values in axes.items() if len(values) > 1]
     real = variable is not None and STATISTICS[variable].dtype == "float64"
     others = [name for name in many if not lookup(name).name.endswith(".seed")]  # of which the mean is drawn
-    if len(many) != 2 and not (real and 1 <= len(others) <= 2):
+    if len(many) not in (1, 2) and not (real and 1 <= len(others) <= 2):
         raise InputError(
-            f"plot = {str(path)!r}: a map is drawn over two axes, not {len(many)} ({', '.join(many)}); "
+            f"plot = {str(path)!r}: a map is drawn over one or two axes, not {len(many)} ({', '.join(many)}); "
             "leave --plot out, and plot a slice with snapbeam plot map.nc --at location=0.3"
         )

@@ -59,6 +59,16 @@ def simulate(
         int | None,
         opt.count_option("Evenly spaced samples per cycle (default: 200, and every step in contact).", "Output"),
     ] = None,
+    save: Annotated[
+        str,
+        typer.Option(
+            "--save",
+            help="Samples in the file of --output: samples (all, default), waveforms (without those of the modes) or statistics "
+            "(none, for long runs).",
+            rich_help_panel="Output",
+            metavar="CONTENT",
+        ),
+    ] = "samples",
     stream: Annotated[
         bool,
         typer.Option(
@@ -92,7 +102,11 @@ def simulate(
     part = opt.parse_window(window)
 
     import snapbeam as sb
+    from snapbeam.simulation.save import CONTENTS
+    from snapbeam.util.validation import choice
 
+    if choice("save", save, CONTENTS) != "samples" and (output is None or stream):
+        raise sb.InputError(f"save = {save!r}: is of the file of --output, without --stream")
     if stream and (output is None or plot is not None or animate is not None):
         raise sb.InputError("--stream: writes one file, name it with --output; draw it later with snapbeam plot")
 
@@ -107,9 +121,16 @@ def simulate(
     run = None
     with _share_done() as progress:
         times = _even(system, integration, samples)
+        if save == "statistics" and not pictures:
+            times = [0.0]  # samples that nobody sees are not recorded
         if output is not None and not stream:
-            size = least_file_size(system, integration, None if times is None else len(times))
-            require_room_of({"output": (output, size), **pictures})
+            size = (
+                0.0
+                if save == "statistics"
+                else least_file_size(system, integration, None if times is None else len(times))
+            )
+            _tell_size(size, output) if save == "samples" else None
+            require_room_of({"output": (output, size if save == "samples" else 0.0), **pictures})
         if stream and output is not None:
             summary = sb.simulate_to_file(system, integration, path=output, sample_times=times, progress=progress)
         else:
@@ -119,8 +140,7 @@ def simulate(
     console.print(_summary_text(summary, time.monotonic() - start, system))
     if output is not None:
         if run is not None:
-            _warn_of_size(run.dataset, output)
-            run.save(output)
+            run.save(output, save)
         console.print(f"Written: {file_line(output)}")
     if run is not None and plot is not None:
         console.print(f"Written: {file_line(draw_computed(run.dataset, plot, output, save=run.save, window=part))}")
@@ -135,15 +155,15 @@ def simulate(
         raise typer.Exit(FAILED)
 
 
-_LARGE_FILE = 100e6
-"""Size of a run above which the command prints a warning before it writes the file, bytes."""
+_LARGE_FILE = 20e6
+"""Size of the file of a run above which the command tells it before the run, bytes."""
 
 
-def _warn_of_size(dataset: xr.Dataset, path: Path) -> None:
-    if dataset.nbytes > _LARGE_FILE:
+def _tell_size(least: float, path: Path) -> None:
+    if 2.0 * least > _LARGE_FILE:
         notes().print(
-            f"{path}: {dataset.sizes['time']} samples, about {dataset.nbytes / 1e6:.0f} MB; for a smaller file use fewer "
-            "samples per cycle, such as --samples 50",
+            f"{path}: about {2.0 * least / 1e6:.2g} MB; smaller are files with fewer samples per cycle (--samples 50), without "
+            "those of the modes (--save waveforms), or without any (--save statistics)",
             markup=False,
         )
 

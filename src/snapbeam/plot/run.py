@@ -56,7 +56,10 @@ _ENERGIES = (
 
 def dataset_of(run: Run | xr.Dataset, *needed: str) -> xr.Dataset:
     """The time series of a run, given as a run or as its dataset; refused if it lacks a variable."""
-    return check_trajectory(run.dataset if isinstance(run, Run) else run, require=needed)
+    found = check_trajectory(run.dataset if isinstance(run, Run) else run, require=needed)
+    if found.sizes["time"] < 2:
+        raise InputError(f"run with {found.sizes['time']} samples: has no figures; record and save its samples")
+    return found
 
 
 def across(dataset: xr.Dataset) -> tuple[str, str]:

@@ -92,11 +92,19 @@ class Run:
     def __getstate__(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the run to a NetCDF file atomically; :func:`snapbeam.load` reads it."""
+    def save(self, path: str | os.PathLike[str], content: str = "samples") -> None:
+        """Write the run to a NetCDF file atomically; :func:`snapbeam.load` reads it.
+
+        Parameters
+        ----------
+        path : path
+        content : {"samples", "waveforms", "statistics"}
+            All samples; those without the amplitudes and velocities of the modes; or none.  The statistics, the impacts and the
+            state at the end are always in the file.
+        """
         from snapbeam.simulation.save import save_run
 
-        save_run(self, path)
+        save_run(self, path, content)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the time series as a table: one row for each time, a column for each mode of a modal variable.

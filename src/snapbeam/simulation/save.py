@@ -20,7 +20,7 @@ from snapbeam.solver.statistics import STATISTICS
 from snapbeam.util.files import check_writable
 from snapbeam.util.netcdf import read_netcdf, write_netcdf
 from snapbeam.util.status_codes import ResponseClass, RunStatus
-from snapbeam.util.validation import InputError, file_path
+from snapbeam.util.validation import InputError, choice, file_path
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,14 +30,20 @@ _GROUPS = ("impacts", "summary")
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 
 
-def save_run(run: Run, path: str | os.PathLike[str]) -> None:
+CONTENTS = ("samples", "waveforms", "statistics")
+"""What a file of a run has of its samples: all, the series without those of modes, or none."""
+
+
+def save_run(run: Run, path: str | os.PathLike[str], content: str = CONTENTS[0]) -> None:
     """Write a run; see :meth:`snapbeam.Run.save`.
 
     The root group contains the time series, the groups ``impacts`` and ``summary`` the rest.  Attributes of the root
     contain the system, the integration, the error estimate and the final state as JSON.
     """
     target = check_writable(path, "path", (".nc",))
-    root = run.dataset.assign_attrs(description(run.system, run.integration, run.accuracy, run.final_state))
+    kept = run.dataset.drop_dims("mode") if choice("content", content, CONTENTS) == "waveforms" else run.dataset
+    kept = kept.isel(time=slice(0)) if content == "statistics" else kept
+    root = kept.assign_attrs(description(run.system, run.integration, run.accuracy, run.final_state))
     groups = {None: root, "impacts": run.impacts.assign_attrs({}), "summary": summary_dataset(run.summary)}
     write_netcdf(groups, target, {name: compressed(dataset) for name, dataset in groups.items()})
 

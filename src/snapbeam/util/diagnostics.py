@@ -5,17 +5,22 @@ from __future__ import annotations
 import json
 import math
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from types import FrameType
 from typing import Any
 
+from snapbeam.util import validation
 from snapbeam.util.validation import InputError, InputTypeError, choice, shown
 from snapbeam.util.work_rate import WorkRate
 
 _INTERVAL = 0.2
+_WAIT = 2.0
+"""Seconds after which a computation without *progress* shows it to a person who waits."""
 _Counts = Callable[[int, int], object]
 _Shares = Callable[[float], object]
 
@@ -193,18 +198,19 @@ def _outside() -> int:
 
 
 class _Line:
-    """Progress line on standard error, updated at most five times per second."""
+    """Progress line on standard error, updated at most five times per second, from *after* seconds on."""
 
-    def __init__(self, what: str) -> None:
+    def __init__(self, what: str, after: float = 0.0) -> None:
         self.what = what
         self.last = time.monotonic()
+        self.begin = self.last + after
         self.rate = WorkRate()
         self.ended = False
 
     def say(self, share: float, words: str) -> None:
         now = time.monotonic()
         self.rate.report(share)
-        if (self.ended and share >= 1.0) or (now - self.last < _INTERVAL and share < 1.0):
+        if now < self.begin or (self.ended and share >= 1.0) or (now - self.last < _INTERVAL and share < 1.0):
             return
         self.ended = share >= 1.0
         self.last = now
@@ -215,19 +221,39 @@ class _Line:
         sys.stderr.flush()
 
 
+def _line(progress: object, what: str) -> _Line | None:
+    """The line of True; that of None for a person who waits for a call of the package itself; otherwise None."""
+    if progress is True:
+        return _Line(what)
+    stream = sys.stderr
+    is_seen = progress is None and stream is not None
+    is_seen = is_seen and (stream.isatty() or type(stream).__module__.startswith("ipykernel."))
+    if not is_seen or threading.current_thread() is not threading.main_thread():
+        return None
+    frame: FrameType | None = sys._getframe(2)
+    own = {validation.__file__, sys._getframe(2).f_code.co_filename}
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == _PACKAGE:
+        if frame.f_code.co_filename not in own:  # a part of a longer computation
+            return None
+        frame = frame.f_back
+    return _Line(what, _WAIT)
+
+
 def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -> _Counts | None:
-    """Function to which a computation reports ``(done, total)``; True selects a line on standard error.
+    """Function to which a computation reports ``(done, total)``.
+
+    True selects a line on standard error; so does None, after 2 s, in a terminal or a notebook, unless the computation is a
+    part of another one; False selects none.
 
     Raises
     ------
     InputTypeError
         If *progress* can be called no more than it is True, False or None.
     """
+    if (line := _line(progress, what)) is not None:
+        return lambda done, total: line.say(done / max(total, 1), f"{done} of {total} {noun}")
     if progress is None or progress is False:
         return None
-    if progress is True:
-        line = _Line(what)
-        return lambda done, total: line.say(done / max(total, 1), f"{done} of {total} {noun}")
     if not callable(progress):
         raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress(done, total)")
     return progress
@@ -235,11 +261,10 @@ def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -
 
 def sharing(progress: _Shares | bool | None, what: str) -> _Shares | None:
     """Progress function as :func:`counting`, for progress as a fraction."""
+    if (line := _line(progress, what)) is not None:
+        return lambda share: line.say(share, f"{100.0 * share:.0f} %")
     if progress is None or progress is False:
         return None
-    if progress is True:
-        line = _Line(what)
-        return lambda share: line.say(share, f"{100.0 * share:.0f} %")
     if not callable(progress):
         raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress(share)")
     own: _Shares = progress
