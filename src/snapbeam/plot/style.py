@@ -70,8 +70,7 @@ _RC: Any = {
     "axes.titlesize": 8,
     "figure.constrained_layout.use": True,
     "figure.dpi": 150,
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
+    "font.family": ["DejaVu Sans"],  # by name: a generic family is another font once the context has ended
     "font.size": 8,
     "legend.fontsize": 7,
     "legend.columnspacing": 1.4,
@@ -123,13 +122,10 @@ def plot_style(name: str) -> None:
     """
     widths, size, font = _STYLES[choice("name", name, tuple(_STYLES))]
     COLUMN_WIDTHS.update(zip(COLUMN_WIDTHS, widths, strict=True))
-    scale, serif = size / _BASE["font.size"], font == "STIXGeneral"
+    scale = size / _BASE["font.size"]
     scaled = ("size", "width", "linewidth")  # of text and lines
     _RC.update({key: scale * _BASE[key] for key in _BASE if key.endswith(scaled)})
-    _RC.update({
-        "font.sans-serif": [font], "font.serif": [font], "font.family": "serif" if serif else "sans-serif",
-        "mathtext.fontset": "stix" if serif else "dejavusans",
-    })  # fmt: skip
+    _RC.update({"font.family": [font], "mathtext.fontset": "stix" if font == "STIXGeneral" else "dejavusans"})
 
 
 def figure_style() -> AbstractContextManager[None]:
@@ -155,6 +151,8 @@ def fix_ticks(*axes: Axes) -> None:
     """Give the ticks of *axes* the style of this package, at most seven along x, so that their numbers stay apart."""
     for ax in axes:
         ax.tick_params(labelsize=_RC["xtick.labelsize"], width=_RC["xtick.major.width"])
+        for axis in (ax.xaxis, ax.yaxis):  # further ticks are copies of these, also of their font
+            axis.get_major_ticks(1), axis.get_minor_ticks(1)
         locator = ax.xaxis.get_major_locator()
         if isinstance(locator, AutoLocator):
             locator.set_params(nbins=6, steps=[1, 2, 5, 10])
@@ -241,12 +239,12 @@ def color_bar(mesh: Any, ax: Axes, label: str, **options: Any) -> None:
     bar = ax.figure.colorbar(mesh, ax=ax, label=label, **options)
     if isinstance(mesh.norm, LogNorm):
         plain_decades(bar.ax.yaxis, *mesh.get_clim())
-    bar.ax.tick_params(labelsize=_RC["ytick.labelsize"], width=_RC["ytick.major.width"])
+    fix_ticks(bar.ax)
 
 
 def plain_decades(axis: Axis, low: float, high: float) -> None:
-    """Write plain numbers at a few ticks along a logarithmic axis of fewer than three decades."""
-    if 0.0 < low < high < 1e3 * low and 1e-3 <= low and high < 1e5:
+    """Write plain numbers at a few ticks along a logarithmic axis of fewer than three decades, or a part of one."""
+    if 0.0 < low < high < 1e3 * low and (1e-3 <= low and high < 1e5 or high < 3.0 * low):
         few = LogLocator(subs=(1.0, 2.0, 5.0)) if high > 5.0 * low else MaxNLocator(4)
         axis.set_major_locator(few)
         axis.set_major_formatter("{x:g}")
