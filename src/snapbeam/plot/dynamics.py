@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from snapbeam.plot.axes import dress, edges_of, positions
+from snapbeam.plot.axes import axis_label, dress, edges_of, positions
 from snapbeam.plot.map import in_order
 from snapbeam.plot.style import (
     SERIES_COLORS,
@@ -451,8 +451,8 @@ def _undecided_cells(ax: Axes, edges: list[Any], value: Any, error: Any) -> None
     middle = [0.5 * (edge[1:] + edge[:-1]) for edge in edges]
     if undecided.any():
         row, column = np.nonzero(undecided)
-        for color, width, label in (("white", 1.5, None), ("0.2", 0.6, "sign not decided")):
-            look = {"color": color, "markersize": 2.5 + 0.4 * width, "markeredgewidth": width, "label": label}
+        for color, width, label in (("white", 1.8, None), ("0.2", 0.8, "sign not decided")):
+            look: dict[str, Any] = {"color": color, "markersize": 2.4 + width, "markeredgewidth": width, "label": label}
             ax.plot(middle[0][column], middle[1][row], "x", **look)
     legend_below(ax)
 
@@ -866,15 +866,14 @@ def plot_tangency(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     contains(dataset, "homoclinic tangency", "crosses", "bracket")
     crosses, value = dataset["crosses"].values, dataset["value"].values
     with frame(ax, dataset, height=48.0) as ax:
-        for state, color, label in ((False, cm.batlow(0.15), "apart"), (True, _RED, "crossing")):
-            ax.plot(value[crosses == state], crosses[crosses == state], "o", color=color, markersize=3.0, label=label)
+        for state, color in ((False, cm.batlow(0.15)), (True, _RED)):
+            ax.plot(value[crosses == state], crosses[crosses == state], "o", color=color, markersize=3.0)
         bracket = dataset["bracket"].values
         if np.isfinite(bracket).all():
-            ax.axvspan(bracket.min(), bracket.max(), color="0.8", linewidth=0.0, label="bracket of the tangency")
-        # the long name of the values is that of the parameter
-        ax.set_xlabel(str(dataset["value"].attrs["long_name"]))
+            ax.axvspan(bracket.min(), bracket.max(), color="0.8", label="bracket of the tangency")
+            legend_below(ax)
+        ax.set_xlabel(axis_label(dataset, str(dataset.attrs["parameter"])))
         ax.set(ylabel="Manifolds", yticks=[0, 1], yticklabels=["apart", "crossing"], ylim=(-0.5, 1.5))
-        ax.legend(loc="best")
     return ax
 
 
@@ -955,4 +954,4 @@ def _coordinate(name: str) -> str:
         return rf"Modal amplitude $\alpha_{{{mode}}}\,/\,{well}$"
     if name.startswith("velocity["):
         return rf"Modal velocity $\dot\alpha_{{{mode}}}\,/\,\omega_1{well}$"
-    return name
+    return f"{name.partition('[')[0].replace('_', ' ').capitalize()} {mode}"
