@@ -887,7 +887,7 @@ def plot_homoclinic(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         ax.plot(*dataset["state"].values.T, "o", color=_BLACK, markerfacecolor="white", markersize=4.0, label=label)
         if new:
             ax.set(xlabel=_coordinate(names[0]), ylabel=_coordinate(names[1]))
-        ax.legend(loc="best")
+        legend_below(ax)
     return ax
 
 

@@ -434,7 +434,7 @@ def smooth_statistics(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
 def _elasticities(data: xr.Dataset, ax: Axes) -> list[Any]:
     """Bars of one quantity; returns the entries of a legend."""
     name = str(data["statistic"].item() if "statistic" in data.coords else data.attrs["quantity"])
-    words = STATISTICS[name].long_name if name in STATISTICS else name.replace("_", " ")
+    words = STATISTICS[name].long_name.partition(", over")[0] if name in STATISTICS else name.replace("_", " ")
     value, error = data["elasticity"].values, data["relative_error"].values
     place = _rows(ax, [_name(data, i) for i in range(value.size)])
     sure = error <= 1.0
