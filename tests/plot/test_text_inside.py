@@ -97,6 +97,8 @@ def check(figure: Figure, words: str) -> None:
     width, height = figure.bbox.size
     texts = texts_of(figure)
     boxes = [(each.get_text(), each.get_window_extent()) for each in texts]
+    fonts = {(*each.get_fontfamily(), each.get_math_fontfamily()) for each in texts}
+    assert len(fonts) == 1 and not {"serif", "sans-serif"} & fonts.pop(), f"{words}: another font outside the context"
     for text, box in boxes:
         assert not RAW_NAME.search(re.sub(r"\$.*?\$", "", text)), f"{words}: {text!r} is a name of a program"
         inside = min(box.x0, box.y0, width - box.x1, height - box.y1)
@@ -160,6 +162,33 @@ def test_files_are_small_and_have_their_fonts(result: str, style: str, tmp_path)
 
 def test_text_of_the_schematic_is_inside_the_canvas() -> None:
     assert outside(SYSTEM.plot()) < 0.01
+
+
+def test_a_talk_has_larger_markers() -> None:
+    sizes = []
+    for name in ("elsevier", "talk"):
+        sb.plot.plot_style(name)
+        ax = RESULTS["attractors"]().snapbeam.plot()
+        legend = ax.figure.legends[0].get_lines()
+        sizes.append([line.get_markersize() for line in (*ax.lines, *legend)])
+    sb.plot.plot_style("elsevier")
+    np.testing.assert_allclose(sizes[1], 1.5 * np.array(sizes[0]))
+
+
+@pytest.mark.parametrize(
+    ("name", "x", "y"),
+    [
+        ("impact section", "drive_phase", "velocity_at_striker"),
+        ("section at a level", "drive_phase", "midspan_velocity"),
+        ("stroboscopic section", "midspan_displacement", "midspan_velocity"),
+    ],
+)
+def test_a_section_is_drawn_over_what_differs(name: str, x: str, y: str) -> None:
+    """The displacement at a level is the level, and at an impact that of the striker."""
+    section = RESULTS[name]()
+    (line,) = section.snapbeam.plot().lines
+    np.testing.assert_array_equal(line.get_xdata(), section[x].values)
+    np.testing.assert_array_equal(line.get_ydata(), section[y].values)
 
 
 def test_hysteresis_draws_the_motion_and_names_the_well_of_its_first_run() -> None:

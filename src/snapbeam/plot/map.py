@@ -153,7 +153,9 @@ def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
         ax.plot(points, curve, color="white", linewidth=2.0)
         ax.plot(points, curve, ".-", color="black", linewidth=0.8, markersize=2.5)
     dress(ax.xaxis, dataset, name)
-    ax.set_ylabel(f"Mid-span displacement {scale_text(dataset.attrs, '$w/b$')},\nminimum and maximum".replace(" (", "\n("))
+    ax.set_ylabel(
+        f"Mid-span displacement {scale_text(dataset.attrs, '$w/b$')},\nminimum and maximum".replace(" (", "\n(")
+    )
     ax.set(xlim=edges[[0, -1]], ylim=(low - pad, high + pad))
 
 

@@ -17,9 +17,11 @@ from cmcrameri import cm
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.collections import PathCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
@@ -195,6 +197,7 @@ def frame(
     those along *axes*.
     """
     with figure_style():
+        new = ax is None
         if ax is None:
             ax = new_figure(width, height).add_subplot()
             if dataset is not None:
@@ -202,6 +205,29 @@ def frame(
         yield ax
         say_scale_once(ax)
         fix_ticks(ax)
+        if new and (scale := _scale()) != 1.0:
+            _enlarge(ax, scale)
+
+
+def _scale() -> float:
+    """Size of text and lines over that of the first style."""
+    return float(_RC["font.size"] / _BASE["font.size"])
+
+
+def _enlarge(ax: Axes, scale: float) -> None:
+    """Enlarge the markers, and the lines of a width of their own, of the figure of *ax* and of its legends."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    drawn: list[Any] = [each for own in figure.axes for each in (*own.lines, *own.collections)]
+    for legend in figure.findobj(Legend):
+        drawn += legend.findobj(Line2D) + legend.findobj(PathCollection)
+    for each in drawn:
+        if isinstance(each, PathCollection):
+            each.set_sizes(scale**2 * np.asarray(each.get_sizes()))
+        elif isinstance(each, Line2D):
+            each.set_markersize(scale * each.get_markersize())
+            if each.get_linewidth() != _RC["lines.linewidth"]:
+                each.set_linewidth(scale * each.get_linewidth())
 
 
 def say_scale_once(ax: Axes) -> None:
@@ -399,7 +425,7 @@ def panel_letters(axes: Iterable[Axes], first: str = "A", *, offset: float = -16
     for at, ax in enumerate(axes):
         ax.annotate(
             chr(ord(first) + at), (0.0, 1.0), (offset, 3.0), xycoords="axes fraction", textcoords="offset points",
-            fontsize=9, fontweight="bold", ha="right", va="bottom", annotation_clip=False,
+            fontsize=9 * _scale(), fontweight="bold", ha="right", va="bottom", annotation_clip=False,
         )  # fmt: skip
 
 
@@ -476,7 +502,7 @@ def _lines(diagnostics: Iterable[Diagnostic], width: float, most: int) -> list[t
     out: list[tuple[str, str]] = []
     for one in chosen[:most]:
         text = f"{one.severity.value}: {one.message}"
-        for k, line in enumerate(textwrap.wrap(text, int(width / 1.02))):
+        for k, line in enumerate(textwrap.wrap(text, int(width / (1.11 * _scale())))):
             out.append((line if k == 0 else f"    {line}", _COLORS[one.severity]))
     if len(chosen) > most:
         out.append((f"and {len(chosen) - most} more", "0.35"))
@@ -495,9 +521,11 @@ def draw_diagnostics(figure: Figure, diagnostics: Iterable[Diagnostic], most: in
     lines = _lines(diagnostics, width, most)
     if not lines:
         return
-    share = (_LINE * len(lines) + 2.0) / height
+    scale = _scale()
+    share = (_LINE * len(lines) + 2.0) * scale / height
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.set(rect=(0.0, share, 1.0, 1.0 - share))  # type: ignore[call-arg]
     for k, (text, color) in enumerate(lines):
-        figure.text(1.5 / width, share - (k + 0.9) * _LINE / height, text, color=color, fontsize=5.5, va="baseline")
+        y = share - (k + 0.9) * _LINE * scale / height
+        figure.text(1.5 / width, y, text, color=color, fontsize=6.0 * scale, va="baseline")
