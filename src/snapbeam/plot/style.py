@@ -270,7 +270,7 @@ def color_bar(mesh: Any, ax: Axes, label: str, **options: Any) -> None:
 
 def plain_decades(axis: Axis, low: float, high: float) -> None:
     """Write plain numbers at a few ticks along a logarithmic axis of fewer than three decades, or a part of one."""
-    if 0.0 < low < high < 1e3 * low and (1e-3 <= low and high < 1e5 or high < 3.0 * low):
+    if 0.0 < low < high < 1e3 * low and ((1e-3 <= low and high < 1e5) or high < 3.0 * low):
         few = LogLocator(subs=(1.0, 2.0, 5.0)) if high > 5.0 * low else MaxNLocator(4)
         axis.set_major_locator(few)
         axis.set_major_formatter("{x:g}")
