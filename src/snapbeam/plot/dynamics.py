@@ -732,7 +732,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str | None = No
     >>> ax = sb.plot.plot_section(sb.dynamics.poincare_section(system, "impact", 20, transient=20))
     """
     section, new = str(dataset.attrs.get("section", "stroboscopic")), ax is None
-    x = x or section_abscissae(dataset)[0]
+    x = x or next(iter(section_abscissae(dataset)), "midspan_displacement")
     y = x.replace("displacement", "velocity")
     if x == "drive_phase":
         y = "midspan_velocity" if "midspan" in section else "velocity_at_striker"
