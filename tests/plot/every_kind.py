@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 import snapbeam as sb
+from snapbeam import lab
 from snapbeam.model import default_values
 from snapbeam.util.datasets import xr
 
@@ -33,7 +34,53 @@ def _attractors() -> sb.dynamics.Attractors:
 @cache
 def _branch() -> sb.dynamics.Branch:
     orbit = sb.dynamics.periodic_orbit(SYSTEM, transient=100)
-    return sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=40)
+    return sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
+
+
+def _curve() -> xr.Dataset:
+    fold, names = _branch().special_points[0], ("frequency_ratio", "velocity_amplitude")
+    return sb.dynamics.bifurcation_curve(fold, names, ((1.5, 1.7), (0.02, 0.1)), max_points=5)
+
+
+def _response() -> xr.Dataset:
+    force = np.random.default_rng(0).standard_normal(4000)
+    motion = 0.002 * np.convolve(force, np.exp(-np.arange(80) / 20.0) * np.cos(0.4 * np.arange(80)))[: force.size]
+    motion += 0.001 * np.random.default_rng(1).standard_normal(force.size)
+    signals = lab.make_signal(force, "N", 2000.0), lab.make_signal(motion, "m", 2000.0)
+    return lab.frequency_response(*signals)
+
+
+def _equilibria() -> xr.Dataset:
+    plate = sb.ReducedModel.from_matrices([[1e-9]], [[2.0]], contact_shape=[1.0], length_scale=3e-6)
+    electrode = sb.ElectrostaticForce(voltage=1.0, area=4e-8, gap=3e-6)
+    return sb.model.equilibrium_branches(sb.System(plate, forces=[electrode]), "force.voltage", (0.0, 8.0))
+
+
+def _field() -> xr.Dataset:
+    time, place = np.linspace(0.0, 0.1, 30), np.linspace(0.0, 0.16, 12)
+    values = 3e-4 * np.sin(np.pi * place / 0.16) * np.cos(200.0 * time)[:, None]
+    over = ("time", "position")
+    data = {"displacement": (over, values), "displacement_se": (over, np.full(values.shape, 1e-6))}
+    return xr.Dataset(data, {"time": time, "position": place})
+
+
+def _scores() -> xr.Dataset:
+    kinds = ("measurement", np.array([0, 3, 3, 1], dtype=np.int8))
+    middle = np.array([0.9, 0.2, 0.6, 0.8])
+    columns = {"probability": middle, "probability_low": middle - 0.1, "probability_high": middle + 0.1}
+    data = {name: ("measurement", values) for name, values in columns.items()}
+    return xr.Dataset(data | {"response_class": kinds, "most_likely": kinds}, attrs={"agree": 3, "agree_expected": 2.5})
+
+
+def _tangency() -> xr.Dataset:
+    data = {"crosses": ("value", [False, False, True, True]), "bracket": ("manifolds", [0.024, 0.026])}
+    coordinates = {"value": ("value", [0.02, 0.024, 0.026, 0.03]), "manifolds": ["apart", "crossing"]}
+    return xr.Dataset(data, coordinates, {"parameter": "velocity_amplitude"})
+
+
+def _crossings() -> xr.Dataset:
+    data = {"state": (("point", "coordinate"), [[0.1, 0.2], [0.3, 0.4]]), "stable_arclength": ("point", [1.0, 2.0])}
+    return xr.Dataset(data, {"coordinate": ["amplitude[1]", "velocity[1]"]})
 
 
 def _lifetimes(axes: dict[str, np.ndarray]) -> xr.Dataset:
@@ -87,6 +134,7 @@ QUICK: dict[str, Callable[[], xr.Dataset]] = {
     "lifetimes of a line": lambda: _lifetimes(SPEEDS),
     "lifetimes of a point": lambda: _lifetimes({"drive.velocity_amplitude": [0.2, 0.3]}).isel(velocity_amplitude=0),
     "impact section": lambda: sb.dynamics.poincare_section(CHAOTIC, "impact", 60),
+    "section at a level": lambda: sb.dynamics.poincare_section(CHAOTIC, ("midspan_displacement", 0.0, "up"), 60),
     "stroboscopic section": lambda: sb.dynamics.poincare_section(CHAOTIC, "stroboscopic", 60),
     "attractors": lambda: _attractors().to_dataset(),
     "orbit": lambda: sb.dynamics.periodic_orbit(SYSTEM, transient=100).to_dataset(),
@@ -125,6 +173,14 @@ SLOW: dict[str, Callable[[], xr.Dataset]] = {
     "manifold": lambda: sb.dynamics.invariant_manifold(_saddle(), max_arclength=1.0),
     "force-displacement curve": lambda: sb.force_displacement(SYSTEM),
     "growth of a perturbation": lambda: sb.perturbation_growth(CHAOTIC, SHORT),
+    "bifurcation curve": _curve,
+    "frequency response": _response,
+    "estimated density": lambda: sb.RecordedAcceleration.from_psd("NAVMAT P-9492", duration_s=2.0).estimated_psd(),
+    "equilibrium branches": _equilibria,
+    "displacement field": _field,
+    "measured classes": _scores,
+    "homoclinic tangency": _tangency,
+    "homoclinic points": _crossings,
 }  # fmt: skip
 
 

@@ -213,7 +213,10 @@ def test_gradients_of_several_statistics_have_panels_in_one_order() -> None:
         {"statistic": ["peak_force", "impacts", "impulse"], "parameter": ["beam.thickness", "contact.stiffness"]},
     )
     figure = table.snapbeam.plot().get_figure(root=True)
-    assert [ax.get_xlabel().split("\n")[0] for ax in figure.axes] == ["Change of peak force", "Change of impulse"]
+    assert [ax.get_xlabel().split("\n")[0] for ax in figure.axes] == [
+        "Change of peak contact force",
+        "Change of impulse on the beam, all impacts",
+    ]
     names = [[text.get_text() for text in ax.get_yticklabels()] for ax in figure.axes]
     assert names == [["contact stiffness", "thickness"]] * 2
     widths = [{round(bar.get_width(), 6): bar.get_hatch() for bar in ax.patches} for ax in figure.axes]

@@ -19,7 +19,7 @@ def test_branches_units_and_snaps() -> None:
     assert "µm" in ax.get_xlabel()
     assert "µN" in ax.get_ylabel()
     texts = [each.get_text() for each in ax.texts]
-    assert any(each.startswith("snap-through -37") for each in texts)
+    assert any(each.startswith("snap-through \N{MINUS SIGN}37") for each in texts)
     legend = [each.get_text() for each in ax.figure.legends[0].get_texts()]
     assert legend == ["stable", "stable under displacement control only", "unstable", "bifurcation point"]
     low, high = ax.get_ylim()

@@ -150,7 +150,7 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
         ("Distance from the left end of the striker\n(mm)", MM_S),
     ),
     "line of a map": (
-        "base", lambda s: sb.sweep(s, axes(GRAVITIES), SHORT), (G, f"Mid-span displacement {OVER_B},\nminimum and maximum")
+        "base", lambda s: sb.sweep(s, axes(GRAVITIES), SHORT), (G, "Mid-span displacement $w/b$\n($b$ = 700 µm),\nminimum and maximum")
     ),
     "points": ("striker", lambda s: sb.sweep(s, points(), SHORT), (EXCITATION, MM_S)),
     "threshold of the base": ("base", lambda s: sb.threshold(s, *numbers(GRAVITIES), dict([numbers(HERTZ)]), SHORT), (HZ, G)),
@@ -181,7 +181,7 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
     "gradient": (
         "striker",
         lambda s: U.gradient(s, "peak_midspan_velocity", ["beam.thickness", "drive.velocity_m_s"], integration=sb.Integration(cycles=2)),
-        ("Change of peak midspan velocity\nfor 1 % of the parameter (%)",),
+        ("Change of maximum speed of mid-span at the\nend of a step\nfor 1 % of the parameter (%)",),
     ),
     "designs": ("striker", designs, ("Excitation frequency (Hz)",)),
     "hysteresis": ("base", lambda s: D.hysteresis(s, *numbers(GRAVITIES), integration=SHORT), (G,)),

@@ -118,8 +118,7 @@ def _lifetimes(dataset: xr.Dataset) -> dict[str, _Draws]:
 
 
 def _section(dataset: xr.Dataset) -> dict[str, _Draws]:
-    pairs = ("midspan_displacement", "displacement_at_striker")
-    return {name: partial(dynamics.plot_section, x=name) for name in pairs if name in dataset}
+    return {name: partial(dynamics.plot_section, x=name) for name in dynamics.section_abscissae(dataset)}
 
 
 def _designs(dataset: xr.Dataset) -> dict[str, _Draws]:

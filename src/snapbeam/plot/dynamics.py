@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from snapbeam.plot.axes import dress, edges_of, positions
+from snapbeam.plot.axes import axis_label, dress, edges_of, positions
 from snapbeam.plot.map import in_order
 from snapbeam.plot.style import (
     SERIES_COLORS,
@@ -25,6 +25,7 @@ from snapbeam.plot.style import (
     frame,
     legend_below,
     marker_size,
+    plain_decades,
 )
 from snapbeam.plot.units import in_units, scale_text
 from snapbeam.util.si_prefixes import prefixed
@@ -253,7 +254,8 @@ def _lifetime_cells(
     if known.size:
         low, high = (float(np.quantile(known, share)) for share in (0.02, 0.98))
         low, high = (max(low, 1.0), max(high, low, 1.0) * 1.001) if limits is None else limits
-        cells = ax.pcolormesh(*edges, values, cmap=cm.batlow, norm=LogNorm(low, high), rasterized=True)
+        colors = ListedColormap(cm.batlow(np.linspace(0.0, 0.92, 256)))  # its last colours are nearly white
+        cells = ax.pcolormesh(*edges, values, cmap=colors, norm=LogNorm(low, high), rasterized=True)
         beyond = known.min() < low, known.max() > high
         extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
         color_bar(cells, ax, "Lifetime of snapping (cycles)", extend=extend)
@@ -325,6 +327,7 @@ def plot_survival(dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequen
                 ax.plot(t, begun * np.exp(-(t - delay[i]) / tau[i]), color=color, dashes=(4, 2), linewidth=0.7)
         ax.set(xlabel="Cycles", ylabel="Fraction of runs still snapping", yscale="log")
         ax.set_ylim(0.6 / rows.shape[1], 1.3)
+        plain_decades(ax.yaxis, *ax.get_ylim())
         ax.set_xlim(left=0.0)
         if not np.isfinite(rows).any():
             ax.text(0.5, 0.5, "no run snaps through", transform=ax.transAxes, ha="center")
@@ -391,6 +394,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
         if "running" in dataset:
             _running(factor * dataset["running"], ax)
             ax.set(xlabel="Periods of the excitation", ylabel=f"Lyapunov exponent so far ({unit})", xscale="log")
+            plain_decades(ax.xaxis, 1.0, dataset.sizes["period"])
         elif len(dims) == 1:
             _exponent_line(dataset, ax, dims[0], value.values, error.values)
             ax.set_ylabel(f"Largest Lyapunov exponent\n({unit})")
@@ -447,10 +451,9 @@ def _undecided_cells(ax: Axes, edges: list[Any], value: Any, error: Any) -> None
     middle = [0.5 * (edge[1:] + edge[:-1]) for edge in edges]
     if undecided.any():
         row, column = np.nonzero(undecided)
-        ax.plot(
-            middle[0][column], middle[1][row], "x", color="0.2", markersize=2.5, markeredgewidth=0.6,
-            label="sign not decided",
-        )  # fmt: skip
+        for color, width, label in (("white", 1.8, None), ("0.2", 0.8, "sign not decided")):
+            look: dict[str, Any] = {"color": color, "markersize": 2.4 + width, "markeredgewidth": width, "label": label}
+            ax.plot(middle[0][column], middle[1][row], "x", **look)
     legend_below(ax)
 
 
@@ -490,7 +493,8 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             ):
                 if which.any():
                     ax.plot(values[which].real, values[which].imag, mark, color=color, markersize=3.5, label=words)
-            ax.set_aspect("equal", adjustable="datalim")
+            ax.set_aspect("equal")
+            ax.margins(0.08)
             ax.set(xlabel="Floquet multiplier, real part", ylabel="Floquet multiplier, imaginary part")
             legend_below(ax)
     return ax
@@ -708,8 +712,17 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 @checked
-def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_displacement") -> Axes:
-    """Draw a Poincare section: a displacement against its velocity.
+def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str | None = None) -> Axes:
+    """Draw a Poincare section: a velocity over its displacement, or over the phase of the drive.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`snapbeam.dynamics.poincare_section`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+    x : {"midspan_displacement", "displacement_at_striker", "drive_phase"}, optional
+        By default the displacement of mid-span, once a period; the phase of the drive, at impacts or a level.
 
     Examples
     --------
@@ -718,7 +731,12 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
     >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> ax = sb.plot.plot_section(sb.dynamics.poincare_section(system, "impact", 20, transient=20))
     """
+    section, new = str(dataset.attrs.get("section", "stroboscopic")), ax is None
+    x = x or next(iter(section_abscissae(dataset)), "midspan_displacement")
     y = x.replace("displacement", "velocity")
+    if x == "drive_phase":
+        y = "midspan_velocity" if "midspan" in section else "velocity_at_striker"
+        y = y.replace("velocity", "displacement") if "velocity" in section else y  # which is the level
     contains(dataset, f"{x} and {y}", x, y)
     with frame(ax, dataset) as ax:
         # few points are large, and many do not run into one another
@@ -731,10 +749,27 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
             middle, least = 0.5 * (values.min() + values.max()), 1e-3 * np.abs(values).max()
             if 0.0 < least > np.ptp(values):
                 ax.set(**{limits: (middle - 10.0 * least, middle + 10.0 * least)})
-        where = "at mid-span" if x.startswith("midspan") else "at the striker"
-        ax.set_xlabel(scale_text(dataset.attrs, f"Displacement {where} $w/b$"))
-        ax.set_ylabel(rf"Velocity {where} $\dot w\,/\,b\omega_1$")
+        for axis, name in ((ax.xaxis, x), (ax.yaxis, y)):
+            where = "at mid-span" if name.startswith("midspan") else "at the striker"
+            moved = scale_text(dataset.attrs, f"Displacement {where} $w/b$")
+            axis.set_label_text(moved if "displacement" in name else rf"Velocity {where} $\dot w\,/\,b\omega_1$")
+        if x == "drive_phase":
+            ax.set(xlabel="Phase of the drive (rad)", xlim=(0.0, 2.0 * np.pi))
+            ax.set_xticks(np.pi * np.linspace(0.0, 2.0, 5), ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
+        if new:
+            extend_title(ax, f"{dataset[x].size} points, {_MET.get(section, 'at each passage of the level')}")
     return ax
+
+
+_MET = {"stroboscopic": "once a period", "impact": "at the start of each contact"}
+
+
+def section_abscissae(dataset: xr.Dataset) -> list[str]:
+    """The variables that a section is drawn over, the default first."""
+    names = ("midspan_displacement", "displacement_at_striker", "drive_phase")
+    if dataset.attrs.get("section", "stroboscopic") != "stroboscopic":
+        names = names[::-1]  # the displacement at a level is the same, and that of impacts is the striker's
+    return [name for name in names if name in dataset]
 
 
 @checked
@@ -831,15 +866,14 @@ def plot_tangency(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     contains(dataset, "homoclinic tangency", "crosses", "bracket")
     crosses, value = dataset["crosses"].values, dataset["value"].values
     with frame(ax, dataset, height=48.0) as ax:
-        for state, color, label in ((False, cm.batlow(0.15), "apart"), (True, _RED, "crossing")):
-            ax.plot(value[crosses == state], crosses[crosses == state], "o", color=color, markersize=3.0, label=label)
+        for state, color in ((False, cm.batlow(0.15)), (True, _RED)):
+            ax.plot(value[crosses == state], crosses[crosses == state], "o", color=color, markersize=3.0)
         bracket = dataset["bracket"].values
         if np.isfinite(bracket).all():
-            ax.axvspan(bracket.min(), bracket.max(), color="0.8", linewidth=0.0, label="bracket of the tangency")
-        # the long name of the values is that of the parameter
-        ax.set_xlabel(str(dataset["value"].attrs["long_name"]))
+            ax.axvspan(bracket.min(), bracket.max(), color="0.8", label="bracket of the tangency")
+            legend_below(ax)
+        ax.set_xlabel(axis_label(dataset, str(dataset.attrs["parameter"])))
         ax.set(ylabel="Manifolds", yticks=[0, 1], yticklabels=["apart", "crossing"], ylim=(-0.5, 1.5))
-        ax.legend(loc="best")
     return ax
 
 
@@ -853,7 +887,7 @@ def plot_homoclinic(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         ax.plot(*dataset["state"].values.T, "o", color=_BLACK, markerfacecolor="white", markersize=4.0, label=label)
         if new:
             ax.set(xlabel=_coordinate(names[0]), ylabel=_coordinate(names[1]))
-        ax.legend(loc="best")
+        legend_below(ax)
     return ax
 
 
@@ -920,4 +954,4 @@ def _coordinate(name: str) -> str:
         return rf"Modal amplitude $\alpha_{{{mode}}}\,/\,{well}$"
     if name.startswith("velocity["):
         return rf"Modal velocity $\dot\alpha_{{{mode}}}\,/\,\omega_1{well}$"
-    return name
+    return f"{name.partition('[')[0].replace('_', ' ').capitalize()} {mode}"

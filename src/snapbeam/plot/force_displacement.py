@@ -72,7 +72,7 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
                 at, right = (there / prefix_w, value / prefix_f), there > place[seen].mean()
                 ax.plot(*at, "^" if value > 0.0 else "v", color="#000000", markersize=6.0, zorder=6)
                 ax.annotate(
-                    f"{words} {prefixed(value, 'N')}", at,
+                    f"{words} {prefixed(value, 'N')}".replace(" -", " \N{MINUS SIGN}"), at,
                     xytext=(6.0 if right else -6.0, 9.0 if value > 0.0 else -15.0), textcoords="offset points",
                     ha="right" if right else "left", fontsize="small",
                     bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}, zorder=7,

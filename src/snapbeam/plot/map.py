@@ -50,7 +50,7 @@ UPWARD = ("velocity_amplitude", "location", "base_excitation_acceleration_amplit
 
 _CURVES = ("min_midspan_displacement", "max_midspan_displacement")
 """Drawn over the classes of a map over one axis."""
-_LONGEST = 38
+_LONGEST = 32
 """Characters of a line next to a map of one column."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
@@ -155,7 +155,9 @@ def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
         ax.plot(points, curve, color="white", linewidth=2.0)
         ax.plot(points, curve, ".-", color="black", linewidth=0.8, markersize=2.5)
     dress(ax.xaxis, dataset, name)
-    ax.set_ylabel(f"Mid-span displacement {scale_text(dataset.attrs, '$w/b$')},\nminimum and maximum")
+    ax.set_ylabel(
+        f"Mid-span displacement {scale_text(dataset.attrs, '$w/b$')},\nminimum and maximum".replace(" (", "\n(")
+    )
     ax.set(xlim=edges[[0, -1]], ylim=(low - pad, high + pad))
 
 

@@ -29,6 +29,7 @@ from snapbeam.plot.style import (
     fix_ticks,
     frame,
     new_figure,
+    plain_decades,
     say_scale_once,
     set_title,
 )
@@ -340,6 +341,7 @@ def plot_frequency_response(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
             each.plot(f, values, color="0.75", **style)
             each.plot(f, np.where(coherent, values, np.nan), color=BEAM_COLOR, **style)
         axes[0].set(yscale="log", ylabel=f"Magnitude ({dataset['magnitude'].attrs['units']})", xlim=(f[0], f[-1]))
+        plain_decades(axes[0].yaxis, *axes[0].get_ylim())
         if axes.size > 1:
             axes[1].set(ylabel="Phase (rad)", ylim=(-3.3, 3.3))
             axes[2].plot(f, dataset["coherence"].values, color=BEAM_COLOR, linewidth=0.8)
@@ -398,6 +400,8 @@ def _plot_density(dataset: xr.Dataset, ax: Axes | None) -> Axes:
             target = data["psd_target"].values[inside]
             ax.plot(f[inside], target, "--", color=SHAKER_COLOR, linewidth=1.2, label="given density")
         ax.set(xscale="log", yscale="log", xlabel="Frequency (Hz)", ylabel="Acceleration PSD (g$^2$/Hz)")
+        for axis in (ax.xaxis, ax.yaxis):
+            plain_decades(axis, *axis.get_view_interval())
         set_title(ax, f"{data.attrs['rms_g']:.3g} g root mean square")
         ax.legend()
     return ax
@@ -551,8 +555,8 @@ def plot_run(run: Run | xr.Dataset, window: tuple[float, float] | None = None, a
             around = seconds / scale
             right = _column(figure, grid, 1, near, around, scales)
             digits = _digits(near, axis_name)
-            onset = f"\nafter $\\tau$ = {peak:.{digits if peak else 0}f}" if axis_name == "cycle" else ""
-            right[-1].set_xlabel(f"Time ({unit}){onset}", loc="right")
+            onset = f" after $\\tau$ = {peak:.{digits if peak else 0}f}" if axis_name == "cycle" else ""
+            right[-1].set_xlabel(f"Hardest impact:\ntime ({unit}){onset}", loc="right")
             right[-1].xaxis.set_major_locator(MaxNLocator(3))
             right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
     return left[0]

@@ -17,9 +17,11 @@ from cmcrameri import cm
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.collections import PathCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
@@ -70,8 +72,7 @@ _RC: Any = {
     "axes.titlesize": 8,
     "figure.constrained_layout.use": True,
     "figure.dpi": 150,
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
+    "font.family": ["DejaVu Sans"],  # by name: a generic family is another font once the context has ended
     "font.size": 8,
     "legend.fontsize": 7,
     "legend.columnspacing": 1.4,
@@ -123,13 +124,10 @@ def plot_style(name: str) -> None:
     """
     widths, size, font = _STYLES[choice("name", name, tuple(_STYLES))]
     COLUMN_WIDTHS.update(zip(COLUMN_WIDTHS, widths, strict=True))
-    scale, serif = size / _BASE["font.size"], font == "STIXGeneral"
+    scale = size / _BASE["font.size"]
     scaled = ("size", "width", "linewidth")  # of text and lines
     _RC.update({key: scale * _BASE[key] for key in _BASE if key.endswith(scaled)})
-    _RC.update({
-        "font.sans-serif": [font], "font.serif": [font], "font.family": "serif" if serif else "sans-serif",
-        "mathtext.fontset": "stix" if serif else "dejavusans",
-    })  # fmt: skip
+    _RC.update({"font.family": [font], "mathtext.fontset": "stix" if font == "STIXGeneral" else "dejavusans"})
 
 
 def figure_style() -> AbstractContextManager[None]:
@@ -155,6 +153,8 @@ def fix_ticks(*axes: Axes) -> None:
     """Give the ticks of *axes* the style of this package, at most seven along x, so that their numbers stay apart."""
     for ax in axes:
         ax.tick_params(labelsize=_RC["xtick.labelsize"], width=_RC["xtick.major.width"])
+        for axis in (ax.xaxis, ax.yaxis):  # further ticks are copies of these, also of their font
+            axis.get_major_ticks(1), axis.get_minor_ticks(1)
         locator = ax.xaxis.get_major_locator()
         if isinstance(locator, AutoLocator):
             locator.set_params(nbins=6, steps=[1, 2, 5, 10])
@@ -197,6 +197,7 @@ def frame(
     those along *axes*.
     """
     with figure_style():
+        new = ax is None
         if ax is None:
             ax = new_figure(width, height).add_subplot()
             if dataset is not None:
@@ -204,6 +205,29 @@ def frame(
         yield ax
         say_scale_once(ax)
         fix_ticks(ax)
+        if new and (scale := _scale()) != 1.0:
+            _enlarge(ax, scale)
+
+
+def _scale() -> float:
+    """Size of text and lines over that of the first style."""
+    return float(_RC["font.size"] / _BASE["font.size"])
+
+
+def _enlarge(ax: Axes, scale: float) -> None:
+    """Enlarge the markers, and the lines of a width of their own, of the figure of *ax* and of its legends."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    drawn: list[Any] = [each for own in figure.axes for each in (*own.lines, *own.collections)]
+    for legend in figure.findobj(Legend):
+        drawn += legend.findobj(Line2D) + legend.findobj(PathCollection)
+    for each in drawn:
+        if isinstance(each, PathCollection):
+            each.set_sizes(scale**2 * np.asarray(each.get_sizes()))
+        elif isinstance(each, Line2D):
+            each.set_markersize(scale * each.get_markersize())
+            if each.get_linewidth() != _RC["lines.linewidth"]:
+                each.set_linewidth(scale * each.get_linewidth())
 
 
 def say_scale_once(ax: Axes) -> None:
@@ -241,12 +265,12 @@ def color_bar(mesh: Any, ax: Axes, label: str, **options: Any) -> None:
     bar = ax.figure.colorbar(mesh, ax=ax, label=label, **options)
     if isinstance(mesh.norm, LogNorm):
         plain_decades(bar.ax.yaxis, *mesh.get_clim())
-    bar.ax.tick_params(labelsize=_RC["ytick.labelsize"], width=_RC["ytick.major.width"])
+    fix_ticks(bar.ax)
 
 
 def plain_decades(axis: Axis, low: float, high: float) -> None:
-    """Write plain numbers at a few ticks along a logarithmic axis of fewer than three decades."""
-    if 0.0 < low < high < 1e3 * low and 1e-3 <= low and high < 1e5:
+    """Write plain numbers at a few ticks along a logarithmic axis of fewer than three decades, or a part of one."""
+    if 0.0 < low < high < 1e3 * low and ((1e-3 <= low and high < 1e5) or high < 3.0 * low):
         few = LogLocator(subs=(1.0, 2.0, 5.0)) if high > 5.0 * low else MaxNLocator(4)
         axis.set_major_locator(few)
         axis.set_major_formatter("{x:g}")
@@ -401,7 +425,7 @@ def panel_letters(axes: Iterable[Axes], first: str = "A", *, offset: float = -16
     for at, ax in enumerate(axes):
         ax.annotate(
             chr(ord(first) + at), (0.0, 1.0), (offset, 3.0), xycoords="axes fraction", textcoords="offset points",
-            fontsize=9, fontweight="bold", ha="right", va="bottom", annotation_clip=False,
+            fontsize=9 * _scale(), fontweight="bold", ha="right", va="bottom", annotation_clip=False,
         )  # fmt: skip
 
 
@@ -478,7 +502,7 @@ def _lines(diagnostics: Iterable[Diagnostic], width: float, most: int) -> list[t
     out: list[tuple[str, str]] = []
     for one in chosen[:most]:
         text = f"{one.severity.value}: {one.message}"
-        for k, line in enumerate(textwrap.wrap(text, int(width / 1.02))):
+        for k, line in enumerate(textwrap.wrap(text, int(width / (1.11 * _scale())))):
             out.append((line if k == 0 else f"    {line}", _COLORS[one.severity]))
     if len(chosen) > most:
         out.append((f"and {len(chosen) - most} more", "0.35"))
@@ -497,9 +521,11 @@ def draw_diagnostics(figure: Figure, diagnostics: Iterable[Diagnostic], most: in
     lines = _lines(diagnostics, width, most)
     if not lines:
         return
-    share = (_LINE * len(lines) + 2.0) / height
+    scale = _scale()
+    share = (_LINE * len(lines) + 2.0) * scale / height
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.set(rect=(0.0, share, 1.0, 1.0 - share))  # type: ignore[call-arg]
     for k, (text, color) in enumerate(lines):
-        figure.text(1.5 / width, share - (k + 0.9) * _LINE / height, text, color=color, fontsize=5.5, va="baseline")
+        y = share - (k + 0.9) * _LINE * scale / height
+        figure.text(1.5 / width, y, text, color=color, fontsize=6.0 * scale, va="baseline")

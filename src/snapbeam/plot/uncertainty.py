@@ -32,6 +32,7 @@ from snapbeam.plot.style import (
     plain_decades,
 )
 from snapbeam.plot.units import in_units, ratio_along, ratio_name, scale_text
+from snapbeam.solver.statistics import STATISTICS
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, checked, shown
@@ -117,7 +118,7 @@ def _label(dataset: xr.Dataset, name: str) -> str:
     if f"fixed_{short}" in dataset.attrs or "parameter" in dataset.get(short, dataset[name]).attrs:
         return axis_label(dataset, short)
     labels = dataset[name].attrs
-    unit, words = str(labels.get("units", "1")), str(labels.get("long_name", name))
+    unit, words = str(labels.get("units", "1")), str(labels.get("long_name", name)).replace("_", " ")
     words = scale_text(dataset.attrs, words) if "over b" in words else words
     return textwrap.fill(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}", 40)
 
@@ -439,6 +440,7 @@ def smooth_statistics(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
 def _elasticities(data: xr.Dataset, ax: Axes) -> list[Any]:
     """Bars of one quantity; returns the entries of a legend."""
     name = str(data["statistic"].item() if "statistic" in data.coords else data.attrs["quantity"])
+    words = STATISTICS[name].long_name.partition(", over")[0] if name in STATISTICS else name.replace("_", " ")
     value, error = data["elasticity"].values, data["relative_error"].values
     place = _rows(ax, [_name(data, i) for i in range(value.size)])
     sure = error <= 1.0
@@ -450,7 +452,7 @@ def _elasticities(data: xr.Dataset, ax: Axes) -> list[Any]:
     ax.axvline(0.0, color="black", linewidth=0.6)
     if not np.isfinite(value).any():
         ax.text(0.5, 0.5, "the quantity is 0", transform=ax.transAxes, ha="center", va="center")
-    ax.set_xlabel(textwrap.fill(f"Change of {name.replace('_', ' ')}", 44) + "\nfor 1 % of the parameter (%)")
+    ax.set_xlabel(textwrap.fill(f"Change of {words}", 44) + "\nfor 1 % of the parameter (%)")
     return [doubtful] if np.isfinite(value[~sure]).any() else []
 
 
