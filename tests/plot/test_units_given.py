@@ -12,6 +12,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.plot.dataset import _KINDS, figures_of
+from snapbeam.plot.units import in_symbols
 from snapbeam.util.datasets import xr
 
 BEAM = """
@@ -150,7 +151,7 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
         ("Distance from the left end of the striker\n(mm)", MM_S),
     ),
     "line of a map": (
-        "base", lambda s: sb.sweep(s, axes(GRAVITIES), SHORT), (G, f"Mid-span displacement {OVER_B},\nminimum and maximum")
+        "base", lambda s: sb.sweep(s, axes(GRAVITIES), SHORT), (G, "Mid-span displacement $w/b$\n($b$ = 700 µm),\nminimum and maximum")
     ),
     "points": ("striker", lambda s: sb.sweep(s, points(), SHORT), (EXCITATION, MM_S)),
     "threshold of the base": ("base", lambda s: sb.threshold(s, *numbers(GRAVITIES), dict([numbers(HERTZ)]), SHORT), (HZ, G)),
@@ -181,7 +182,7 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
     "gradient": (
         "striker",
         lambda s: U.gradient(s, "peak_midspan_velocity", ["beam.thickness", "drive.velocity_m_s"], integration=sb.Integration(cycles=2)),
-        ("Change of peak midspan velocity\nfor 1 % of the parameter (%)",),
+        ("Change of maximum speed of mid-span at the\nend of a step\nfor 1 % of the parameter (%)",),
     ),
     "designs": ("striker", designs, ("Excitation frequency (Hz)",)),
     "hysteresis": ("base", lambda s: D.hysteresis(s, *numbers(GRAVITIES), integration=SHORT), (G,)),
@@ -274,3 +275,14 @@ ELSEWHERE = {
 def test_no_kind_of_figure_is_left_out(systems) -> None:
     assert {kind.words for kind in _KINDS} >= ELSEWHERE
     assert len(CASES) >= len(_KINDS) - len(ELSEWHERE)
+
+
+@pytest.mark.parametrize(("words", "drawn"), [
+    ("maximum speed of mid-span, over b omega_1", r"maximum speed of mid-span over $b\omega_1$"),
+    ("acceleration over b omega_1^2, of the base", r"acceleration over $b\omega_1^2$, of the base"),
+    ("peak displacement, over b", "peak displacement over $b$"),
+    ("energy above a multiple of omega_1", r"energy above a multiple of $\omega_1$"),
+    ("work over beams, b in all", "work over beams, b in all"),
+])  # fmt: skip
+def test_long_names_are_drawn_with_symbols(words: str, drawn: str) -> None:
+    assert in_symbols(words) == drawn
