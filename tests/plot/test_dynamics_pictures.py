@@ -9,7 +9,7 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam.dynamics.lifetimes import refit
-from snapbeam.plot.dynamics import plot_basins, plot_section, plot_survival
+from snapbeam.plot.dynamics import plot_basins, plot_exponents, plot_section, plot_survival
 from snapbeam.util.status_codes import RunStatus
 
 CYCLES, QUIET = 400, 50.0
@@ -101,3 +101,16 @@ def test_what_holds_nothing_of_the_kind_is_refused() -> None:
     for plot in (plot_survival, plot_basins, plot_section):
         with pytest.raises(sb.InputError):
             plot(xr.Dataset({"response_class": ("x", [1.0])}))
+
+
+def test_the_legend_has_the_exponents_with_their_errors() -> None:
+    """Rounded to two digits of the error, and the value alone where no error is known."""
+    over = ("run", "exponent_number")
+    data = {
+        "exponent": (over, [[2.3456, -30.04]], {"units": "1/s"}),
+        "exponent_error": (over, [[0.0123, np.nan]], {"units": "1/s"}),
+        "running": (("period", *over), np.ones((20, 1, 2)), {"units": "1/s"}),
+    }
+    ax = plot_exponents(xr.Dataset(data, {"exponent_number": [1, 2]}))
+    legend = [each.get_text() for each in ax.figure.legends[0].get_texts()]
+    assert legend == [r"$\lambda_{1}$ = 2.346 ± 0.012", "$\\lambda_{2}$ = \N{MINUS SIGN}30.040"]

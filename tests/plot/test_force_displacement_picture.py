@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
+from snapbeam.model import default_values
 from snapbeam.util.validation import InputError
 
 BEAM = sb.Beam(length=5e-4, thickness=2e-6, width=2e-5, density=2330.0, young_modulus=160e9, axial_load=0.0)
@@ -30,3 +31,14 @@ def test_branches_units_and_snaps() -> None:
     assert np.isfinite(drawn).all()
     with pytest.raises(InputError, match="no force-displacement curve among"):
         sb.plot.plot_force_displacement(xr.Dataset({"force": 0.0}))
+
+
+def test_critical_points_are_seen_on_the_triangles() -> None:
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)  # both limit points are the snaps
+    ax = sb.plot.plot_force_displacement(sb.force_displacement(model, 0.5))
+    (points,) = [line for line in ax.lines if line.get_label() == "limit point"]
+    triangles = [line for line in ax.lines if str(line.get_marker()) in "^v"]
+    places = np.array([line.get_xydata()[0] for line in triangles])
+    np.testing.assert_allclose(np.sort(points.get_xydata(), axis=0), np.sort(places, axis=0), rtol=1e-6)
+    for line in triangles:
+        assert line.get_zorder() < points.get_zorder() and line.get_markersize() > 2.0 * points.get_markersize()

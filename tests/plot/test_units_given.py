@@ -12,6 +12,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.plot.dataset import _KINDS, figures_of
+from snapbeam.plot.units import in_symbols
 from snapbeam.util.datasets import xr
 
 BEAM = """
@@ -274,3 +275,14 @@ ELSEWHERE = {
 def test_no_kind_of_figure_is_left_out(systems) -> None:
     assert {kind.words for kind in _KINDS} >= ELSEWHERE
     assert len(CASES) >= len(_KINDS) - len(ELSEWHERE)
+
+
+@pytest.mark.parametrize(("words", "drawn"), [
+    ("maximum speed of mid-span, over b omega_1", r"maximum speed of mid-span over $b\omega_1$"),
+    ("acceleration over b omega_1^2, of the base", r"acceleration over $b\omega_1^2$, of the base"),
+    ("peak displacement, over b", "peak displacement over $b$"),
+    ("energy above a multiple of omega_1", r"energy above a multiple of $\omega_1$"),
+    ("work over beams, b in all", "work over beams, b in all"),
+])  # fmt: skip
+def test_long_names_are_drawn_with_symbols(words: str, drawn: str) -> None:
+    assert in_symbols(words) == drawn

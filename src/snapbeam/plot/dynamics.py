@@ -392,7 +392,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     value, error = (each.transpose(*dims) for each in (value, error))
     with frame(ax, dataset) as ax:
         if "running" in dataset:
-            _running(factor * dataset["running"], ax)
+            _running(dataset, factor, ax)
             ax.set(xlabel="Periods of the excitation", ylabel=f"Lyapunov exponent so far ({unit})", xscale="log")
             plain_decades(ax.xaxis, 1.0, dataset.sizes["period"])
         elif len(dims) == 1:
@@ -411,15 +411,20 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     return ax
 
 
-def _running(running: xr.DataArray, ax: Axes) -> None:
+def _running(dataset: xr.Dataset, factor: Any, ax: Axes) -> None:
+    """The exponents so far; the legend has the results with their standard errors."""
+    running = factor * dataset["running"]
+    result, error = (np.ravel(factor * dataset[f"exponent{end}"]) for end in ("", "_error"))
     period = np.arange(1, running.sizes["period"] + 1)
     ax.axhline(0.0, color="0.6", linewidth=0.5)
     shown = min(running.sizes["exponent_number"], 10)
     values = running.transpose("period", ..., "exponent_number").values
     for number in range(shown):
-        label = rf"$\lambda_{{{number + 1}}}$"
+        digits = int(np.clip(1.0 - np.floor(np.log10(error[number])), 0, 6)) if error[number] > 0.0 else 3
+        ends = " ± ".join(f"{each[number]:.{digits}f}" for each in (result, error) if np.isfinite(each[number]))
+        label = rf"$\lambda_{{{number + 1}}}$ = {ends}".replace(" = -", " = \N{MINUS SIGN}")
         ax.plot(period, values[:, 0, number], color=color_of(number, shown), label=label)
-    ax.legend(loc="best", ncols=2)
+    legend_below(ax)
 
 
 def _exponent_line(dataset: xr.Dataset, ax: Axes, name: str, value: Any, error: Any) -> None:
@@ -559,7 +564,7 @@ def plot_backbone(
                     kinds.add(kind)
             if len(curves) > 1:
                 handles.append(Line2D([], [], label=label, **look))
-        unit = f" (1: {prefixed(curves[0].attrs['reference_frequency'], 'Hz')})" if one_model else ""
+        unit = rf" ($\Omega$ = 1: {prefixed(curves[0].attrs['reference_frequency'], 'Hz')})" if one_model else ""
         ax.set(xlabel=rf"Frequency $\Omega$ of free vibration{unit}")
         ax.set_ylabel(scale_text(curves[0].attrs if one_model else {}, "Amplitude at mid-span $w/b$"))
         ax.set_ylim(bottom=0.0)

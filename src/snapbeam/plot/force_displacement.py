@@ -70,7 +70,7 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
             if np.isfinite(value):
                 there = float(dataset[f"{name}_displacement"])
                 at, right = (there / prefix_w, value / prefix_f), there > place[seen].mean()
-                ax.plot(*at, "^" if value > 0.0 else "v", color="#000000", markersize=6.0, zorder=6)
+                ax.plot(*at, "^" if value > 0.0 else "v", color="#000000", markersize=8.5, zorder=5)
                 ax.annotate(
                     f"{words} {prefixed(value, 'N')}".replace(" -", " \N{MINUS SIGN}"), at,
                     xytext=(6.0 if right else -6.0, 9.0 if value > 0.0 else -15.0), textcoords="offset points",
@@ -135,7 +135,7 @@ def _critical(dataset: xr.Dataset, ax: Axes, prefix_w: float, prefix_f: float) -
         if near.any():
             handles += ax.plot(
                 at[near, 0] / prefix_w, at[near, 1] / prefix_f, marker, color="#000000", markerfacecolor="white",
-                markersize=4.0, markeredgewidth=0.9, zorder=5, label=label,
+                markersize=3.5, markeredgewidth=0.9, zorder=6, label=label,
             )  # fmt: skip
     return handles
 

@@ -32,7 +32,7 @@ from snapbeam.plot.style import (
     marker_size,
     set_title,
 )
-from snapbeam.plot.units import in_units, ratio_along, scale_text
+from snapbeam.plot.units import in_symbols, in_units, ratio_along, scale_text
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.sweeps.seeds import mean_over_seeds, seed_axes
@@ -447,11 +447,11 @@ def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, s
     """Divisor of the values, and the label of the colour bar."""
     attrs = dataset[name].attrs
     row = STATISTICS.get(name)
-    words = str(attrs.get("long_name", row.long_name if row else name))
+    words = in_symbols(str(attrs.get("long_name", row.long_name if row else name)))
     unit = str(attrs.get("units", row.unit if row else "1"))
     words = words[:1].upper() + words[1:]
     if unit == "1":
-        words = scale_text(dataset.attrs, words) if "over b" in words else words
+        words = scale_text(dataset.attrs, words) if "over $b" in words else words
         return 1.0, textwrap.fill(words, _LONGEST)
     factor, scaled = scale_of(values, unit)
     return factor, textwrap.fill(f"{words} ({scaled})", _LONGEST)

@@ -33,7 +33,7 @@ from snapbeam.plot.style import (
     say_scale_once,
     set_title,
 )
-from snapbeam.plot.units import scale_text
+from snapbeam.plot.units import in_symbols, scale_text
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.simulation.run import Run
 from snapbeam.util.diagnostics import diagnostics_of
@@ -221,7 +221,7 @@ def _even_samples(run: Run | xr.Dataset, variable: str | None, window: Any) -> t
 
 def _words(dataset: xr.Dataset, variable: str) -> str:
     """Long name of a variable, as the label of an axis."""
-    words = str(dataset[variable].attrs.get("long_name", variable)).replace(", over b", " over $b$")
+    words = in_symbols(str(dataset[variable].attrs.get("long_name", variable)))
     words = scale_text(dataset.attrs, words) if "$b$" in words else words
     return f"{words[:1].upper()}{words[1:]}"
 

@@ -31,7 +31,7 @@ from snapbeam.plot.style import (
     new_figure,
     plain_decades,
 )
-from snapbeam.plot.units import in_units, ratio_along, ratio_name, scale_text
+from snapbeam.plot.units import in_symbols, in_units, ratio_along, ratio_name, scale_text
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.status_codes import ResponseClass
@@ -118,9 +118,10 @@ def _label(dataset: xr.Dataset, name: str) -> str:
     if f"fixed_{short}" in dataset.attrs or "parameter" in dataset.get(short, dataset[name]).attrs:
         return axis_label(dataset, short)
     labels = dataset[name].attrs
-    unit, words = str(labels.get("units", "1")), str(labels.get("long_name", name)).replace("_", " ")
-    words = scale_text(dataset.attrs, words) if "over b" in words else words
-    return textwrap.fill(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}", 40)
+    unit, words = str(labels.get("units", "1")), in_symbols(str(labels.get("long_name", name)))
+    words = re.sub("(?<=[a-z])_(?=[a-z])", " ", words)  # names of statistics in it
+    words = scale_text(dataset.attrs, words) if "over $b" in words else words
+    return textwrap.fill(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}", 44)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -302,7 +303,9 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
         reach = np.nanmax(np.where(np.isfinite(data["threshold_high"]), data["threshold_high"], np.nan))
         ax.set_ylim(min(0.0, bottom), min(top, 1.08 * float(reach)) if np.isfinite(reach) else top)
         share = 100.0 * float(data.attrs.get("confidence", 0.95))
-        extend_title(ax, f"{int(data['runs'].max())} runs a point, {share:g} % bands")
+        watched = str(data.attrs.get("watched_outcome", "snap"))
+        words = _WORDS.get(watched, watched).replace("Probability", "$P$: probability")
+        extend_title(ax, f"{words}; {int(data['runs'].max())} runs a point, {share:g} % bands")
         legend_below(ax)
     return ax
 
@@ -343,7 +346,7 @@ def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
         ax.errorbar(middle + sign * half, place, xerr=error, fmt="none", label=interval, **_BARS)
     ax.axvline(middle, color="black", linewidth=0.6)
     unit = str(data.attrs["quantity_units"])
-    words = str(data.attrs["quantity"]).replace("omega_1", r"$\omega_1$")
+    words = in_symbols(str(data.attrs["quantity"]))
     text = f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
     ax.set_xlabel(textwrap.fill(text, 40))
     legend_below(ax)
@@ -361,7 +364,7 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
         error = np.stack([value - low, high - value])
         ax.errorbar(value, place + shift, xerr=error, fmt="none", label=words, **_BARS)
     ax.axvline(0.0, color="black", linewidth=0.6)
-    ax.set_xlabel(textwrap.fill(f"Share of the variance of {data.attrs['quantity']}", 44))
+    ax.set_xlabel(textwrap.fill(f"Share of the variance of {in_symbols(str(data.attrs['quantity']))}", 44))
     legend_below(ax)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -101,6 +102,13 @@ def ratio_name(name: str) -> str:
     """The name that datasets give the ratio of a parameter in its physical unit; the name itself for any other."""
     full = _by_short().get(name)
     return name if full is None else lookup(PHYSICAL[full].parameter).short
+
+
+def in_symbols(words: str) -> str:
+    """Words of a long name for a figure, with b and omega_1 as symbols."""
+    words = re.sub(r",? over b(?!\w)", " over b", words)
+    symbol = re.compile(r"(?<= over )b(?!\w)( omega_1(\^2)?)?|\bomega_1\b")
+    return symbol.sub(lambda found: f"${found[0].replace(' ', '').replace('omega', chr(92) + 'omega')}$", words)
 
 
 def scale_text(attrs: Mapping[Any, Any], words: str) -> str:
