@@ -98,7 +98,9 @@ def check(figure: Figure, words: str) -> None:
     texts = texts_of(figure)
     boxes = [(each.get_text(), each.get_window_extent()) for each in texts]
     fonts = {(*each.get_fontfamily(), each.get_math_fontfamily()) for each in texts}
-    assert len(fonts) == 1 and not {"serif", "sans-serif"}.intersection(*fonts), f"{words}: another font outside the context"
+    assert len(fonts) == 1 and not {"serif", "sans-serif"}.intersection(*fonts), (
+        f"{words}: another font outside the context"
+    )
     for text, box in boxes:
         assert not RAW_NAME.search(re.sub(r"\$.*?\$", "", text)), f"{words}: {text!r} is a name of a program"
         inside = min(box.x0, box.y0, width - box.x1, height - box.y1)
