@@ -244,15 +244,15 @@ KINDS = table(
     Kind(
         "camera.knocked", ERROR,
         "the rows of striker and beam before and after each frame, against jumps of the time and of each alone",
-        "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked; keep the frames before, or "
-        "give a part with a stationary object (fixed_marks, --fixed-mark)",
+        "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked (or, where beam and striker "
+        "move alike, frames are missing); keep the frames before, or give a part with a stationary object (fixed_marks, --fixed-mark)",
         ("fixed_marks",),
     ),
     Kind(
         "camera.jump", ERROR,
         "the rows of striker and beam before and after each frame, against jumps of the time and of each alone",
-        "beam and striker jump by {beam:.2f} and {striker:.2f} px at frame {first:.0f}: frames are missing, or two "
-        "recordings were joined; keep the frames before",
+        "beam and striker jump by {beam:.2f} and {striker:.2f} px at frame {first:.0f}: frames are missing, two recordings "
+        "were joined, or the camera was knocked; keep the frames before",
     ),
     Kind(
         "camera.off_its_drive", WARNING,

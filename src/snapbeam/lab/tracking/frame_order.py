@@ -2,9 +2,10 @@
 
 A frame that is lost makes both move two steps in one; a frame shown twice makes both stand still for one.  Some
 frames before a place and as many after it are fitted with one polynomial over time, whose clock runs on evenly, jumps
-by the frames that were lost, stops for a frame, or shows two in the wrong order; or the rows of both jump there.  The striker moves smoothly, so more frames tell more of it.  With
-an even clock the motion may also bend faster, or change its velocity about the place as a body does that is struck or
-starts; a place counts only if no such motion, and no fit over more frames, explains it as well.
+by the frames that were lost, stops for a frame, or shows two in the wrong order; or the rows of both jump there, alike
+where the camera was knocked.  The striker moves smoothly, so more frames tell more of it.  With an even clock the
+motion may also bend faster, or change its velocity about the place as a body does that is struck or starts; a place
+counts only if no such motion, and no fit over more frames, explains it as well.
 """
 
 from __future__ import annotations
@@ -28,12 +29,11 @@ _BENDS = 7  # degree of a motion over many frames with an even clock
 _STRUCK = np.arange(-2.0, 2.1, 0.5)  # frames about a place, at which a body may be struck
 _MOST = 3  # frames lost at one place
 _EXCHANGED, _STEP = _MOST + 1, _MOST + 2  # rows of gains after those of frames shown twice and lost
-_PIXELS = 0.3  # that a step is at least
 _SAME = 5.0  # standard errors by which two steps may differ and be one
 _BETTER = 50.0  # chi-square by which a clock must be better than one that runs on evenly
 _FURTHER = 15.0  # the same, in a recording in which one place is known
-_SURER = 10.0  # chi-square by which a jump of both rows must explain more than a clock, or one by the same more than two
-_PIXELS = 0.2  # that a jump is at least
+_SURER = 15.0  # chi-square by which a jump of the rows must explain more than a clock, which has no size of its own
+_PIXELS = 0.3  # that a jump is at least
 _PARAMETER = 3.0  # chi-square that a parameter more of the motion must explain
 _SPREADS = 5.5  # standard deviations of chi-square that a fit may leave beyond its degrees of freedom
 _LEAST_NOISE = 0.005  # px
@@ -53,15 +53,15 @@ class FrameOrder(NamedTuple):
 
 
 def find_order(row: Floats, shaker: Floats) -> FrameOrder:
-    """Detect lost and repeated frames from the rows [px] of beam and shaker, NaN where unknown."""
+    """Detect lost, repeated and exchanged frames and jumps from the rows [px] of beam and shaker, NaN where unknown."""
     if row.size < 4 * _HALVES[-1]:
         return FrameOrder((), (), ())
     beam = _better(row, _HALVES[0])
     striker = [_better(shaker, half) for half in _HALVES]
     gain = np.max([beam + one for one in striker], axis=0)
-    # a body alone may be found a little off; a step is one of the picture, and both have it
-    gain[_STEP] *= (beam[_STEP] > _FURTHER) & (np.max(striker, axis=0)[_STEP] > _FURTHER)
-    gain[_STEP] -= _FURTHER
+    # of a body alone an edge may be found elsewhere; a jump of the picture or of the time shows in both
+    most = np.max([one[_STEP] for one in striker], axis=0)
+    gain[_STEP] = np.where(np.minimum(beam[_STEP], most) > _FURTHER, gain[_STEP] - _SURER, 0.0)
     for values in (row, shaker):
         gain[_contradicted(values)] = 0.0
     best = gain.argmax(0)
@@ -76,13 +76,14 @@ def find_order(row: Floats, shaker: Floats) -> FrameOrder:
     if _EXCHANGED in places:
         swapped = places[_EXCHANGED]
         clock.append(("frames_exchanged", {"frames": len(swapped), "first": min(swapped) - 1}))
-    for at in sorted(places.get(_STEP, []))[:1]:
-        (beam_step, error), (step, other) = _step(row, at, _HALVES[0]), _step(shaker, at, _HALVES[1])
-        if max(abs(beam_step), abs(step)) < _PIXELS:
-            continue
-        alike = abs(beam_step - step) < _SAME * math.hypot(error, other, 0.02 * step)
-        size_of = {"size": abs(step)} if alike else {"beam": beam_step, "striker": step}
-        clock.append(("knocked" if alike else "joined", {"first": at, **size_of}))
+    for at in sorted(places.get(_STEP, [])):
+        half = _HALVES[int(np.argmax([one[_STEP, at] for one in striker]))]
+        (first, error), (second, other) = _step(row, at, _HALVES[0]), _step(shaker, at, half)
+        alike = abs(first - second) < _SAME * math.hypot(error, other)
+        if min(abs(first), abs(second)) > _PIXELS and alike:
+            clock.append(("knocked", {"first": at, "size": abs(second)}))
+        elif max(abs(first), abs(second)) > _PIXELS:
+            clock.append(("jump", {"first": at, "beam": first, "striker": second}))
     lost = tuple(at for at, _ in missing), tuple(count for _, count in missing)
     return FrameOrder(tuple(sorted(places.get(0, []))), *lost, tuple(clock))
 
@@ -108,7 +109,7 @@ def _better(values: Floats, half: int) -> Floats:
     With the even one the motion may also turn faster (a higher degree), or change its velocity about the place as a
     body does that is struck or starts; each parameter more costs :data:`_PARAMETER`.
     """
-    out = np.zeros((_MOST + 3, values.size))
+    out = np.zeros((_STEP + 1, values.size))
     noise = _noise(values)
     if not math.isfinite(noise):
         return out
@@ -133,7 +134,7 @@ def _better(values: Floats, half: int) -> Floats:
 
 def _contradicted(values: Floats) -> NDArray[np.bool_]:
     """Clocks with which a fit before each frame is not good, and is with the even one."""
-    out = np.zeros((_MOST + 3, values.size), dtype=bool)
+    out = np.zeros((_STEP + 1, values.size), dtype=bool)
     noise = _noise(values)
     if not math.isfinite(noise):
         return out
@@ -143,7 +144,7 @@ def _contradicted(values: Floats) -> NDArray[np.bool_]:
             left = np.stack([_left(windows, design) for design in _designs(half, degree)]) / noise**2
             fits = _good(half, degree)
             with np.errstate(invalid="ignore"):
-                out[:_STEP, half : half + left.shape[1]] |= (left[0] <= fits) & (left[1:] > fits)
+                out[:, half : half + left.shape[1]] |= (left[0] <= fits) & (left[1:] > fits)
     return out
 
 
@@ -154,8 +155,11 @@ def _good(half: int, degree: int) -> float:
 
 
 def _designs(half: int, degree: int) -> list[Floats]:
-    """Motions about a place: with an even clock, with the first frame after it as the one before, with up to three lost
-    there, with the two beside it exchanged, and with a jump of the row."""
+    """Motions about a place: with an even clock, and with each of what may be wrong there.
+
+    These are the first frame after it shown as the one before, up to three lost, the two beside it exchanged, and a jump
+    of the row.
+    """
     even = np.arange(2.0 * half) - half + 0.5
     twice, turned = even.copy(), even.copy()
     twice[half] = even[half - 1]
@@ -164,6 +168,12 @@ def _designs(half: int, degree: int) -> list[Floats]:
     late = [even + count * after for count in range(1, _MOST + 1)]
     designs = [_powers(clock, degree) for clock in (even, twice, *late, turned)]
     return [*designs, np.column_stack([designs[0], after])]
+
+
+def _step(values: Floats, at: int, half: int) -> tuple[float, float]:
+    """Jump [px] of a row at a frame, and its standard error."""
+    weights = lstsq(_designs(half, _DEGREES[0])[-1], np.eye(2 * half))[-1]
+    return float(weights @ values[at - half : at + half]), _noise(values) * float(np.linalg.norm(weights))
 
 
 def _powers(clock: Floats, degree: int) -> Floats:
