@@ -370,7 +370,7 @@ def _filters(record: Record) -> list[Hypothesis]:
         seen = one.kind == "notch" or shown > -_CONTRADICTS
         gain = shown + max(gain, -_CONTRADICTS) if seen else shown
         # what the start alone shows may be the shaker's own: it is in the standard error, and not told
-        own = shown < limit and (one.kind == "high_pass" or (one.kind == "notch" and certain < limit))
+        own = shown < limit and (one.kind == "high_pass" or (one.kind == "notch" and certain < _CONTRADICTS))
         told.append(Hypothesis("" if own else one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
     return told
 
