@@ -344,7 +344,8 @@ def _filters(record: Record) -> list[Hypothesis]:
     """Filters, by the spectrum of the noise about the drive and by what they make of the start of the motion.
 
     A high-pass is told only where the noise shows it, whatever it explains of the start: the suspension of a shaker and the
-    control of its amplitude leave tails as filters do.  It is then one of the ``_hidden_filters``.
+    control of its amplitude leave tails as filters do.  It is then one of the ``_hidden_filters``.  A notch is told where the
+    noise shows it, or the start whatever its shape is.
     """
     drive = record.fit.frequency
     noise = _noise_misfit(record)
@@ -495,10 +496,10 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None, bool], float]:
 
 
 def _start_gains(record: Record, filters: list[_Filter]) -> tuple[list[float], float]:
-    """Chi-square that filters explain of the first cycles, as a shaker's exponential start-up behind each, and what the best
-    notch explains whatever the shape of the start is.
+    """Chi-square that filters explain of the first cycles, as a shaker's exponential start-up behind each.
 
-    A low-pass makes a start alike to a gentle one, so it is not judged by it.
+    A low-pass makes a start alike to a gentle one, so it is not judged by it.  With it, what the best notch explains
+    whatever the shape of the start is.
     """
     fit, moving = record.fit, record.moving
     every = max(int(moving.sampling_frequency / (40.0 * fit.frequency)), 1)
