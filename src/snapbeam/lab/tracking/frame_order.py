@@ -58,7 +58,11 @@ def find_order(row: Floats, shaker: Floats) -> FrameOrder:
         return FrameOrder((), (), ())
     beam = _better(row, _HALVES[0])
     striker = [_better(shaker, half) for half in _HALVES]
-    gain = np.max([beam + one for one in striker], axis=0)
+    # a jump of the striker alone, whose edge is found elsewhere where it touches, looks as a lost frame
+    own = np.where(beam > 0.0, 0.0, 1.0)[:_STEP]
+    gain = np.max(
+        [beam + one - np.vstack([own * np.maximum(one[_STEP], 0.0), np.zeros_like(row)]) for one in striker], axis=0
+    )
     # of a body alone an edge may be found elsewhere; a jump of the picture or of the time shows in both
     most = np.max([one[_STEP] for one in striker], axis=0)
     gain[_STEP] = np.where(np.minimum(beam[_STEP], most) > _FURTHER, gain[_STEP] - _SURER, 0.0)
