@@ -45,8 +45,13 @@ def test_a_knocked_camera_exchanged_frames_and_joined_recordings_need_no_steady_
     whole = motion(260, noise=0.02)
     (order,) = find_order(*(one + 1.5 * (np.arange(260) >= at) for one in whole)).clock
     assert order == ("knocked", {"first": at, "size": pytest.approx(1.5, abs=0.1)})
-    (order,) = find_order(*(one + size * (np.arange(260) >= at) for one, size in zip(whole, (3.0, -1.0)))).clock
-    assert order == ("jump", {"first": at, "beam": pytest.approx(3.0, abs=0.1), "striker": pytest.approx(-1.0, abs=0.1)})
+    (order,) = find_order(
+        *(one + size * (np.arange(260) >= at) for one, size in zip(whole, (3.0, -1.0), strict=True))
+    ).clock
+    assert order == (
+        "jump",
+        {"first": at, "beam": pytest.approx(3.0, abs=0.1), "striker": pytest.approx(-1.0, abs=0.1)},
+    )
     shown = np.arange(260)
     shown[[at, at + 1]] = at + 1, at
     ((kind, numbers),) = find_order(*(one[shown] for one in whole)).clock

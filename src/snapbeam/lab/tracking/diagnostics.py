@@ -230,12 +230,6 @@ KINDS = table(
         "in the order of their numbers",
     ),
     Kind(
-        "camera.frames_copied", WARNING,
-        "the striker frame by frame against its steady sine, with frames exchanged and with frames shown again",
-        "{frames:.0f} frame(s) show the instant of the frame before, the first is frame {first:.0f}: a copy that was coded "
-        "again, or made by a program that changed the frame rate; keep the frames as they were taken",
-    ),
-    Kind(
         "camera.time_jump", ERROR,
         "the phase of the striker's drive before and after each frame, against a shift of the picture",
         "the drive's phase jumps by {size:.2f} frames at about frame {first:.0f}: frames are missing, or two recordings were "
@@ -245,7 +239,8 @@ KINDS = table(
         "camera.knocked", ERROR,
         "the rows of striker and beam before and after each frame, against jumps of the time and of each alone",
         "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked (or, where beam and striker "
-        "move alike, frames are missing); keep the frames before, or give a part with a stationary object (fixed_marks, --fixed-mark)",
+        "move alike, frames are missing); keep the frames before, or give a part with a stationary object (fixed_marks, "
+        "--fixed-mark)",
         ("fixed_marks",),
     ),
     Kind(
