@@ -39,6 +39,31 @@ def test_frames_lost_and_shown_twice_are_located(at):
     assert order.repeated == (at,) and not order.missing
 
 
+@pytest.mark.parametrize("at", [75, 140, 170])
+def test_a_knocked_camera_exchanged_frames_and_joined_recordings_need_no_steady_drive(at):
+    """Two cycles of the drive: jumps of striker and beam in one frame, alike or each by its own."""
+    whole = motion(260, noise=0.02)
+    (order,) = find_order(*(one + 1.5 * (np.arange(260) >= at) for one in whole)).clock
+    assert order == ("knocked", {"first": at, "size": pytest.approx(1.5, abs=0.1)})
+    (order,) = find_order(
+        *(one + size * (np.arange(260) >= at) for one, size in zip(whole, (3.0, -1.0), strict=True))
+    ).clock
+    assert order == (
+        "jump",
+        {"first": at, "beam": pytest.approx(3.0, abs=0.1), "striker": pytest.approx(-1.0, abs=0.1)},
+    )
+    shown = np.arange(260)
+    shown[[at, at + 1]] = at + 1, at
+    ((kind, numbers),) = find_order(*(one[shown] for one in whole)).clock
+    assert kind == "frames_exchanged" and numbers == {"frames": 1, "first": at}
+
+
+def test_a_jump_of_one_edge_is_not_one_of_the_picture():
+    """As of a striker whose edge is found elsewhere while it touches."""
+    beam, striker = motion(noise=0.02)
+    assert find_order(beam, striker + 1.0 * (np.arange(240) >= 140)) == ((), (), (), ())
+
+
 def test_every_tenth_frame_lost_and_every_seventh_a_copy():
     whole = motion()
     keep = np.delete(np.arange(240), np.arange(30, 240, 10))

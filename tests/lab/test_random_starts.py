@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import random_starts
 
 from snapbeam.lab import make_signal, measure_drive
-from snapbeam.util.diagnostics import diagnostics_of
+from snapbeam.util.diagnostics import diagnostics_of, doubtful
 
 
 def test_starts_and_noise_of_many_kinds_are_no_high_pass():
@@ -46,3 +47,21 @@ def test_a_sudden_start_excludes_a_filter_and_a_gentle_one_does_not():
     assert "vibrometer.high_pass" not in {one.code for one in diagnostics_of(gentle)}
     assert 1e-2 < gentle.steady.amplitude_se / gentle.steady.amplitude < 0.5
     assert abs(gentle.steady.amplitude - 0.02) < 2.0 * gentle.steady.amplitude_se
+
+
+@pytest.mark.parametrize("start", ["linear", "overshoot", "gentle"])
+def test_white_noise_excludes_a_high_pass_and_a_start_is_no_notch(start):
+    """Shakers at 54 Hz, near the mains: the noise is white to its lowest line, and each start is that of a control."""
+    time = np.arange(8_000) / 4e3
+    since = 54.0 * np.maximum(time - 0.2, 0.0)
+    ramp = np.minimum(since / 9.0, 1.0)
+    turn = 2.0 * np.pi * since / 12.0
+    rise = {
+        "linear": ramp,
+        "overshoot": 1.0 - np.exp(-0.3 * turn) * np.cos(np.sqrt(0.91) * turn),
+        "gentle": ramp**2 * (3.0 - 2.0 * ramp),
+    }[start]
+    noise = np.random.default_rng(41).standard_normal(time.size)
+    drive = measure_drive(make_signal(0.02 * (rise * np.cos(2.0 * np.pi * since + 1.0) + 0.02 * noise), "m/s", 4e3))
+    assert not doubtful(diagnostics_of(drive))
+    assert abs(drive.steady.amplitude - 0.02) < 2.0 * drive.steady.amplitude_se < 0.02 * 0.1

@@ -295,7 +295,7 @@ def test_noise_behind_a_filter_of_first_order_tells_its_corner():
 @pytest.mark.parametrize(
     ("kind", "least"),
     [
-        ("notch", 2),
+        ("notch", 1),
         ("AC coupling", 1),
         ("slew limit", 2),
         ("hysteresis", 1),

@@ -40,6 +40,7 @@ _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
 _START = 20.0  # cycles of the start that a filter shapes
 _CONTRADICTS = 40.0  # chi-square of what a start or a drive that no model describes to the noise leaves
+_DESCRIBED = 1.2  # times its noise up to which what a start leaves is noise
 _PASSES = 0.05  # of the drive that a filter must let pass for it to be seen at all
 _BETWEEN = 0.02  # of a start, which filters between those that are tried leave
 _POSSIBLE = 3.0  # chi-square by which a filter may be worse than none, or than the best, and be there
@@ -343,14 +344,16 @@ def _filters(record: Record) -> list[Hypothesis]:
     """Filters, by the spectrum of the noise about the drive and by what they make of the start of the motion.
 
     A high-pass is told only where the noise shows it, whatever it explains of the start: the suspension of a shaker and the
-    control of its amplitude leave tails as filters do.  It is then one of the ``_hidden_filters``.
+    control of its amplitude leave tails as filters do.  It is then one of the ``_hidden_filters``.  A notch is told where the
+    noise shows it, or the start whatever its shape is.
     """
     drive = record.fit.frequency
     noise = _noise_misfit(record)
-    plain = noise(None)
+    plain = noise(None, False)
     # behind a notch at its own frequency the drive is gone but for the change of its amplitude, and it is there
     candidates = [one for one in _candidates(drive) if abs(one.response(drive)) > _PASSES]
-    start = _start_gains(record, candidates)
+    start, certain = _start_gains(record, candidates)
+    limit = float(chi2.isf(FALSE_ALARM_RATE, 2))
     told = [Hypothesis("", 0.0, 1)]
     for one, gain in zip(candidates, start, strict=True):
         kept = max(float(abs(one.response(drive))), 1e-3)
@@ -363,12 +366,12 @@ def _filters(record: Record) -> list[Hypothesis]:
             "wanted": 20.0 * drive,
             "delay_ms": 1e3 * order / (2.0 * math.pi * one.centre),
         }
-        shown = plain - noise(one)
+        shown = plain - noise(one, False)
         # a notch rings where its noise has a hole
         seen = one.kind == "notch" or shown > -_CONTRADICTS
         gain = shown + max(gain, -_CONTRADICTS) if seen else shown
         # what the start alone shows may be the shaker's own: it is in the standard error, and not told
-        own = one.kind == "high_pass" and shown < float(chi2.isf(FALSE_ALARM_RATE, 2))
+        own = shown < limit and (one.kind == "high_pass" or (one.kind == "notch" and certain < _CONTRADICTS))
         told.append(Hypothesis("" if own else one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
     return told
 
@@ -377,14 +380,17 @@ def _hidden_filters(record: Record) -> list[Hypothesis]:
     """The largest loss by a high-pass that noise and start do not exclude: in the standard error, and no doubt.
 
     It is possible where both together are not against it, or where one of them shows it, whatever the other says: noise
-    may hold the end of a transient, and a start may be of any kind.
+    may hold the end of a transient, and a start may be of any kind.  White noise excludes a filter that would have
+    coloured it, unless the start is, to the noise, that behind the filter: noise may be added after it.
     """
     if not record.early.size:
         return []
     drive = record.fit.frequency
     filters = [one for one in _candidates(drive) if one.kind == "high_pass"]
     misfit = _noise_misfit(record)
-    noise = np.array([misfit(one) for one in filters]) - misfit(None)
+    # a colour that a filter makes white needs the filter's own corner
+    white = misfit(None, True) - misfit(None, False) < _SHOWS
+    noise = np.array([misfit(one, white) for one in filters]) - misfit(None, white)
     start, unexplained, freedom = _free_start(record, filters)
     described = 1.0 + unexplained / freedom
     weight = 1.0 / described if described < 2.0 else 0.0  # a start of another kind says nothing
@@ -392,6 +398,7 @@ def _hidden_filters(record: Record) -> list[Hypothesis]:
     possible = both < min(float(both.min()), 0.0) + _POSSIBLE
     possible |= noise < min(float(noise.min()) + _POSSIBLE, -_SHOWS)
     possible |= start < min(float(start.min()) + _POSSIBLE + unexplained, -_SHOWS)
+    possible &= (noise < _CONTRADICTS) | ((start < -_CONTRADICTS) & (described < _DESCRIBED))
     loss = np.array([1.0 / abs(one.response(drive)) - 1.0 for one in filters])
     if not (possible & (loss > _UNSEEN)).any():
         return []
@@ -442,8 +449,11 @@ def _free_start(record: Record, filters: list[_Filter]) -> tuple[_Array, float, 
     return worse, max(plain / unit - freedom / colour + min(float(worse.min()), 0.0), 0.0), freedom
 
 
-def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
-    """Twice the negative logarithm of Whittle's likelihood of the noise behind a response, least over its colours."""
+def _noise_misfit(record: Record) -> Callable[[_Filter | None, bool], float]:
+    """Twice the negative logarithm of Whittle's likelihood of the noise behind a response, least over its colours.
+
+    The function that is returned takes the response, and True for noise that is white before it.
+    """
     rate, drive = record.part.sampling_frequency, record.fit.frequency
     left = record.left[min(round(_TAIL * rate / drive), record.left.size // 4) :]
     n = left.size
@@ -461,7 +471,7 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
         used &= np.abs(freq - line) > 1.5 * rate / n
     freq, power = freq[used], power[used]
     if freq.size < 2 * _LINES or not power.min() > 1e-18 * n * record.fit.amplitude**2:
-        return lambda one: 0.0  # a computed signal has no noise that a filter shapes
+        return lambda one, white: 0.0  # a computed signal has no noise that a filter shapes
     # neighbours that differ in frequency by less than 1 % are averaged
     steps = np.arange(math.log(freq[-1] / freq[0]) / 0.00996)
     edges = np.unique(np.searchsorted(freq, freq[0] * 1.01**steps))
@@ -474,45 +484,64 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], float]:
     colours = np.vstack([colours, bent])
     falling = colours[:, 0] >= colours[:, -1]
 
-    def misfit(one: _Filter | None) -> float:
+    def misfit(one: _Filter | None, white: bool) -> float:
         kept = 1.0 if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
         # noise that rises and is filtered again would explain any hill
-        shape = (colours[falling] if one is not None and one.kind == "low_pass" else colours) * kept
+        any_colour = colours[falling] if one is not None and one.kind == "low_pass" else colours
+        shape = (np.ones((1, freq.size)) if white else any_colour) * kept
         level = (count * power / shape).sum(-1) / count.sum()
         return 2.0 / lines * float(np.min(count.sum() * np.log(level) + (count * np.log(shape)).sum(-1)))
 
     return misfit
 
 
-def _start_gains(record: Record, filters: list[_Filter]) -> list[float]:
+def _start_gains(record: Record, filters: list[_Filter]) -> tuple[list[float], float]:
     """Chi-square that filters explain of the first cycles, as a shaker's exponential start-up behind each.
 
-    A low-pass makes a start alike to a gentle one, so it is not judged by it.
+    A low-pass makes a start alike to a gentle one, so it is not judged by it.  With it, what the best notch explains
+    whatever the shape of the start is.
     """
     fit, moving = record.fit, record.moving
     every = max(int(moving.sampling_frequency / (40.0 * fit.frequency)), 1)
     count = min(int(_START * moving.sampling_frequency / fit.frequency), moving.values.size)
     time = moving.time[:count:every] - moving.time[0]
     if not record.early.size or time.size < 200:
-        return [0.0] * len(filters)
+        return [0.0] * len(filters), 0.0
     aim = moving.values[:count:every] - fit.offset
     turn = np.exp(2j * math.pi * fit.frequency * time)
     waves = [turn * np.exp(-time * rate) for rate in (0.0, 8.0, 40.0, 200.0)] + [turn**2, turn**3]
     columns = np.column_stack([part for wave in waves for part in (wave.real, wave.imag)])
     rate, slow = moving.sampling_frequency / every, np.column_stack([np.ones_like(time), time])
 
+    def behind(one: _Filter | None, waves: _Array) -> _Array:
+        if one is None:
+            return waves
+        speed = rate / (math.pi * one.centre)
+        above, below = (
+            np.pad(side, (3 - len(side), 0)) * np.array([speed**2, speed, 1.0]) @ _BILINEAR
+            for side in (one.above, one.below)
+        )
+        return np.asarray(lfilter(above, below, waves, axis=0))
+
+    def residual(one: _Filter | None) -> tuple[_Array, _Array]:
+        design = np.hstack([behind(one, columns), slow])
+        return design, aim - design @ solve(design, aim, 1e-10)
+
     def left(one: _Filter | None) -> float:
-        passed = columns
-        if one is not None:
-            speed = rate / (math.pi * one.centre)
-            above, below = (
-                np.pad(side, (3 - len(side), 0)) * np.array([speed**2, speed, 1.0]) @ _BILINEAR
-                for side in (one.above, one.below)
-            )
-            passed = lfilter(above, below, columns, axis=0)
-        design = np.hstack([passed, slow])
-        rest = (aim - design @ solve(design, aim, 1e-10))[2:]
+        rest = residual(one)[1][2:]
         return float(rest @ rest)
+
+    def left_of_any(one: _Filter | None) -> float:
+        """The least that a start of another shape leaves."""
+        design, rest = residual(one)
+        base = np.linalg.qr(design)[0]
+        waves = _envelopes(fit.frequency * time)[..., None] * np.stack([turn.real, turn.imag], -1)[:, None]
+        waves = behind(one, waves.reshape(time.size, -1))
+        waves -= base @ (base.T @ waves)
+        pairs = waves.reshape(time.size, -1, 2)
+        gram, along = np.einsum("tki,tkj->kij", pairs, pairs), np.einsum("tki,t->ki", pairs, rest)
+        gram += 1e-9 * time.size * np.eye(2)
+        return float(rest[2:] @ rest[2:] - (along * np.linalg.solve(gram, along[..., None])[..., 0]).sum(1).max())
 
     plain = left(None)
     rests = np.array([plain if one.kind == "low_pass" else left(one) for one in filters])
@@ -521,13 +550,29 @@ def _start_gains(record: Record, filters: list[_Filter]) -> list[float]:
     # a start that a filter does not explain to the noise is of another kind, and speaks for none
     unexplained = 2.0 * math.sqrt(2.0 / time.size) * noise + _BETWEEN * max(plain - noise, 0.0)
     gains = np.where(rests - noise < unexplained, gains, np.minimum(gains, 0.0))
-    # only a notch rings long at another frequency, whatever the start is, and what nothing explains is no noise
-    ringing = (plain - rests) / max(noise / time.size, float(rests.min()) / time.size)
-    gains = np.where([one.kind == "notch" for one in filters], ringing, gains)
+    # only a notch rings long at another frequency, and what nothing explains is no noise
+    notch = np.array([one.kind == "notch" for one in filters])
+    certain = 0.0
+    if notch.any():
+        gains = np.where(notch, (plain - rests) * time.size / max(noise, float(rests.min())), gains)
+        least = left_of_any(filters[int(np.argmin(np.where(notch, rests, np.inf)))])
+        certain = (left_of_any(None) - least) * time.size / max(noise, least)
     # noise that drifts looks as the tail behind a high-pass
     slow_noise = noise_colour(record.left, record.part.sampling_frequency, fit.frequency) ** 2
     scale = [slow_noise if one.kind == "high_pass" else 1.0 for one in filters]
-    return np.asarray(gains / scale).tolist()
+    return np.asarray(gains / scale).tolist(), certain
+
+
+def _envelopes(cycles: _Array) -> _Array:
+    """Starts of a shaker other than exponentials: linear, gentle and overshooting ones of many lengths, as columns."""
+    found = []
+    for length in np.geomspace(1.0, _START, 12):
+        along = np.minimum(cycles / length, 1.0)
+        found += [along, np.cos(np.pi * along)]
+        for damping in (0.2, 0.4, 0.8):
+            swing = np.pi * cycles / length
+            found += [np.exp(-damping * swing) * np.cos(swing - late) for late in (0.0, math.atan(damping))]
+    return np.column_stack(found)
 
 
 def _clocks(record: Record) -> list[Hypothesis]:

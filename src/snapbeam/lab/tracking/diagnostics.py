@@ -225,15 +225,9 @@ KINDS = table(
     ),
     Kind(
         "camera.frames_exchanged", ERROR,
-        "the striker frame by frame against its steady sine, with frames exchanged and with frames shown again",
+        "striker and beam frame by frame, with frames exchanged and with frames shown again",
         "{frames:.0f} pair(s) of frames are in the wrong order, the first from frame {first:.0f} on: write the images again "
         "in the order of their numbers",
-    ),
-    Kind(
-        "camera.frames_copied", WARNING,
-        "the striker frame by frame against its steady sine, with frames exchanged and with frames shown again",
-        "{frames:.0f} frame(s) show the instant of the frame before, the first is frame {first:.0f}: a copy that was coded "
-        "again, or made by a program that changed the frame rate; keep the frames as they were taken",
     ),
     Kind(
         "camera.time_jump", ERROR,
@@ -243,10 +237,17 @@ KINDS = table(
     ),
     Kind(
         "camera.knocked", ERROR,
-        "the striker's rows before and after each frame, against a jump of the drive's phase",
-        "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked; keep the frames before, or "
-        "give a part with a stationary object (fixed_marks, --fixed-mark)",
+        "the rows of striker and beam before and after each frame, against jumps of the time and of each alone",
+        "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked (or, where beam and striker "
+        "move alike, frames are missing); keep the frames before, or give a part with a stationary object (fixed_marks, "
+        "--fixed-mark)",
         ("fixed_marks",),
+    ),
+    Kind(
+        "camera.jump", ERROR,
+        "the rows of striker and beam before and after each frame, against jumps of the time and of each alone",
+        "beam and striker jump by {beam:.2f} and {striker:.2f} px at frame {first:.0f}: frames are missing, two recordings "
+        "were joined, or the camera was knocked; keep the frames before",
     ),
     Kind(
         "camera.off_its_drive", WARNING,

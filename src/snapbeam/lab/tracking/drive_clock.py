@@ -1,8 +1,8 @@
-"""Order and spacing of frames by the drive: the steady sine of the striker is a clock inside the picture.
+"""Spacing of frames by the drive: the steady sine of the striker is a clock inside the picture.
 
-Each error leaves its own pattern in what the sine leaves: a frame shown again or exchanged with the next one in one or
-two frames, time that jumps (frames lost, recordings joined) a step along the slope of the motion from there on, a camera
-that was knocked a step along the rows.  A pattern is named where it explains more than chance and more than the others.
+Time that jumps (frames lost, recordings joined) leaves a step along the slope of the motion from there on, a camera
+that was knocked a step along the rows.  A step is named where it explains more than chance and more than the other.
+Frames exchanged or shown again are found without a sine, by :mod:`~snapbeam.lab.tracking.frame_order`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.stats import chi2, f
 
 from snapbeam.lab.signals import SignalSamples
@@ -24,12 +23,10 @@ _RATE = 1e-4  # of false alarms of a pattern over a recording with normal noise
 _CYCLES = 4.0  # of steady motion, at least
 _MOST = 3000  # frames of a recording that are looked at
 _LEAST_NOISE = 0.01  # px
-_EXPLAINS = 0.8  # of what one or two frames are off that a pattern must explain
 _SURER = 10.0  # chi-square by which one kind of step must explain more than the other
 _FRAMES, _PIXELS = 0.3, 0.2  # that a step is at least
 _JITTER = 0.05  # frames
 _MEDIAN = 2.7  # times as many squares a median needs for the error of a mean
-_NEIGHBOURS = 9  # frames about one
 _FADING = (0.05, 0.2)  # time constants of a start that is not over, over the length
 _BLOCK = 8  # frames, for noise that is alike in neighbours
 
@@ -55,7 +52,7 @@ def steady_striker(shaker: Floats) -> tuple[SignalSamples, SineFit] | None:
 
 
 def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
-    """Kinds and numbers of what is wrong with the order of the frames, from the rows [px] of the striker."""
+    """Kinds and numbers of what is wrong with the times of the frames, from the rows [px] of the striker."""
     steady = steady_striker(shaker)
     if steady is None:
         return []
@@ -67,32 +64,7 @@ def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
     if told:
         return told
     noise = max(1.4826 * float(np.median(np.abs(np.diff(off, 2)))) / math.sqrt(6.0), _LEAST_NOISE)
-    # a start that is not over leaves a slow residual; frames out of order are alone among their neighbours
-    alone = off - median_filter(off, _NEIGHBOURS, mode="nearest")
-    whole = max(1.4826 * float(np.median(np.abs(off))), noise)
-    return _frames(off, alone, wave, whole, first) or _steps(part, off, noise, fit.frequency)
-
-
-def _frames(off: Floats, alone: Floats, wave: Floats, noise: float, first: int) -> list[tuple[str, dict[str, float]]]:
-    """Frames shown again, and frames exchanged with the next, from the residual and that without its slow part."""
-    before, after = wave[:-2] - wave[1:-1], wave[2:] - wave[1:-1]
-    limit = float(chi2.isf(_RATE / off.size, 1)) * noise**2
-    again = off**2 - (off - before) ** 2
-    pair = off[:-1] ** 2 + off[1:] ** 2
-    turned = pair - (off[:-1] - after[:-1]) ** 2 - (off[1:] - before[1:]) ** 2
-    told: list[tuple[str, dict[str, float]]] = []
-    exchanged = (turned > limit) & (turned > _EXPLAINS * pair) & (off[:-1] ** 2 > 0.2 * pair)
-    exchanged &= off[1:] ** 2 > 0.2 * pair
-    shown = (again > limit) & (again > _EXPLAINS * off**2)
-    own = alone**2 > 0.5 * off**2
-    shown &= own
-    exchanged &= own[:-1] & own[1:]
-    shown[:-1] &= ~exchanged
-    shown[1:] &= ~exchanged
-    for kind, found in (("frames_exchanged", exchanged), ("frames_copied", shown)):
-        if found.any():
-            told.append((kind, {"frames": int(found.sum()), "first": first + int(np.argmax(found))}))
-    return told
+    return _steps(part, off, noise, fit.frequency)
 
 
 def _steps(part: SignalSamples, off: Floats, noise: float, frequency: float) -> list[tuple[str, dict[str, float]]]:

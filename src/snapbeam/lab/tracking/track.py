@@ -95,7 +95,7 @@ def tracked_dataset(
             order = find_order(*(np.where(blurred, np.nan, one) for one in (rows.row, steady * rows.shaker)))
             rows = without_repeats(rows, order)
             clock = tuple(drive_clock(steady * rows.shaker))
-        order = order._replace(clock=clock)
+        order = order._replace(clock=order.clock or clock)
     beam_mm = settings.rest * 1e3 - turn.sign * scale * (rows.row - rest.row)
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
     shaker_mm = settings.rest * 1e3 - turn.sign * scale * (tip - beam.thickness - rest.row)
