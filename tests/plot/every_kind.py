@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 
 import snapbeam as sb
-from snapbeam import lab
 from snapbeam.model import default_values
 from snapbeam.util.datasets import xr
 
@@ -40,14 +39,6 @@ def _branch() -> sb.dynamics.Branch:
 def _curve() -> xr.Dataset:
     fold, names = _branch().special_points[0], ("frequency_ratio", "velocity_amplitude")
     return sb.dynamics.bifurcation_curve(fold, names, ((1.5, 1.7), (0.02, 0.1)), max_points=5)
-
-
-def _response() -> xr.Dataset:
-    force = np.random.default_rng(0).standard_normal(4000)
-    motion = 0.002 * np.convolve(force, np.exp(-np.arange(80) / 20.0) * np.cos(0.4 * np.arange(80)))[: force.size]
-    motion += 0.001 * np.random.default_rng(1).standard_normal(force.size)
-    signals = lab.make_signal(force, "N", 2000.0), lab.make_signal(motion, "m", 2000.0)
-    return lab.frequency_response(*signals)
 
 
 def _equilibria() -> xr.Dataset:
@@ -119,6 +110,13 @@ def _saddle() -> sb.dynamics.PeriodicOrbit:
     return sb.dynamics.periodic_orbit(SYSTEM, [0.0, 0.0])
 
 
+def _over_seeds() -> xr.Dataset:
+    motion = sb.RecordedAcceleration.from_psd([(20, 0.01), (200, 0.01)], duration_s=0.5, ramp_up_s=0.05)
+    shaken = sb.System(SYSTEM.model, base_excitation=sb.BaseExcitation(motion=motion))
+    axes = {"base_excitation.rms_g": [0.1, 0.2, 0.3], "base_excitation.seed": [0, 1, 2]}
+    return sb.mean_over_seeds(sb.sweep(shaken, axes, sb.Integration(cycles=10)))
+
+
 QUICK: dict[str, Callable[[], xr.Dataset]] = {
     "run": lambda: sb.simulate(CHAOTIC.replace(**{"model.modes": 3}), SHORT).dataset,
     "map": lambda: sb.sweep(SYSTEM, PLANE, SHORT)[["response_class", "peak_force"]],
@@ -140,6 +138,7 @@ QUICK: dict[str, Callable[[], xr.Dataset]] = {
     "orbit": lambda: sb.dynamics.periodic_orbit(SYSTEM, transient=100).to_dataset(),
     "backbone": lambda: sb.dynamics.backbone_curve(sb.System(SYSTEM.model), max_points=20),
     "posterior": _posterior,
+    "means over seeds": _over_seeds,
     "probability map": lambda: sb.uncertainty.probability_map(
         CHAOTIC, {key: values[1:4] for key, values in PLANE.items()}, MOVING, 12, integration=SHORT
     ),
@@ -174,7 +173,6 @@ SLOW: dict[str, Callable[[], xr.Dataset]] = {
     "force-displacement curve": lambda: sb.force_displacement(SYSTEM),
     "growth of a perturbation": lambda: sb.perturbation_growth(CHAOTIC, SHORT),
     "bifurcation curve": _curve,
-    "frequency response": _response,
     "estimated density": lambda: sb.RecordedAcceleration.from_psd("NAVMAT P-9492", duration_s=2.0).estimated_psd(),
     "equilibrium branches": _equilibria,
     "displacement field": _field,

@@ -400,7 +400,7 @@ class System:
         Parameters
         ----------
         equilibrium : Equilibrium, {"lower", "upper"} or int, optional
-            As in :meth:`poles`.
+            Equilibrium or well, as in :meth:`poles`.
 
         Returns
         -------

@@ -31,7 +31,7 @@ _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 
 
 CONTENTS = ("samples", "waveforms", "statistics")
-"""What a file of a run has of its samples: all, the series without those of modes, or none."""
+"""Contents of a file: all samples of a run, the series without those of modes, or none."""
 
 
 def save_run(run: Run, path: str | os.PathLike[str], content: str = CONTENTS[0]) -> None:
