@@ -61,6 +61,7 @@ def test_help_loads_no_scipy():
     assert not loaded_by("--help") & {"scipy", "matplotlib", "pandas", "xarray"}
 
 
+@pytest.mark.slow
 def test_a_run_that_is_written_and_drawn_loads_no_arrays_of_other_libraries(tmp_path):
     files = ("-o", str(tmp_path / "run.nc"), "--plot", str(tmp_path / "run.png"), "--window", "0:2")
     loaded = loaded_by("simulate", "--modes", "2", "--cycles", "3", "--quiet", *files)

@@ -144,6 +144,7 @@ def works_without(part: str, copy: Path) -> None:
         assert not re.search(rf"^\W*{command} ", shown, re.MULTILINE), command
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", PARTS)
 def test_works_without_a_part(tmp_path: Path, part: str) -> None:
     works_without(part, without(part, tmp_path))

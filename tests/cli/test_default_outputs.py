@@ -78,6 +78,7 @@ def test_every_default_output_is_in_the_list():
     assert {name for command in _COMMANDS for name in defaults(commands[command])} == set(COMMANDS)
 
 
+@pytest.mark.slow
 def test_a_result_of_the_same_parameters_is_replaced(run):
     """However they are given, and whatever is drawn; another file is named, or forced."""
     assert run(*MAP) == (0, "")

@@ -68,6 +68,7 @@ def test_other_commands_ask_for_room_too(monkeypatch, tmp_path):
         assert done.exit_code == 2 and "plot = 'a.png': needs some 0.035 MB" in said(done), done.output
 
 
+@pytest.mark.slow
 def test_no_figure_is_smaller_than_its_estimate(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     for suffix in (".png", ".pdf", ".svg"):

@@ -90,6 +90,7 @@ def test_only_regular_files_are_written(tmp_path, monkeypatch, kind):
             check_writable(target, appended=appended)
 
 
+@pytest.mark.slow
 def test_commands_refuse_a_pipe_before_the_work(tmp_path, tmp_path_factory):
     lines = [
         [*RUN, "-o", "pipe.nc"],

@@ -330,6 +330,7 @@ def judged_of(kind, k):
     return random_signals.judged_decay(np.random.default_rng((7, random_signals.hash_of(kind), k)), kind)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "code"), [("shaker touches", "touches"), ("frequency creeps", "frequency_drift")])
 def test_a_course_is_told_from_its_alternatives(kind, code):
     outcomes = [judged_of(kind, k) for k in range(8)]

@@ -13,6 +13,7 @@ from snapbeam.lab.decay.model import CURVE, DampingLaw, envelope
 RISING = ("exponential", "root", "rational", "tanh", "logarithm", "cubic")
 
 
+@pytest.mark.slow
 def test_damping_by_a_law_of_no_list_is_within_the_standard_error_at_zero_amplitude():
     """By laws of a list alone nearly all of them were off by 3 to 35 standard errors, or two modes."""
     places = [k for k in range(27) if tuple(random_damping.LAWS)[k % len(random_damping.LAWS)] in RISING]

@@ -67,6 +67,7 @@ def test_the_dataset_of_a_sweep_draws_itself() -> None:
     assert table.snapbeam.plot("peak_force").get_ylabel() == "Peak contact force (N)"
 
 
+@pytest.mark.slow
 def test_a_stored_run_draws_itself_in_a_program_that_imports_snapbeam_alone(tmp_path) -> None:
     sb.simulate(SMALL, sb.Integration(cycles=2)).save(tmp_path / "run.nc")
     script = (

@@ -50,6 +50,7 @@ def test_a_command_without_memory_says_so_in_one_line(command, megabytes, tmp_pa
     assert [name for name in os.listdir(tmp_path) if name not in ("a.nc", "a.png")] == []
 
 
+@pytest.mark.slow
 def test_the_memory_that_is_named_suffices(tmp_path):
     words = COMMANDS["run"]
     said = limited(words, 300, tmp_path).stderr

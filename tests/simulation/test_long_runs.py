@@ -56,6 +56,7 @@ def test_the_bound_grows_with_steps_and_modes():
     assert not long_run(1, 1e-5, 1e6, "") and long_run(1, 1e-5, float("inf"), "")
 
 
+@pytest.mark.slow
 def test_the_command_says_it_before_the_run(tmp_path):
     words = ["simulate", "--modes", "1", "--cycles", "50000", "--contact-stiffness", "1e15", "-o", "a.nc"]
     with subprocess.Popen(

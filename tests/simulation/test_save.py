@@ -158,6 +158,7 @@ def test_a_long_run_is_compressed(tmp_path) -> None:
     assert (tmp_path / "run.nc").stat().st_size < run.dataset.nbytes
 
 
+@pytest.mark.slow
 def test_refusals(tmp_path) -> None:
     run = sb.simulate(SYSTEM, sb.Integration(cycles=1))
     with pytest.raises(InputError, match=r"must end in \.nc"):

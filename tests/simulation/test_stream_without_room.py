@@ -56,6 +56,7 @@ def in_pieces(monkeypatch):
     monkeypatch.setattr(native, "_SAMPLES", 4096)
 
 
+@pytest.mark.slow
 def test_a_run_ends_at_the_last_whole_piece(tmp_path, monkeypatch, system):
     in_pieces(monkeypatch)
     settings = sb.Integration(cycles=300, early_termination=False)
@@ -102,6 +103,7 @@ main()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 @pytest.mark.parametrize(("limit", "kept"), [(6 * 2**20, True), (100_000, False)])
 def test_a_limit_of_the_size_of_files(tmp_path, limit, kept):

@@ -111,7 +111,7 @@ def slopes_of(
     return here, exact, found, doubt
 
 
-@pytest.mark.parametrize("accuracy", LIMIT)
+@pytest.mark.parametrize("accuracy", ["standard", pytest.param("reference", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_derivatives_of_statistics(kind: str, accuracy: str) -> None:
     make, names = SYSTEMS[kind]

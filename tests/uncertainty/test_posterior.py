@@ -49,6 +49,7 @@ def test_intervals_cover() -> None:
     assert counted.trials == 400 and 0.93 <= counted.all <= 0.97, counted
 
 
+@pytest.mark.slow
 def test_a_search_that_does_not_converge_keeps_its_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     from snapbeam.uncertainty import posterior
 

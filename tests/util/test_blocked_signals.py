@@ -41,6 +41,7 @@ BODIES = {
 }
 
 
+@pytest.mark.slow
 def test_calls_that_do_not_end(tmp_path):
     """All at once, since the program waits for some seconds before it gives a call up."""
     begun = []

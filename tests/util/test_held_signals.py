@@ -99,6 +99,7 @@ def system():
     )
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("method", ["write", "seek", "truncate", "close"])
 @pytest.mark.parametrize("write", [written, streamed, swept, saved], ids=lambda write: write.__name__)

@@ -50,6 +50,7 @@ def test_a_video_whose_codec_is_not_known(tmp_path):
         lab.open_recording(path, frame_rate=1e4, pixel_size=1e-5)
 
 
+@pytest.mark.slow
 def test_output_in_ascii(tmp_path):
     environment = os.environ | {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
     done = subprocess.run(
@@ -100,6 +101,7 @@ threading.Thread.start = start
 """
 
 
+@pytest.mark.slow
 def test_threads_that_cannot_start(tmp_path):
     """A command that needs none goes on, and one that does says so."""
     assert run_python(NO_THREADS + PROGRAM, "equilibria", cwd=tmp_path).returncode == 0
@@ -133,6 +135,7 @@ sb.write_netcdf(data, "c.nc")
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of a process")
 def test_no_descriptors(tmp_path):
     done = run_python(NO_DESCRIPTORS, cwd=tmp_path)
@@ -159,6 +162,7 @@ except OSError as error:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pages", [0, 1, 5])
 def test_a_file_for_which_there_is_no_memory(tmp_path, pages):
     """An error inside a callback of HDF5 would end the process with a segmentation fault."""

@@ -38,6 +38,7 @@ def test_the_first_faults_of_many_are_listed(sections):
     assert len(lines) == 31 and lines[-1] == "more than 30 faults: these are the first"
 
 
+@pytest.mark.slow
 def test_info_shows_attributes_and_names_as_text(tmp_path):
     about = "b\x1b]0;title\x07[/bold][red]"
     data = xr.Dataset({"x[red]": ("n", [1.0], {"long_name": about, "units": "[/]"})}, attrs={"key[/]\x9b": about})
@@ -50,6 +51,7 @@ def test_info_shows_attributes_and_names_as_text(tmp_path):
     assert r"key[/]\x9b" in done.stdout and "x[red]" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_missing_file_with_a_hostile_name(tmp_path):
     command = [sys.executable, "-m", "snapbeam", "info", "no\x1b[31m.nc"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
