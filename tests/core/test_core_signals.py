@@ -217,7 +217,7 @@ def test_a_derivative_by_a_users_motion(monkeypatch):
     monkeypatch.setitem(DRIVES, "own_cycle", OwnCycle)
     flow = Stroboscope(driven(OwnCycle(height=1e-4), 2), sb.Integration(accuracy="reference"))
     x = flow.advance(flow.coordinates(), 9).states[0]
-    found = flow.slope(x, 2, "drive.height", 1e-4, 1e-9)
+    found = flow.slope(x, 2, {"drive.height": 1e-4}, "drive.height", 1e-9)
     ends = [
         flow.advance(x[None], 2, points={"drive.height": np.array([at])}).states[0] for at in (1e-4 + 3e-9, 1e-4 - 3e-9)
     ]

@@ -199,7 +199,7 @@ def test_derivatives_by_parameters(part: str, name: str) -> None:
         beside = flow.advance(np.repeat(x[None], len(rows), axis=0), 2, points={name: value * rows[:, 0]})
         return beside.states, beside.statistics["impacts"]
 
-    found = flow.slope(x, 2, name, value, 1e-5 * value)
+    found = flow.slope(x, 2, {name: value}, name, 1e-5 * value)
     expected, error = differences(advance_rows, np.ones((1, 1)), np.ones((1, 1, 1)))
     assert error.max() < 1e-6
     np.testing.assert_allclose(found * value, expected[0, 0], rtol=0.0, atol=1e-6 * np.abs(expected).max())
