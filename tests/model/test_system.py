@@ -351,6 +351,14 @@ def test_another_number_of_modes_keeps_the_start() -> None:
     assert system.replace(**{"model.modes": 5}).replace(**{"model.modes": 3}) == system
 
 
+def test_names_are_those_of_the_axes_of_maps() -> None:
+    changed = PLAIN.replace(modes=4, velocity_amplitude=0.31)
+    assert changed.model.modes == 4 and changed.parameters["drive.velocity_amplitude"] == 0.31
+    assert changed.to_mapping() == PLAIN.replace(**{"model.modes": 4, "drive.velocity_amplitude": 0.31}).to_mapping()
+    with pytest.raises(InputError, match="velocity_amp: is not a parameter; did you mean"):
+        PLAIN.replace(velocity_amp=0.3)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -359,7 +367,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
             {"nothing.x": 1.0},
             r"nothing\.x: is not a parameter of a system; its sections are beam, model, boundary, imperfection, contact",
         ),
-        ({"modes": 3}, "modes: is not a parameter of a system"),
+        ({"mode": 3}, "mode: is not a parameter; did you mean"),
         (
             {"contact.coefficient": 0.5},
             r"contact\.coefficient: is not a parameter of this system; must be one of stiffness",

@@ -313,7 +313,7 @@ _MOVED = {"base_excitation": BaseExcitation, "axial_load": AxialLoadModulation}
 """Parts with a motion, by the section of a system."""
 _TUPLES = {"contact": "contacts", "force": "forces", "harvester": "harvesters"}
 """Parts of a system that are tuples, by the section of one of them."""
-_PARTS = ("model", "base_excitation", "axial_load", "initial_state", "initial_well", *_TUPLES.values())
+PARTS = ("model", "base_excitation", "axial_load", "initial_state", "initial_well", *_TUPLES.values())
 
 
 def resolved(name: str, labels: Mapping[str, Sequence[str]]) -> str:
@@ -360,13 +360,13 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     inside: dict[str, dict[str, Any]] = {}
     for name, value in changes.items():
         section, field = split_name(name)
-        if numbered(section)[0] not in (*SECTIONS, *_PARTS):
+        if numbered(section)[0] not in (*SECTIONS, *PARTS):
             raise InputError(f"{name}: is not a parameter of a system; its sections are {', '.join(SECTIONS)}")
         if field:
             inside.setdefault(section, {})[field] = value
         else:
             whole[section] = value
-    found = dict(parts) | {name: whole[name] for name in _PARTS if name in whole}
+    found = dict(parts) | {name: whole[name] for name in PARTS if name in whole}
     for name, other in (("initial_state", "initial_well"), ("initial_well", "initial_state")):
         if whole.get(name) is not None and other not in whole:  # a new start replaces the other one
             found[other] = None

@@ -25,9 +25,9 @@ from snapbeam.model.equilibria import Equilibrium
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.local_force import LocalForce
-from snapbeam.model.mapping import nested, parts_from_mapping, parts_to_mapping, replaced, resolved, sequence_of
+from snapbeam.model.mapping import PARTS, nested, parts_from_mapping, parts_to_mapping, replaced, resolved, sequence_of
 from snapbeam.model.parameter_axes import ratios_of, to_physical
-from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, named_in, ratio_of
+from snapbeam.model.parameters import PHYSICAL, SECTIONS, Parameter, lookup, named_in, ratio_of
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import section_of
 from snapbeam.model.reduced_model import ReducedModel
@@ -163,8 +163,8 @@ class System:
     def replace(self, **changes: Any) -> System:
         """A neighbour: the same system with parameters changed by dotted name.
 
-        Names are those of the table of parameters (:func:`snapbeam.model.parameters.parameters`), such as
-        ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``contact.location`` and ``drive.frequency_ratio``.
+        Names are those of the table of parameters (:func:`snapbeam.model.parameters.parameters`), as :func:`snapbeam.sweep`
+        takes them: ``velocity_amplitude``, ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``contact.location`` and ``drive.frequency_ratio``.
         Those of the second contact, its drive or the second force have its number, ``contact.2.gap``,
         ``drive.2.frequency_ratio``, or its label, ``contact.stop.gap``.  Whole parts are ``beam``, ``model``, ``contacts``,
         ``forces``, ``base_excitation``, ``axial_load``, ``harvesters``, ``initial_state`` and ``initial_well``; one of several is ``contact``,
@@ -172,7 +172,7 @@ class System:
         """
         prefix = "initial_state."
         parts = {item.name: getattr(self, item.name) for item in fields(self)}
-        changes = {resolved(name, self.labels): value for name, value in changes.items()}
+        changes = {resolved(self._full_name(name), self.labels): value for name, value in changes.items()}
         in_units = {name: changes.pop(name) for name in [*changes] if name in PHYSICAL}
         if in_units:  # of the structure as changed
             found = self.replace(**changes)
@@ -195,6 +195,12 @@ class System:
             raise InputError(f"{name}: is not a parameter of this system; it has {', '.join(found)}")
         value = found[ratio_of(name)]
         return float(to_physical(self, name, value)) if name in PHYSICAL else value
+
+    def _full_name(self, name: str) -> str:
+        """The dotted name of a parameter whose last part was given; names of sections and parts as they are."""
+        if "." in name or name in (*SECTIONS, *PARTS):
+            return name
+        return self.parameter(name).name
 
     def parameter(self, name: str) -> Parameter:
         """The row of the table of parameters of a name: dotted, by label, as in datasets, or its last part alone.
