@@ -41,8 +41,8 @@ _SECTIONS = {
     "drive": "The motion of the striker, selected by `type`: {drives}. "
     "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples can have `file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest. "
-    "Keys that are not in the second table are those of [`[drive]`](#drive), with the same unit, limits, default and level; in datasets their names "
-    "begin with `base_excitation_`. [Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples or a spectrum can have "
+    "Keys that are not in the second table are those of [`[drive]`](#drive), with the same unit, limits, default and level. "
+    "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples or a spectrum can have "
     "`file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
     "constant.",
@@ -93,9 +93,9 @@ def parameter_tables() -> str:
     of_drives: dict[str, tuple[str, ...]] = {}
     for section, words in _SECTIONS.items():
         rows = []
-        for name, row in parameters().items():
-            if row.section != section:
-                continue
+        own = {name: row for name, row in parameters().items() if row.section == section}
+        prefixed = all(row.short.startswith(f"{section}_") for row in own.values())
+        for name, row in own.items():
             default = given.get(name, row.default)
             shown = "" if default is None or row.quantity.kind is object else _number(default)
             unit = "" if row.quantity.unit == "1" else row.quantity.unit
@@ -103,22 +103,20 @@ def parameter_tables() -> str:
             limits = row.limits.replace("inf", "∞")
             key = name.partition(".")[2]
             meaning = row.quantity.long_name + (f", {symbol}" if symbol else "")
-            meaning += f"; in datasets `{row.short}`" if row.short != key else ""
-            owners = ", ".join(f"`{each}`" for each, kind in types.get(section, {}).items() if key in _keys(kind))
+            usual = f"{section}_{key}" if prefixed else key
+            meaning += f"; in datasets `{row.short}`" if row.short != usual else ""
             level = "run" if row.is_run else "model"
-            rows.append((f"`{key}`", meaning, unit, limits, shown or "–", level, owners))
+            rows.append((f"`{key}`", meaning, unit, limits, shown or "–", level))
         keys = [row[0] for row in rows]
         if section == "drive":
             of_drives = {row[0]: row[2:6] for row in rows}
         elif section == "base_excitation":  # a motion of the base has the keys of that of a tip
             rows = [row for row in rows if of_drives.get(row[0]) != row[2:6]]
-        header = ["key", "meaning", "unit", "allowed", "default", "level", "types"]
-        if not any(row[-1] for row in rows):
-            header, rows = header[:-1], [row[:-1] for row in rows]
-        text = f"## [{section}]\n\n{words.format(**listed)}\n\n"
+        note = f" In datasets their names begin with `{section}_`." if prefixed else ""
+        text = f"## [{section}]\n\n{words.format(**listed)}{note}\n\n"
         if section in types:
             text += _keys_by_type(types[section], keys) + "\n"
-        parts.append(text + _table(header, rows))
+        parts.append(text + _table(("key", "meaning", "unit", "allowed", "default", "level"), rows))
     return "\n".join([*parts, _physical()])
 
 

@@ -1,6 +1,6 @@
 """Records of a shaker with starts and noise of many kinds, good and behind a high-pass filter, and what is told of them.
 
-``python tests/lab/random_starts.py GOOD FILTERED [SEED]`` prints the rates of ``docs/experiment.md``, of the
+``python tests/lab/random_starts.py GOOD FILTERED [SEED]`` prints the rates of ``docs/data/verification.md``, of the
 seed 811 that no rule was set with.
 """
 
