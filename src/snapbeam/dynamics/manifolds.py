@@ -482,7 +482,7 @@ def homoclinic_tangency(
         Width of the bracket over that of *bounds*, between 1e-9 and 0.5.
     max_seconds : float, optional
         Time after which the search ends with the bracket that it has, s; no limit by default.  Each value takes the time of two
-        manifolds, minutes for a beam.
+        manifolds, about ten seconds for a struck beam.
     progress : callable, optional
         Called as ``progress(share)`` with the share of the values; True writes a line with the time left to standard error.
 
