@@ -167,13 +167,7 @@ Law = Annotated[
 
 
 def import_laws(given: Sequence[str] | None) -> None:
-    """Execute Python files of the user's own, which register the laws that they define.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be executed, or does not define the class that is named.
-    """
+    """Execute Python files of the user's own, which register the laws that they define."""
     import importlib.util
     import sys
 
@@ -838,13 +832,7 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
 
 
 def coordinate_on_axis(dataset: xr.Dataset, option: str, text: str) -> tuple[str, Any]:
-    """The axis of a map and the value on it that ``name=value`` names, in the axis' own unit or as a physical value.
-
-    Raises
-    ------
-    InputError
-        If the map has no such axis, or the value is no number in its unit.
-    """
+    """The axis of a map and the value on it that ``name=value`` names, in the axis' own unit or as a physical value."""
     from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.model.parameters import PHYSICAL, lookup, named_in, ratio_of
     from snapbeam.model.quantity import split_name

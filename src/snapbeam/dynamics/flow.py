@@ -144,12 +144,7 @@ def leaving(system: System, rest: State, begun: State, location: ArrayLike | Non
 
 
 def starts_of(given: InitialConditions | int) -> InitialConditions:
-    """Starts, or that many of them.
-
-    Raises
-    ------
-    InputTypeError
-    """
+    """Starts, or that many of them."""
     if isinstance(given, InitialConditions):
         return given
     if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, np.integer)):

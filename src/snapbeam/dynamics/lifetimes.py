@@ -410,12 +410,7 @@ def lifetime_map(
 
 
 def require_excitation(system: System) -> None:
-    """Refuse a system that nothing drives.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a system that nothing drives."""
     if not system.moving:
         raise InputError(
             "contacts = []: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "

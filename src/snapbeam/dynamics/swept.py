@@ -334,13 +334,7 @@ def hysteresis(
 
 
 def _restarts(system: System) -> bool:
-    """Return True if an excitation does not repeat, so that every excitation restarts at each value.
-
-    Raises
-    ------
-    InputError
-        If a tip moves then.
-    """
+    """Return True if an excitation does not repeat, so that every excitation restarts at each value."""
     motions = frequencies_of(system, run_columns(system, {}))
     single = [(section, drive) for section, drive, rates in motions if rates is None]
     if not single:

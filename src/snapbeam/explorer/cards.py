@@ -870,13 +870,7 @@ class SystemCard:
         return typed(name, value) if value.strip() else None
 
     def changed_fields(self) -> dict[str, Any]:
-        """Parameters whose fields were changed, by dotted name; of another contact law all, None for those of the old one.
-
-        Raises
-        ------
-        InputError
-            For what is no number, and for values out of range.
-        """
+        """Parameters of changed fields, by dotted name; of another contact law all, None for those of the old one."""
         found = {name: self._typed(name) for name in self._edited()}
         if self.law.value != self._law:
             law = [row.name for row in parameters().values() if _group(row) == "contact"]

@@ -117,13 +117,7 @@ class Jobs:
 
     @contextmanager
     def turn(self, token: Token) -> Iterator[None]:
-        """The turn of one batch of a window: windows of several pages take turns, first come, first served.
-
-        Raises
-        ------
-        Cancelled
-            If the window was cancelled while it waited.
-        """
+        """The turn of one batch of a window: windows of several pages take turns, first come, first served."""
         ticket = object()
         with self._turns:
             self._queue.append(ticket)
@@ -277,13 +271,7 @@ def too_large(name: str, size: int) -> str:
 
 
 def check_run(system: System, integration: Integration) -> None:
-    """Refuse a run that one page may not ask for.
-
-    Raises
-    ------
-    InputError
-        For too many modes or cycles.
-    """
+    """Refuse a run that one page may not ask for."""
     if system.model.modes > MODES:
         raise InputError(f"model.modes = {system.model.modes}: a page may ask for at most {MODES}")
     if integration.cycles_or_default > CYCLES:

@@ -303,13 +303,7 @@ _MAPS = ("map", "probability map", "lifetimes")
 
 
 class ResultSource(Source):
-    """A result that is no map: what ``snapbeam plot`` draws of it, and its run if it is one.
-
-    Raises
-    ------
-    InputError
-        If it is no result that has a figure.
-    """
+    """A result that is no map: what ``snapbeam plot`` draws of it, and its run if it is one."""
 
     def __init__(self, dataset: xr.Dataset, name: str = "result", run: sb.Run | None = None) -> None:
         try:
@@ -359,13 +353,7 @@ def _axes_of(skeleton: xr.Dataset) -> list[str]:
 
 
 def default_axes(system: sb.System) -> dict[str, Any]:
-    """Two axes over a system: frequency and amplitude of its excitation, else the first parameters that it has.
-
-    Raises
-    ------
-    InputError
-        If a run of the system has fewer than two parameters.
-    """
+    """Two axes over a system: frequency and amplitude of its excitation, else the first parameters that it has."""
     from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.model.parameter_file import DEFAULT_AXES
 
@@ -528,13 +516,7 @@ def brief(value: Any, other: Any = None) -> str:
 
 
 def system_of(attrs: Mapping[str, Any], name: str) -> sb.System:
-    """System stored in a map.
-
-    Raises
-    ------
-    InputError
-        If it does not say it, or it was driven by a record, which is too long to be kept in a file.
-    """
+    """System stored in a map."""
     text = attrs.get("system")
     if not isinstance(text, str):
         raise sb.InputError(f"{name}: does not hold the system that it was computed of")
@@ -891,13 +873,7 @@ class Scatter(_Cut):
 
     @classmethod
     def of(cls, source: Source, x: str, y: str) -> Scatter:
-        """A list of points along two parameters.
-
-        Raises
-        ------
-        InputError
-            If its points have no such parameters.
-        """
+        """A list of points along two parameters."""
         cls.check(source, x, y)
         size = source.skeleton.sizes[POINT]
         return cls(source, Axis.scattered(source, x, size), Axis.scattered(source, y, size), {})

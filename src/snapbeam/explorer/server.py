@@ -209,11 +209,6 @@ def make_server(
 
     The address contains the token, a random one unless given.  Port None is 8760 or, if that is in use, the next
     free one; 0 is any free port.
-
-    Raises
-    ------
-    InputError
-        For an address beyond this machine that was not allowed, and for a port in use.
     """
     if not is_loopback(address) and not allow_remote:
         raise InputError(

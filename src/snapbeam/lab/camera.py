@@ -287,11 +287,6 @@ def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
         Grey levels over rows, shape (n, rows).
     reference
         The same where nothing has moved, shape (rows,).
-
-    Raises
-    ------
-    InputError
-        If the reference is too short or too even to show a shift.
     """
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import gaussian_filter1d

@@ -93,13 +93,7 @@ class BaseExcitation:
 
 
 def rigid_mass(model: ReducedModel) -> NDArray[np.float64]:
-    """rho S integral(phi_i), kg m^-0.5, or m r of a structure given by matrices, shape (N,): what a base accelerates.
-
-    Raises
-    ------
-    InputError
-        For a structure given by matrices without a base_shape.
-    """
+    """rho S integral(phi_i), kg m^-0.5, or m r of given matrices, shape (N,): what a base accelerates."""
     beam = model.beam
     if beam is None:
         if model.base_shape is None:

@@ -278,13 +278,7 @@ class Condensed(NamedTuple):
 
 
 def condensed(stiffness: _Array, force: _Array, elongation: _Array) -> Condensed:
-    """Eliminate the coordinates that do not change the elongation alpha . S alpha, by static condensation.
-
-    Raises
-    ------
-    InputError
-        If the stiffness of these coordinates is singular.
-    """
+    """Eliminate the coordinates that do not change the elongation alpha . S alpha, by static condensation."""
     full = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
     value, axes = np.linalg.eigh(elongation)
     stretched = value > 1e-12 * value[-1]
@@ -312,11 +306,6 @@ def landscape_of(
 
     At most two of them are stable: beyond the second eigenvalue of K0 + gamma s the term 2 gamma alpha alpha^T, of rank
     one, cannot make up for two negative ones.
-
-    Raises
-    ------
-    InputError
-        If no equilibrium is stable, or the wells do not differ at mid-span.
     """
     found = []
     if elongation is None:

@@ -42,13 +42,7 @@ _STEPS = 60
 
 
 def spring_natural_frequency(beam: Beam, count: int, reduced: _Array) -> _Array:
-    """The first *count* frequencies, Hz, near those of a reduced model, which are upper bounds of them.
-
-    Raises
-    ------
-    InputError
-        If one is not found near the value of the reduced model.
-    """
+    """The first *count* frequencies, Hz, near those of a reduced model, which are upper bounds of them."""
     balance = _balance_of(beam)
     found: list[float] = []
     for at in range(count):

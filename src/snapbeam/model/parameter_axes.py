@@ -53,11 +53,6 @@ def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool =
     Returns
     -------
     float or array of shape (points,)
-
-    Raises
-    ------
-    InputError
-        If it cannot be read so, is not finite, or does not increase.
     """
     instance("name", name, str, "text")
     flag("whole", whole)
@@ -152,13 +147,7 @@ def from_physical(system: System, name: str, value: ArrayLike) -> Any:
 
 
 def checked_physical(system: System, name: str, value: float, shown: str) -> float:
-    """The ratio that a value in the physical unit of *name* is, refused, with the name *shown*, where it cannot be.
-
-    Raises
-    ------
-    InputError
-        If the ratio is out of its range; the message contains both.
-    """
+    """The ratio that a value in the physical unit of *name* is, refused, with the name *shown*, where it cannot be."""
     ratio, row = float(from_physical(system, name, value)), lookup(PHYSICAL[name].parameter)
     short = split_name(row.name)[1]
     try:

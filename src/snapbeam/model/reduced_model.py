@@ -144,11 +144,6 @@ def linear_modes_about(
     """Linear modes about the equilibrium alpha of a tangent stiffness; each parity by itself where the tangent does not couple the two.
 
     *magnitude* is the sum of the moduli of its terms, from which rounding follows.  Rigid modes have the frequency 0.
-
-    Raises
-    ------
-    InputError
-        If an eigenvalue is negative, or if rounding hides whether one is 0.
     """
     count = mass.shape[0]
     odd = np.zeros(count, dtype=bool) if parity is None else parity < 0

@@ -20,11 +20,6 @@ def checked_request(system: Any, integration: Any) -> tuple[System, Integration]
     system : System
     integration : Integration or None
         None selects the default settings.
-
-    Raises
-    ------
-    InputError
-        If an argument has the wrong type, or nothing in the system can move.
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")

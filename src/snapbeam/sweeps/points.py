@@ -182,11 +182,6 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any, system: System | None
         The system that the names belong to.  Values in Hz, m/s, g, um or m become ratios of it.  Where another axis
         changes the structure, and with it the unit of a ratio, they stay as they are given;
         :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
-
-    Raises
-    ------
-    InputError
-        For unknown names, parameters that cannot be swept, and values out of range.
     """
     from snapbeam.util.datasets import xr
 
@@ -303,13 +298,7 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
 
 
 def _is_label(name: str) -> bool:
-    """Return whether a column of a table of points is a label, not a parameter.
-
-    Raises
-    ------
-    InputError
-        For a name that is almost the name of a parameter.
-    """
+    """Return whether a column of a table of points is a label, not a parameter."""
     table = parameters()
     known = [*table, *short_names(), *(split_name(full)[1] for full in (*table, *PHYSICAL))]
     if name in known:

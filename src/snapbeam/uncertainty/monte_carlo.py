@@ -260,13 +260,7 @@ class Trials:
 
 
 def _folder(path: Path) -> Path:
-    """The folder of a store of rounds, made where it is not there.
-
-    Raises
-    ------
-    InputError
-        If it cannot be one, or holds a sweep.
-    """
+    """The folder of a store of rounds, made where it is not there."""
     if path.exists() and not path.is_dir():
         raise InputError(f"checkpoint = {str(path)!r}: is a file; must be a folder")
     if not path.absolute().parent.is_dir():
@@ -307,12 +301,7 @@ def trials_of(
     early: bool = True,
     statistics: Iterable[str] = (),
 ) -> Trials:
-    """Check what is sampled of a system; with *statistics*, which need whole runs, none ends early.
-
-    Raises
-    ------
-    InputError
-    """
+    """Check what is sampled of a system; with *statistics*, which need whole runs, none ends early."""
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     uncertainty = ParameterUncertainty() if uncertainty is None else uncertainty
@@ -441,13 +430,7 @@ _SCALES = {"b": ("length_scale", "m"), "b omega_1": ("velocity_scale", "m/s")}
 
 
 def outcome_named(given: Any, name: str = "outcome") -> tuple[str, Event]:
-    """Return an outcome and its name: one of :data:`OUTCOMES`, or a statistic beyond a value, such as ``"peak_force > 60 N"``.
-
-    Raises
-    ------
-    InputError
-        If there is none, the statistic is no number, or the unit of the value does not fit.
-    """
+    """Return an outcome, one of :data:`OUTCOMES` or such as ``"peak_force > 60 N"``, and its name."""
     short = " ".join(text(name, given).split()) if isinstance(given, str) else ""
     if short in OUTCOMES:
         return short, OUTCOMES[short]
@@ -480,12 +463,7 @@ def metres_key(statistic: str) -> str:
 
 
 def number_statistic(name: str, statistic: Any) -> Statistic:
-    """Return the row of a statistic that is a number.
-
-    Raises
-    ------
-    InputError
-    """
+    """Return the row of a statistic that is a number."""
     if not isinstance(statistic, str) or of_one_named(statistic) is None:
         choice(name, statistic, tuple(each for each, row in STATISTICS.items() if row.dtype in ("float64", "int32")))
     return STATISTICS[statistic]
@@ -497,12 +475,7 @@ def reached(found: Statistics) -> NDArray[np.bool_]:
 
 
 def require_held(names: Iterable[str], system: System) -> None:
-    """Refuse statistics that runs of a system do not have: those of one of several strikers, if it is not there.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse statistics that runs of a system do not have: those of one of several strikers, if it is not there."""
     strikers = len(system.contacts)
     held = rows_for(strikers)
     for name in names:

@@ -287,22 +287,12 @@ def missing_room(path: str | os.PathLike[str], size: float, name: str = "output"
 
 
 def require_room(path: str | os.PathLike[str], size: float, name: str = "output") -> None:
-    """Refuse an output for which the disk has no room, before any work; *size* is its least estimated size in bytes.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse an output for which the disk has no room, before any work; *size* is its least estimated size in bytes."""
     require_room_of({name: (path, size)})
 
 
 def require_room_of(outputs: Mapping[str, tuple[str | os.PathLike[str], float]]) -> None:
-    """Refuse outputs, paths and least sizes in bytes by name, for which together a disk has no room.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse outputs, paths and least sizes in bytes by name, for which together a disk has no room."""
     disks: dict[int, list[str]] = {}
     for name, (path, _) in outputs.items():
         folder = Path(path).absolute().parent

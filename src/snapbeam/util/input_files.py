@@ -32,11 +32,6 @@ def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_
         The file.
     largest : int
         Largest size, bytes.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is larger, or is no regular file, such as a device or a pipe.
     """
     file = file_path(name, path)
     try:
@@ -53,7 +48,7 @@ def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_
 
 
 def refuse_inflated(name: str, path: str | os.PathLike[str], size: int) -> None:
-    """Refuse a small file with a large content, before memory is allocated for it.
+    """Refuse a content above 512 MiB and twenty times its file, before memory is allocated for it.
 
     Compression, fill values and false headers can turn a file of some kilobytes into any size.  Every reader calls this
     with the size that the header of the file states.
@@ -66,11 +61,6 @@ def refuse_inflated(name: str, path: str | os.PathLike[str], size: int) -> None:
         The file.
     size : int
         Size of the content in memory, bytes, at 8 bytes for a number.
-
-    Raises
-    ------
-    InputError
-        If the content needs more than 512 MiB and more than twenty times the file.
     """
     found = os.stat(path)
     stored = min(found.st_size, getattr(found, "st_blocks", found.st_size) * 512)
@@ -82,13 +72,7 @@ def refuse_inflated(name: str, path: str | os.PathLike[str], size: int) -> None:
 
 
 def input_text(name: str, path: str | os.PathLike[str]) -> str:
-    """Return the text of a regular file in UTF-8.
-
-    Raises
-    ------
-    InputError
-        For anything :func:`input_bytes` refuses, and if the file is not in UTF-8.
-    """
+    """Return the text of a regular file in UTF-8."""
     try:
         return input_bytes(name, path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -104,11 +88,6 @@ def decoded(raw: bytes, where: str) -> str:
         Contents of the file.
     where : str
         Name of the file, for the message.
-
-    Raises
-    ------
-    InputError
-        If the bytes are not text.
     """
     start = raw[:400]
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -148,11 +127,6 @@ def parsed_toml(text: str, what: str) -> dict[str, Any]:
     text : str
     what : str
         What a refusal names, such as ``config = 'system.toml'``.
-
-    Raises
-    ------
-    InputError
-        If the text is no TOML, or a key has more than eight parts.
     """
     plain = _STRINGS.sub(lambda found: "" if found[0].startswith("#") else "s", text)
     if _DEEP.search(plain):
@@ -166,11 +140,5 @@ def parsed_toml(text: str, what: str) -> dict[str, Any]:
 
 
 def read_toml(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the sections of a TOML file.
-
-    Raises
-    ------
-    InputError
-        For anything :func:`input_text` and :func:`parsed_toml` refuse.
-    """
+    """Return the sections of a TOML file."""
     return parsed_toml(input_text(name, path), f"{name} = {str(Path(path))!r}")

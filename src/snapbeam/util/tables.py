@@ -44,11 +44,6 @@ def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-
-    Raises
-    ------
-    InputError
-        If the dataset has no variable with a dimension.
     """
     import pandas as pd
 

@@ -326,13 +326,7 @@ class BeamBands(NamedTuple):
 
 
 def find_bands(objects: ColumnObjects, height: int, level: float, bright: bool) -> BeamBands:
-    """The band that crosses the picture.
-
-    Raises
-    ------
-    InputError
-        If none does, with what to change.
-    """
+    """The band that crosses the picture."""
     length = objects.end - objects.start
     usable = objects.found & (objects.end < height) & (length >= 3)
     way_out = "set region (--region), objects (--objects) or threshold (--threshold)"
@@ -356,13 +350,7 @@ def find_bands(objects: ColumnObjects, height: int, level: float, bright: bool) 
 def placed(
     width: int, rod: tuple[int, int] | None, count: int, contact_column: float | None
 ) -> tuple[float, NDArray[np.intp], tuple[NDArray[np.intp], ...], bool]:
-    """Contact column, columns to measure the beam in, groups that see it alone, and whether there are none.
-
-    Raises
-    ------
-    InputError
-        If the contact column leaves too little of the picture on one side.
-    """
+    """Contact column, columns to measure the beam in, groups that see it alone, and whether there are none."""
     centre = (rod[0] + rod[1] - 1) / 2.0 if rod is not None else (width - 1) / 2.0
     centre = centre if contact_column is None else contact_column
     half = max(20.0, (rod[1] - rod[0]) / 2.0) if rod is not None else max(20.0, width / 8.0)
@@ -836,13 +824,7 @@ def shaker_view(
     rod: tuple[int, int],
     wanted: Wanted,
 ) -> tuple[ShakerView, float]:
-    """The shaker, and the column at which its tip comes nearest to the beam.
-
-    Raises
-    ------
-    InputError
-        If neither tip nor sticker can be followed, with the way out.
-    """
+    """The shaker, and the column at which its tip comes nearest to the beam."""
     beam = measure_beam(view, frames)
     near = beam.row + view.thickness
     middle = rod_middle(rod)
@@ -1056,11 +1038,6 @@ def survey(
         Grey level of saturated pixels, infinite if there are none.
     pixel_size
         Metres per pixel.
-
-    Raises
-    ------
-    InputError
-        If no beam, or no shaker where one is wanted, can be found.
     """
     height, width = frames.shape[1:]
     smooth = ndimage.uniform_filter(frames, size=(0, 3, 3))

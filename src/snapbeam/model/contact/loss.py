@@ -44,10 +44,6 @@ def loss_number(restitution: float) -> float:
     ----------
     restitution : float
         e, in [1e-300, 1].
-
-    Raises
-    ------
-    InputError
     """
     from scipy.optimize import brentq
 

@@ -175,13 +175,7 @@ def _names(kind: type[Drive]) -> list[str]:
 
 
 def mixture(kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
-    """The class of the sums of such kinds of drives.
-
-    Raises
-    ------
-    InputError
-        For kinds that cannot be summed.
-    """
+    """The class of the sums of such kinds of drives."""
     words = " + ".join(kind.name for kind in kinds)
     if not 2 <= len(kinds) <= MOST_TERMS:
         raise InputError(f"{words or 'no drive'}: a sum has 2 to {MOST_TERMS} terms")
