@@ -26,7 +26,7 @@ from snapbeam.sweeps.tasks import PointWork, ResultTable
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.proportions import proportion
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, checked, integer, nonnegative, shown, within
+from snapbeam.util.validation import InputError, checked, instance, integer, nonnegative, or_default, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -389,15 +389,10 @@ def lifetime_map(
     >>> ds.lifetime.dims
     ('velocity_amplitude',)
     """
-    if not isinstance(system, System):
-        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    instance("system", system, System, "a System")
     require_excitation(system)
-    integration = Integration() if integration is None else integration
-    if not isinstance(integration, Integration):
-        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
-    settings = LifetimeSettings() if settings is None else settings
-    if not isinstance(settings, LifetimeSettings):
-        raise InputTypeError(f"settings = {shown(settings)}: must be a LifetimeSettings")
+    integration = or_default("integration", integration, Integration, "an Integration")
+    settings = or_default("settings", settings, LifetimeSettings, "a LifetimeSettings")
     cycles = CYCLES if integration.cycles is None else integration.cycles
     cycles_after = _after(after, cycles, settings)
     integration = integration.replace(cycles=cycles, early_termination=True)

@@ -25,7 +25,7 @@ from snapbeam.solver.engines import engine_of
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, shown
+from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
 _Array = NDArray[np.float64]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
@@ -58,10 +58,8 @@ class Stroboscope:
     phase: float | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.system, System):
-            raise InputTypeError(f"system = {shown(self.system)}: must be a System")
-        if not isinstance(self.integration, Integration):
-            raise InputTypeError(f"integration = {shown(self.integration)}: must be an Integration")
+        instance("system", self.system, System, "a System")
+        instance("integration", self.integration, Integration, "an Integration")
         if self.integration.tolerance is not None:
             raise InputError(
                 f"tolerance = {self.integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
@@ -284,8 +282,7 @@ def flow_of(system: System | Flow, integration: Integration | None = None, accur
     """The flow that a system makes, or one that is one; *accuracy* is meant where no integration is given."""
     if isinstance(system, System):
         return Stroboscope(system, Integration(accuracy=accuracy) if integration is None else integration)
-    if not isinstance(system, Flow):
-        raise InputTypeError(f"system = {shown(system)}: must be a System, or a Flow that takes states a period on")
+    instance("system", system, Flow, "a System, or a Flow that takes states a period on")
     if integration is not None:
         raise InputTypeError("integration: is for a System; a Flow brings its own")
     return system

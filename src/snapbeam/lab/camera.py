@@ -18,17 +18,7 @@ from snapbeam.lab.photron import frame_bytes, header_text
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.packages import needing
-from snapbeam.util.validation import (
-    InputError,
-    InputTypeError,
-    file_path,
-    instance,
-    integer,
-    positive,
-    require_texts,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, file_path, instance, integer, positive, require_texts, shown, within
 
 _LARGEST_PIXEL = 0.01  # m
 
@@ -88,8 +78,7 @@ class Recording:
         diagnostics: tuple[Diagnostic, ...] = (),
         pixel_width: float | None = None,
     ) -> None:
-        if not isinstance(source, FrameSource):
-            raise InputTypeError(f"source = {shown(source)}: must be a source of frames; open_recording opens a file")
+        instance("source", source, FrameSource, "a source of frames (open_recording opens a file)")
         if not isinstance(region, (tuple, list)) or len(region) != 4:
             raise InputError(f"region = {shown(region)}: must be four numbers")
         self.path = path

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.beam import Beam
 from snapbeam.model.buckling_modes import MAX_MODES
-from snapbeam.util.validation import InputError, InputTypeError, integer, shown
+from snapbeam.util.validation import InputError, instance, integer
 
 # ----------------------------------------------------------------------------------------------------
 # Exact natural frequencies of a beam between rotational springs, straight or buckled.
@@ -176,8 +176,7 @@ def exact_natural_frequencies(beam: Beam, count: int = 10) -> _Array:
     --------
     snapbeam.Beam, snapbeam.ReducedModel
     """
-    if not isinstance(beam, Beam):
-        raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
+    instance("beam", beam, Beam, "a Beam")
     count = integer("count", count, 1, _MAX_COUNT)
     if beam.boundary.is_elastic:
         return _between_springs(beam, integer("count", count, 1, MAX_MODES // 4))

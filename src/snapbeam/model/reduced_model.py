@@ -19,7 +19,16 @@ from snapbeam.model.equilibria import Equilibrium, Landscape, condensed, landsca
 from snapbeam.model.imperfection import Imperfection, perfect_equilibria
 from snapbeam.model.matrix_pairs import eigenpairs
 from snapbeam.model.quantity import ParameterField, quantities
-from snapbeam.util.validation import InputError, InputTypeError, finite_array, integer, positive, shown, within
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    finite_array,
+    instance,
+    integer,
+    positive,
+    shown,
+    within,
+)
 
 # ----------------------------------------------------------------------------------------------------
 # Eigenvalues of the diagonal-plus-rank-one problems into which a buckled beam splits.
@@ -580,8 +589,7 @@ class ReducedModel(Wells):
             Imperfection, which makes the wells unequal; a zero one is ignored.  Damping is that of the linear
             modes about the well that the striker pushes away from, and the same matrix everywhere.
         """
-        if not isinstance(beam, Beam):
-            raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
+        instance("beam", beam, Beam, "a Beam")
         count = integer("modes", modes, 1, MAX_MODES)
         shapes = beam.buckling_modes(count)
         k = shapes.wavenumber

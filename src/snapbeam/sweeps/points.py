@@ -16,7 +16,7 @@ from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physic
 from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters, ratio_of, refuse_well_axis, short_names
 from snapbeam.model.quantity import split_name
 from snapbeam.util.provenance import array_hash
-from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, require_texts, shown
+from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, instance, require_texts, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -192,10 +192,7 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any, system: System | None
         return _list_in_ratios(_list_of(columns), system)
     if hasattr(given, "columns") and hasattr(given, "to_dict"):
         return _list_in_ratios(_list_of({str(name): np.asarray(given[name]) for name in given.columns}), system)
-    if not isinstance(given, Mapping):
-        raise InputTypeError(
-            f"axes = {shown(given)}: must be a mapping of parameters to values, an xarray.Dataset or a table of points"
-        )
+    instance("axes", given, Mapping, "a mapping of parameters to values, an xarray.Dataset or a table of points")
     if not given:
         raise InputError("axes: must name at least one parameter to sweep")
     rows: dict[str, Parameter] = {}

@@ -29,7 +29,17 @@ from snapbeam.uncertainty.distributions import Distribution, Normal, ParameterUn
 from snapbeam.util.diagnostics import DiagnosticWarning
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.units import number_in_unit, unit_in_text
-from snapbeam.util.validation import InputError, InputTypeError, checked, choice, integer, shown, text
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    checked,
+    choice,
+    instance,
+    integer,
+    or_default,
+    shown,
+    text,
+)
 
 Statistics = dict[str, NDArray[Any]]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
@@ -302,14 +312,9 @@ def trials_of(
     statistics: Iterable[str] = (),
 ) -> Trials:
     """Check what is sampled of a system; with *statistics*, which need whole runs, none ends early."""
-    if not isinstance(system, System):
-        raise InputTypeError(f"system = {shown(system)}: must be a System")
-    uncertainty = ParameterUncertainty() if uncertainty is None else uncertainty
-    if not isinstance(uncertainty, ParameterUncertainty):
-        raise InputTypeError(f"uncertainty = {shown(uncertainty)}: must be a ParameterUncertainty")
-    integration = Integration() if integration is None else integration
-    if not isinstance(integration, Integration):
-        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
+    instance("system", system, System, "a System")
+    uncertainty = or_default("uncertainty", uncertainty, ParameterUncertainty, "a ParameterUncertainty")
+    integration = or_default("integration", integration, Integration, "an Integration")
     if uncertainty.hold_fixed == "physical" and uncertainty.structural:
         loose = [name for name in system.parameters if _has_no_unit(name)]
         if loose:

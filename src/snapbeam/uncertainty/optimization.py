@@ -31,6 +31,7 @@ from snapbeam.util.validation import (
     finite_array,
     instance,
     integer,
+    or_default,
     positive,
     shown,
     within,
@@ -803,9 +804,7 @@ def optimize_design(
     >>> best.velocity_amplitude.dims
     ('design',)
     """
-    settings = OptimizerSettings() if settings is None else settings
-    if not isinstance(settings, OptimizerSettings):
-        raise InputTypeError(f"settings = {shown(settings)}: must be an OptimizerSettings")
+    settings = or_default("settings", settings, OptimizerSettings, "an OptimizerSettings")
     problem = design_problem(
         system,
         variables,

@@ -22,7 +22,16 @@ from snapbeam.uncertainty.monte_carlo import Trials, outcome_named, trials_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.proportions import proportion
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, shown, within
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    checked,
+    finite_array,
+    integer,
+    or_default,
+    shown,
+    within,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -425,9 +434,7 @@ def quantile_threshold(
             f"parameter = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
     low, high = _range(row.name, bounds)
-    options = QuantileSearchSettings() if options is None else options
-    if not isinstance(options, QuantileSearchSettings):
-        raise InputTypeError(f"options = {shown(options)}: must be a QuantileSearchSettings")
+    options = or_default("options", options, QuantileSearchSettings, "a QuantileSearchSettings")
     watched = outcome_named(options.outcome)[1].statistic
     trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, statistics=[watched])
     if axes is not None and not isinstance(axes, Mapping):

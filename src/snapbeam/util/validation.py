@@ -336,6 +336,11 @@ def instance(name: str, value: Any, kind: type, words: str) -> Any:
     return value
 
 
+def or_default(name: str, value: Any, kind: type, words: str) -> Any:
+    """Return *value* if it is of a kind, and one of that kind with its default values for None."""
+    return instance(name, kind() if value is None else value, kind, words)
+
+
 # Types of the arguments of public functions, checked against their annotations.
 
 
