@@ -120,10 +120,7 @@ class InitialConditions:
 
 
 def leaving(system: System, rest: State, begun: State, location: ArrayLike | None = None) -> State:
-    """A state beside *rest*, turned about it where it would move the beam towards the first tip.
-
-    *location* is x_s/L, or that of each run of a batch.
-    """
+    """A state beside *rest*, turned about it if it moved the beam towards the first tip, at *location* x_s/L."""
     striker = system.striker
     if striker is None:
         return begun

@@ -115,27 +115,13 @@ class LifetimeFit(NamedTuple):
 def fit_lifetime(
     time: ArrayLike, ended: ArrayLike, delay: float | None = None, confidence: float = 0.95
 ) -> LifetimeFit:
-    """Fit exp(-(t - t0)/tau) to times of which some are only known to be longer.
+    """Fit exp(-(t - t0)/tau) to times of runs, of which some, not *ended*, are only known to be longer; NaN: no run.
 
-    Without a given delay, t0 is the first end from which on the exponential is not refused at 1 % (at most half of
-    the ends are left out; if it is refused still, t0 is the first end and ``goodness`` says so).  Since the
-    exponential forgets, what lasts longer is, counted from t0, a sample without a delay, and the interval is that of
-    complete data where every run ended, with 2 d kappa E distributed as chi squared.  With censored times the rate
-    has the posterior of Jeffreys' prior, gamma(d + 1/2, E), whose intervals cover as they say to a percent or so.
-
-    Parameters
-    ----------
-    time : array_like of shape (..., runs)
-        Lifetimes, or for how long a run was seen to last; NaN: no run.
-    ended : array_like of bool of the same shape
-        True if the run ended at that time; False if it was only seen to last so long.
-    delay : float, optional
-        t0; times before it are left out.
-    confidence : float
-
-    Returns
-    -------
-    LifetimeFit
+    Without a given *delay*, t0 is the first end from which on the exponential is not refused at 1 % (at most half of
+    the ends are left out; if it is refused still, t0 is the first end and ``goodness`` says so).  Since the exponential
+    forgets, what lasts longer is, counted from t0, a sample without a delay, and the interval is that of complete data
+    where every run ended, with 2 d kappa E distributed as chi squared.  With censored times the rate has the posterior
+    of Jeffreys' prior, gamma(d + 1/2, E), whose intervals cover as they say to a percent or so.
     """
     times, ends = np.broadcast_arrays(np.asarray(time, dtype=np.float64), np.asarray(ended, dtype=bool))
     if times.ndim == 0:

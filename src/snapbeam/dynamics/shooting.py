@@ -55,14 +55,7 @@ class Shot(NamedTuple):
 
 
 class Family:
-    """A flow over parameters, at any values of them.
-
-    Parameters
-    ----------
-    flow : Flow
-    *names : str
-        Parameters that may be changed; without one the flow stays as it is.
-    """
+    """A flow over the parameters *names*, at any values of them; without one it stays as it is."""
 
     def __init__(self, flow: Flow, *names: str) -> None:
         self.flow, self.names = flow, names

@@ -41,16 +41,8 @@ _LONGEST = 20_000
 class Stroboscope:
     """The map of a system over the common period of its motions, the tips' mid-positions fixed in space.
 
-    It takes and gives :class:`~snapbeam.dynamics.coordinates.Coordinates`, at a phase of its
-    :class:`~snapbeam.dynamics.clock.Clock`.
-
-    Parameters
-    ----------
-    system : System
-    integration : Integration, optional
-    phase : float, optional
-        Phase of the primary excitation at which the map takes states, rad.  By default each motion has the phase at
-        which a run of the system begins.
+    It takes and gives :class:`~snapbeam.dynamics.coordinates.Coordinates`, at a phase of the primary excitation, rad,
+    by default the one at which a run of the system begins.
     """
 
     system: System
@@ -296,15 +288,8 @@ def jumps(flow: Flow) -> bool:
 def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tuple[int, str]:
     """The number of periods after which a motion of *flow* counts as settled, and the rule that gave it.
 
-    It is 16 time constants of the slowest mode, 1/min(zeta_j omega_j), but at least *least* and at most 20,000 periods.
-
-    Parameters
-    ----------
-    flow : Flow
-        Flow whose slowest mode is taken.  Of a map, which has no modes, *rates* alone count; without both the number is
-        *least*.
-    rates : array_like
-        Further decay rates, 1/s (per period of a map), such as those towards known attractors.
+    It is 16 time constants of the slowest mode, 1/min(zeta_j omega_j), or of further decay *rates*, 1/s (per period of
+    a map, which has no modes), but at least *least* and at most 20,000 periods.
     """
     known = [float(rate) for rate in np.ravel(np.asarray(rates, dtype=np.float64))]
     if isinstance(flow, Stroboscope):

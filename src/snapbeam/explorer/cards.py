@@ -220,16 +220,7 @@ _HEIGHT = 345
 
 
 class MapCard:
-    """The map and its controls.
-
-    Parameters
-    ----------
-    look : Look
-    shared : Shared
-    address : Address
-    post, later : callable
-        ``post(work)`` does something on the page's own thread, ``later(work, milliseconds)`` does it later.
-    """
+    """The map and its controls; ``post`` does something on the page's own thread, ``later`` after milliseconds."""
 
     def __init__(
         self, look: style.Look, shared: Shared, address: Address, post: style.Post, later: style.Later
@@ -716,13 +707,7 @@ _PRESETS: dict[str, dict[str, dict[str, Any]]] = {
 
 
 class SystemCard:
-    """Fields of the system at the point that is shown.
-
-    Parameters
-    ----------
-    page : Page
-        Whose system it is.
-    """
+    """Fields of the system of a page at the point that is shown."""
 
     def __init__(self, page: Page) -> None:
         self.page = page
@@ -1023,13 +1008,7 @@ else { navigator.clipboard.writeText(window.location.href).then(() => say('Copie
 
 
 class TakeCard:
-    """Buttons, and text to copy.
-
-    Parameters
-    ----------
-    page : Page
-        Whose views are taken away.
-    """
+    """Buttons by which views of a page are taken away, and text to copy."""
 
     def __init__(self, page: Page) -> None:
         self.page = page

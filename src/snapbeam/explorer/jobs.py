@@ -203,13 +203,7 @@ _AGAIN = 1000
 
 
 class Waiting:
-    """The waits of one page.
-
-    Parameters
-    ----------
-    later : callable
-        ``later(work, milliseconds)``: do something on the page's own thread a little later.
-    """
+    """The waits of one page; ``later(work, milliseconds)`` does something on the page's own thread a little later."""
 
     def __init__(self, later: Callable[[Callable[[], None], int], object]) -> None:
         self._later = later

@@ -44,17 +44,7 @@ _HIDDEN = ("status",)
 
 @dataclass(frozen=True)
 class MapLayer:
-    """One number a point: a variable, or one entry of it.
-
-    Attributes
-    ----------
-    variable : str
-    where : dict of str to int
-        Which entry of its further dimension.
-    words, unit : str
-    shown : bool
-        Whether it is offered; limits of intervals and statuses are told with their point alone.
-    """
+    """One number a point: a variable, or the entry *where* of it; those not *shown* are told with their point alone."""
 
     variable: str
     where: dict[str, int]
@@ -732,14 +722,9 @@ def picture(
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """A source along two axes.
+    """A source along two axes, across and upward; ``fixed`` is the point of each other axis.
 
-    Attributes
-    ----------
-    x, y : Axis
-        Across and upward; of a list, ``at`` are the places of the points, in the order of the list.
-    fixed : dict of str to int
-        Which point of each other axis.
+    Of a list, ``at`` of an axis are the places of the points, in the order of the list.
     """
 
     source: Source
@@ -1005,21 +990,9 @@ _MOST_WINDOWS = 512
 class Window:
     """A part of a plane of parameters, on a regular grid of cells.
 
-    Attributes
-    ----------
-    system, integration : System, Integration
-        What is computed; the two axes are set at each point.
-    names : pair of str
-        Dotted names of the axes across and upward.
-    x, y : array of shape (nx,) and (ny,)
-        The values at which runs are made, the centres of cells.
-    bounds : 4 floats
-        Left, right, low and high borders.
-    log : pair of bool
-    stride : array of int8, shape (ny, nx)
-        Cells of the block whose point stands for the cell; 0 where nothing is known.
-    values : dict of arrays of shape (ny, nx)
-        Statistics by name.
+    ``x`` and ``y`` are the values at which runs are made, the centres of cells; ``bounds`` left, right, low and high.
+    ``stride``, (ny, nx), is the cells of the block whose point stands for the cell, 0 where nothing is known;
+    ``values`` the statistics by name.
     """
 
     system: sb.System
@@ -1129,14 +1102,8 @@ def known_cells(
 ) -> tuple[_Array, _Array]:
     """Width and height of the cells of a map and of other windows at each cell of a window, in its cells.
 
-    They are infinite where nothing is known.
-
-    Parameters
-    ----------
-    plane : Plane, optional
-        The cut through the map that is shown; None if it has no numbers, or those of another system.
-    others : list of (Window, array of shape (ny, nx))
-        Windows and the strides of their blocks, in the order in which they are drawn.
+    They are infinite where nothing is known.  *plane* is the cut through the map, None if it has no numbers, or those
+    of another system; *others* are windows and the strides of their blocks, in the order in which they are drawn.
     """
     centers = [_scaled(each, log) for each, log in zip((window.x, window.y), window.log, strict=True)]
     units = [np.ptp(edges) / (edges.size - 1) for edges in window.edges]

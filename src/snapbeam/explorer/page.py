@@ -80,15 +80,7 @@ _DRAGGED = 30
 
 
 class Page(jobs.Tab):
-    """Content of one tab of a browser.
-
-    Parameters
-    ----------
-    shared : Shared
-        What all pages of the server share.
-    arguments : mapping
-        Query string of the address.
-    """
+    """Content of one tab of a browser; *arguments* is the query string of the address."""
 
     def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
         super().__init__()

@@ -265,17 +265,10 @@ _RASTER = 0.005  # px, error of a curve drawn between pixels of another phase
 
 
 def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
-    """Rows by which each profile lies below the reference, and their standard errors.
+    """Rows by which each profile, (n, rows), lies below the reference, (rows,), and their standard errors.
 
-    The shift, a gain and an offset are fitted by least squares, from the shift of whole rows with the best
-    correlation on.
-
-    Parameters
-    ----------
-    profiles
-        Grey levels over rows, shape (n, rows).
-    reference
-        The same where nothing has moved, shape (rows,).
+    The shift, a gain and an offset are fitted by least squares, from the shift of whole rows with the best correlation
+    on.
     """
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import gaussian_filter1d

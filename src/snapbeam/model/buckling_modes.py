@@ -209,15 +209,7 @@ class SpringModes:
 
     Slopes are orthonormal, and the curvatures with the springs' energy have the integrals k_i^2.  Every mode rises from
     the left end.  Between equal springs the modes are written about the centre, so that the antisymmetric ones are
-    exactly 0 there.
-
-    Parameters
-    ----------
-    length : float
-        L, m.
-    count : int
-    left, right : float
-        Rotational stiffnesses over E I/L; infinite for a clamp.
+    exactly 0 there.  *left* and *right* are rotational stiffnesses over E I/L, infinite for a clamp.
     """
 
     def __init__(self, length: float, count: int, left: float, right: float) -> None:

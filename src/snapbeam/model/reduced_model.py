@@ -39,27 +39,13 @@ _HALVINGS = 2200
 
 
 def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
-    """Solve diag(d) y = lam (Id + c 1 1^T) y to high relative accuracy.
+    """Solve diag(d) y = lam (Id + c 1 1^T) y, d_i >= 0, c > 0, to high relative accuracy; Y^T (Id + c 1 1^T) Y = Id.
 
-    The eigenvalues are the roots of 1 - c' sum d_i/(d_i - lam) with c' = c/(1 + c n).  The sum falls
-    from +inf to -inf between neighbouring d_i, and from a positive value at lam = 0 to -inf at the
-    smallest d_i, so each interval holds exactly one root.  Bisection for its distance from the nearer
-    pole keeps the differences d_i - lam, and with them the eigenvectors y_i = 1/(d_i - lam), accurate
-    whatever the spread of the d_i, which grows like n^4 here (cf. Golub, SIAM Rev. 15, 1973).
-
-    Parameters
-    ----------
-    diagonal : array of shape (n,)
-        d_i >= 0, in any order.
-    c : float
-        Weight c > 0 of the rank-one part.
-
-    Returns
-    -------
-    eigenvalues : array of shape (n,)
-        Eigenvalues, ascending.
-    vectors : array of shape (n, n)
-        Columns with Y^T (Id + c 1 1^T) Y = Id.
+    The eigenvalues, returned ascending, are the roots of 1 - c' sum d_i/(d_i - lam) with c' = c/(1 + c n).  The sum
+    falls from +inf to -inf between neighbouring d_i, and from a positive value at lam = 0 to -inf at the smallest d_i,
+    so each interval holds exactly one root.  Bisection for its distance from the nearer pole keeps the differences d_i
+    - lam, and with them the eigenvectors y_i = 1/(d_i - lam), accurate whatever the spread of the d_i, which grows like
+    n^4 here (cf. Golub, SIAM Rev. 15, 1973).
     """
     n = diagonal.size
     if not (np.isfinite(diagonal).all() and math.isfinite(c)):
@@ -948,23 +934,7 @@ def _coupling(parity: NDArray[np.int_]) -> _Array:
 def displacement_along(
     length: float, amplitude: ArrayLike, positions: ArrayLike, modes: Modes | None = None
 ) -> NDArray[np.float64]:
-    """Displacement w = sum alpha_i phi_i(x), m.
-
-    Parameters
-    ----------
-    length : float
-        L, m.
-    amplitude : array_like of shape (..., N)
-        alpha, m^0.5.
-    positions : array_like of shape (points,)
-        x over L, each in [0, 1].
-    modes : optional
-        Buckling modes of other ends than clamps.
-
-    Returns
-    -------
-    array of shape (..., points)
-    """
+    """Displacement w = sum alpha_i phi_i(x), m, (..., points), of amplitudes (..., N) at *positions* x/L in [0, 1]."""
     alpha, x = finite_array("amplitude", amplitude), finite_array("positions", positions, 1)
     if x.size and (x.min() < 0.0 or x.max() > 1.0):
         raise InputError(f"positions from {x.min():g} to {x.max():g}: must lie in [0, 1]")

@@ -13,14 +13,7 @@ from snapbeam.util.validation import InputError, instance, or_default
 
 
 def checked_request(system: Any, integration: Any) -> tuple[System, Integration]:
-    """Check a system and an integration.
-
-    Parameters
-    ----------
-    system : System
-    integration : Integration or None
-        None selects the default settings.
-    """
+    """Check a system and an integration, None for the default settings."""
     instance("system", system, System, "a System")
     integration = or_default("integration", integration, Integration, "an Integration")
     require_motion(system)

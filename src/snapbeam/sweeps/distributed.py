@@ -344,14 +344,7 @@ class Cluster:
 
 
 def parse_cluster(text: str) -> Cluster:
-    """Parse the argument *cluster*.
-
-    Parameters
-    ----------
-    text : str
-        ``"local:4"`` for four local processes, ``"tcp://host:8786"`` or ``"tls://host:8786"`` for a running
-        scheduler, or the path of a TOML file with a section ``[slurm]``.
-    """
+    """Parse ``"local:4"`` (processes), ``"tcp://host:8786"`` (a scheduler) or a TOML file with ``[slurm]``."""
     if not isinstance(text, str) or not text:
         raise InputError(f"cluster = {shown(text)}: must be {_FORMS}")
     kind, colon, rest = text.partition(":")

@@ -170,18 +170,13 @@ def require_memory(points: int, remedy: str, bytes_each: int = _POINT_BYTES) -> 
 
 
 def points_of(given: Mapping[str, Any] | xr.Dataset | Any, system: System | None = None) -> Points:
-    """Return the points of a request.
+    """Return the points of a request, an error naming what is unknown, cannot be swept or is out of range.
 
-    Parameters
-    ----------
-    given : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
-        A mapping defines a grid: names of parameters, dotted or short, with strictly increasing numbers or different
-        words.  A dataset with one-dimensional variables along one dimension, or a data frame, defines a list.  Its
-        columns that are not parameters become labels; a name that is almost a parameter's is refused.
-    system : System, optional
-        The system that the names belong to.  Values in Hz, m/s, g, um or m become ratios of it.  Where another axis
-        changes the structure, and with it the unit of a ratio, they stay as they are given;
-        :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
+    A mapping defines a grid: names of parameters, dotted or short, with strictly increasing numbers or different words.
+    A dataset with one-dimensional variables along one dimension, or a data frame, defines a list.  Its columns that are
+    not parameters become labels; a name that is almost a parameter's is refused.  Values in Hz, m/s, g, um or m become
+    ratios of the *system*.  Where another axis changes the structure, and with it the unit of a ratio, they stay as
+    they are given; :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
     """
     from snapbeam.util.datasets import xr
 

@@ -134,19 +134,8 @@ class SweepSetup:
     ) -> dict[str, NDArray[Any]]:
         """Integrate runs and return their statistics, arrays of shape (runs,) by name.
 
-        The results of a run depend only on its own point, not on the other runs of its batch.
-
-        Parameters
-        ----------
-        columns : dict of str to array of shape (runs,)
-            The points.
-        threads, progress
-            Number of threads and report of progress, as for an engine.
-        start : callable, optional
-            ``start(system, state) -> State`` returns other initial conditions; *state* is that of the points, or
-            None if they do not determine it.
-        step_factor : float
-            Factor of all steps.
+        The results of a run depend only on its own point, not on the other runs of its batch.  ``start(system, state)``
+        returns other initial conditions; *state* is that of the points, or None if they do not determine it.
         """
         total = next(iter(columns.values())).size
         found: dict[str, NDArray[Any]] = {}

@@ -104,17 +104,7 @@ class Trials:
     """True if statistics have beside them the length and the velocity of the sample that they are over."""
 
     def columns(self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None) -> Columns:
-        """The parameters of the samples: those of the points, and those that are sampled around them.
-
-        Parameters
-        ----------
-        points : dict of str to array of shape (runs,)
-            Nominal values by dotted name.
-        numbers : int array of shape (runs,)
-            Number of the sample of each run.
-        scores : array of shape (runs, parameters), optional
-            Standard normal scores of the parameters, in place of those of the samples; the start is that of the sample.
-        """
+        """Parameters of samples by their *numbers*, about *points*; *scores* (runs, parameters) replace their own."""
         uncertainty, found = self.uncertainty, dict(points)
         if scores is None:
             scores = uncertainty.normals(numbers)

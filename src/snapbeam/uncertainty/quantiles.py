@@ -193,16 +193,10 @@ _STEPS, _SMALL = 60, 1e-9
 def local_crossing(
     values: _Array, hits: NDArray[Any], probability: float, low: float, high: float, reach: float = 2.0
 ) -> float:
-    """Value at which a local logistic regression about an interval crosses *probability*.
+    """Value at which a local logistic regression about an interval crosses *probability*; NaN if it does not.
 
-    Runs count by the tricube of their distance from the middle of the interval over *reach* times its half width.
-    The fit is Firth's (Biometrika 80 (1993) 27), whose bias is of second order and which is finite for separated
-    runs.
-
-    Returns
-    -------
-    float
-        NaN if the curve does not rise there, or the fit does not converge within 60 steps.
+    Runs count by the tricube of their distance from the middle of the interval over *reach* times its half width. The
+    fit is Firth's (Biometrika 80 (1993) 27), whose bias is of second order and which is finite for separated runs.
     """
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
     distance = (values - middle) / half

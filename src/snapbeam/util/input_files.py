@@ -22,17 +22,7 @@ _KEY_PARTS = 8
 
 
 def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_INPUT) -> bytes:
-    """Return the contents of a regular file.
-
-    Parameters
-    ----------
-    name : str
-        The parameter to name in a refusal.
-    path : path
-        The file.
-    largest : int
-        Largest size, bytes.
-    """
+    """Return the contents of a regular file, *name* in refusals, of at most *largest* bytes."""
     file = file_path(name, path)
     try:
         kind = file.stat().st_mode
@@ -50,17 +40,8 @@ def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_
 def refuse_inflated(name: str, path: str | os.PathLike[str], size: int) -> None:
     """Refuse a content above 512 MiB and twenty times its file, before memory is allocated for it.
 
-    Compression, fill values and false headers can turn a file of some kilobytes into any size.  Every reader calls this
-    with the size that the header of the file states.
-
-    Parameters
-    ----------
-    name : str
-        The parameter to name in a refusal.
-    path : path
-        The file.
-    size : int
-        Size of the content in memory, bytes, at 8 bytes for a number.
+    Compression, fill values and false headers can turn a file of some kilobytes into any *size* in bytes, at 8 for a
+    number. Every reader calls this with the size that the header of the file states.
     """
     found = os.stat(path)
     stored = min(found.st_size, getattr(found, "st_blocks", found.st_size) * 512)
@@ -80,15 +61,7 @@ def input_text(name: str, path: str | os.PathLike[str]) -> str:
 
 
 def decoded(raw: bytes, where: str) -> str:
-    """Return the text of a table that an instrument or a spreadsheet wrote: UTF-8, UTF-16 or Latin-1.
-
-    Parameters
-    ----------
-    raw : bytes
-        Contents of the file.
-    where : str
-        Name of the file, for the message.
-    """
+    """Return the text of a table that an instrument or a spreadsheet wrote: UTF-8, UTF-16 or Latin-1."""
     start = raw[:400]
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         kind = "utf-16"
@@ -120,14 +93,7 @@ _DEEP = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_KEY_PARTS}}}")
 
 
 def parsed_toml(text: str, what: str) -> dict[str, Any]:
-    """Return the sections of a TOML text.
-
-    Parameters
-    ----------
-    text : str
-    what : str
-        What a refusal names, such as ``config = 'system.toml'``.
-    """
+    """Return the sections of a TOML text, whose keys have at most eight parts; refusals name *what*."""
     plain = _STRINGS.sub(lambda found: "" if found[0].startswith("#") else "s", text)
     if _DEEP.search(plain):
         raise InputError(f"{what}: a key must have at most {_KEY_PARTS} parts separated by full stops")
