@@ -122,7 +122,7 @@ def write_json_now(**found: Any) -> None:
 
 
 def write_json(path: Path, found: Mapping[str, Any]) -> None:
-    """Write plain values, None for those not finite, to a JSON file (atomically), or for ``-`` to standard output."""
+    """Write plain values to a JSON file, atomically, or for ``-`` to standard output; what is not finite is null."""
     from snapbeam.util.files import atomic_path, check_writable
 
     text = json.dumps({VERSION: __version__} | _plain(found), indent=2, ensure_ascii=False, allow_nan=False) + "\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import stat
@@ -78,6 +79,20 @@ def decoded(raw: bytes, where: str) -> str:
     if "\x00" in text:
         raise InputError(f"{where}: is no text (it holds zero bytes)")
     return text
+
+
+def rows_of_table(text: str, where: str) -> tuple[str, list[str], list[tuple[int, list[str]]]]:
+    """The separator of a text table, names of its columns, small, and its rows: numbers of lines, cells."""
+    first = next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
+    mark = next((one for one in (";", "\t") if one in first), ",")
+    rows = [
+        (number, [cell.strip() for cell in cells])
+        for number, cells in enumerate(csv.reader(text.splitlines(), delimiter=mark), start=1)
+        if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#")
+    ]
+    if not rows:
+        raise InputError(f"{where}: is empty; its first line must name the columns")
+    return mark, [name.lower() for name in rows[0][1]], rows[1:]
 
 
 # Strings and comments, which may contain any number of full stops.  Each alternative also matches a string without an
