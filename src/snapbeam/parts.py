@@ -27,26 +27,14 @@ def installed_parts() -> list[str]:
 
 
 def load_part(name: str) -> ModuleType:
-    """Import a part.
-
-    Raises
-    ------
-    AttributeError
-        If there is no such part, as ``snapbeam.<name>`` raises it.
-    """
+    """Import a part."""
     if name not in PARTS or find_spec(f"snapbeam.{name}") is None:
         raise AttributeError(f"module 'snapbeam' has no attribute {name!r}")
     return import_module(f"snapbeam.{name}")
 
 
 def signal_files() -> ModuleType:
-    """Readers of files of measured signals, by which the core reads records of drives.
-
-    Raises
-    ------
-    InputError
-        If the part that has them is not installed.
-    """
+    """Readers of files of measured signals, by which the core reads records of drives."""
     from snapbeam.util.validation import InputError
 
     if _SIGNALS not in installed_parts():

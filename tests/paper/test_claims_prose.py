@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -24,10 +25,10 @@ def test_every_topic_is_in_the_table():
 def test_one_entry_a_function_and_one_function_an_entry(topic):
     entries, functions = read_topic(topic).entries, measurements(topic)
     assert sorted(entries) == sorted(functions)
-    assert len(set(functions.values())) == len(functions)
+    assert len({str(function) for function in functions.values()}) == len(functions)
     for number, function in functions.items():
-        assert function.__doc__, number
-        assert function.__doc__.startswith(f"{number}"), f"{function.__name__} says another number than {number}"
+        if not isinstance(function, partial):  # a rule of several rows
+            assert (function.__doc__ or "").startswith(number), f"{function.__name__} says another number than {number}"
 
 
 def test_numbers_are_told_once():

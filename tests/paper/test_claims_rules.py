@@ -31,7 +31,7 @@ def notched(at: float, wide: float = 0.4, depth: float = 0.1) -> np.ndarray:
 @pytest.mark.parametrize(("at", "wide", "verdict"), [(1.4, 0.1, "holds"), (1.55, 0.4, "in part"), (1.9, 0.1, "fails")])
 def test_notch_of_one_mode(at, wide, verdict):
     """2a: at the printed place, near enough for a step of V, elsewhere."""
-    result = thresholds.notch_of_one_mode(two_maps(notched(at, wide), notched(1.2)))
+    result = thresholds.ROWS["2a"](two_maps(notched(at, wide), notched(1.2)))
     assert result.verdict == verdict
     position = result.quantities["position"]
     assert abs(position.value - at) <= position.uncertainty
@@ -223,7 +223,7 @@ def test_notch_is_where_the_resonance_ends(end, verdict):
         {"frequency_ratio": ratio, "velocity_amplitude": drives},
     )  # fmt: skip
     results = two_maps(notched(1.2, 0.1), notched(1.2, 0.1), resonance={"modes_1": study, "modes_32": study})
-    assert resonances.notch_is_resonance_one(results).verdict == verdict
+    assert resonances.ROWS["31a"](results).verdict == verdict
 
 
 def window_data(end: tuple[float, float], centre: tuple[float, float]) -> Given:
@@ -244,13 +244,13 @@ def window_data(end: tuple[float, float], centre: tuple[float, float]) -> Given:
 def test_windows_in_amplitude_and_as_a_share_of_it():
     """15: a window ten times as wide at ten times the amplitude needs no finer control."""
     scaled = window_data((0.1, 0.2), (1.0, 2.0))
-    assert efficiency.wide_fast(scaled).verdict == "holds"
-    assert efficiency.wide_fast(scaled).quantities["times"].value == pytest.approx(10.0, rel=0.1)
-    finer = efficiency.fine_fast(scaled)
+    assert efficiency.ROWS["15b"](scaled).verdict == "holds"
+    assert efficiency.ROWS["15b"](scaled).quantities["times"].value == pytest.approx(10.0, rel=0.1)
+    finer = efficiency.ROWS["15d"](scaled)
     assert finer.verdict != "holds" and finer.quantities["times"].value == pytest.approx(1.0, abs=0.15)
     narrow = window_data((0.5, 0.55), (0.5, 2.0))
-    assert efficiency.wide_fast(narrow).verdict == efficiency.fine_fast(narrow).verdict == "holds"
-    assert efficiency.wide_fast(window_data((0.5, 2.0), (0.5, 2.0))).verdict == "fails"
+    assert efficiency.ROWS["15b"](narrow).verdict == efficiency.ROWS["15d"](narrow).verdict == "holds"
+    assert efficiency.ROWS["15b"](window_data((0.5, 2.0), (0.5, 2.0))).verdict == "fails"
 
 
 def dominance_data(until: float) -> Given:

@@ -122,10 +122,7 @@ def write_json_now(**found: Any) -> None:
 
 
 def write_json(path: Path, found: Mapping[str, Any]) -> None:
-    """Write plain values to a JSON file (atomically) or, for ``-``, to standard output.
-
-    Values that are not finite become null.  The first entry is the version of snapbeam.
-    """
+    """Write plain values to a JSON file, atomically, or for ``-`` to standard output; what is not finite is null."""
     from snapbeam.util.files import atomic_path, check_writable
 
     text = json.dumps({VERSION: __version__} | _plain(found), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -444,10 +441,7 @@ def check_pictures(*pictures: tuple[str, Path | None]) -> None:
 
 
 def check_outputs(output: Path, plot: Path | None, suffixes: tuple[str, ...] = (".nc",), begin: str = "") -> None:
-    """Raise an error, before any computation, if the file of the results or the figure cannot be written.
-
-    *begin* is what a table of this kind begins with.
-    """
+    """Refuse, before any computation, results and figures that cannot be written; *begin* begins such tables."""
     from snapbeam.util.files import check_writable
 
     check_writable(output, "output", suffixes, begin)
@@ -500,16 +494,9 @@ def write_result(dataset: xr.Dataset, path: Path, found: Mapping[str, Any]) -> P
 
 @contextmanager
 def kept_if_not_drawn(again: Callable[[str], str], kept: Path | None, save: Callable[[Path], object]) -> Iterator[None]:
-    """In the block, add to an error where the numbers are, and how to draw them again.
+    """In the block, add to an error that the numbers are in *kept*, or written now by *save*, and how to draw them.
 
-    Parameters
-    ----------
-    again : callable
-        Function of their file that returns the command that draws them.
-    kept : path, optional
-        Their file.
-    save : callable
-        Function that writes them to a path, which is called if they are in no file yet.
+    *again* returns the command that draws a file of them.
     """
     try:
         yield

@@ -111,17 +111,10 @@ _LISTS = ("model.damping_ratio",)
 
 
 def with_parameters(*names: str, axes: tuple[str, ...] = ()) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Give a command options for parameters, and for a parameter file and anything else by name.
+    """Give a command options for parameters (those in *axes* may be axes), and for a parameter file and others by name.
 
-    The command gets a parameter ``given``, a mapping of what was given: values by dotted name, and the file.  A parameter of its
+    The command gets a mapping ``given`` of what was given: values by dotted name, and the file.  A parameter of its
     own, such as ``config``, replaces the general option of that name.
-
-    Parameters
-    ----------
-    *names : str
-        Parameters, by dotted name.
-    axes : tuple of str
-        Those of them that may be a number, numbers a,b,c or start:stop:count.
     """
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -167,13 +160,7 @@ Law = Annotated[
 
 
 def import_laws(given: Sequence[str] | None) -> None:
-    """Execute Python files of the user's own, which register the laws that they define.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be executed, or does not define the class that is named.
-    """
+    """Execute Python files of the user's own, which register the laws that they define."""
     import importlib.util
     import sys
 
@@ -771,15 +758,7 @@ def sweep_report_lines(counts: SweepReport, store: Path | None, elapsed: float) 
 
 
 def config_of_file(path: Path, point: str | None) -> Config:
-    """The parameters of a file, at one point of it if it is a map.
-
-    Parameters
-    ----------
-    path : path
-        NetCDF file of a map, a threshold or a run.
-    point : str, optional
-        ``name=value,name=value``: the point nearest to these coordinates, its values exact.
-    """
+    """The parameters of a file of results; of a map, at the point nearest to ``name=value,...``, its values exact."""
     from snapbeam.cli.console import open_result
     from snapbeam.model.parameter_file import config_from_mapping
     from snapbeam.model.parameters import PHYSICAL
@@ -838,13 +817,7 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
 
 
 def coordinate_on_axis(dataset: xr.Dataset, option: str, text: str) -> tuple[str, Any]:
-    """The axis of a map and the value on it that ``name=value`` names, in the axis' own unit or as a physical value.
-
-    Raises
-    ------
-    InputError
-        If the map has no such axis, or the value is no number in its unit.
-    """
+    """The axis of a map and the value on it that ``name=value`` names, in the axis' own unit or as a physical value."""
     from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.model.parameters import PHYSICAL, lookup, named_in, ratio_of
     from snapbeam.model.quantity import split_name

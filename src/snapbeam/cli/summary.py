@@ -276,10 +276,7 @@ def class_table(dataset: xr.Dataset) -> Table:
 
 
 def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
-    """Return the coordinates of the interwell run of minimum excitation amplitude; None without such a run or axis.
-
-    Points of unknown class are left out; they may be interwell at a smaller value.
-    """
+    """Return the coordinates of the known interwell run of minimum amplitude; None without such a run or axis."""
     response, raised = dataset["response_class"], _strength_axis(dataset)
     interwell = response.values >= _SNAPPED
     if raised is None or not interwell.any():

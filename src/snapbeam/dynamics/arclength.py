@@ -63,10 +63,6 @@ class Equations:
         """The point on the plane through *guess* across *row*; its tangent goes on as *before* does.
 
         *known* is a derivative to begin with.
-
-        Raises
-        ------
-        OrbitNotFoundError
         """
 
         def residual(y: _Array) -> _Array:
@@ -107,12 +103,7 @@ class Equations:
         return last.table
 
     def require_next(self, last: Point, point: Point) -> None:
-        """Refuse a point that does not follow the last one.
-
-        Raises
-        ------
-        OrbitNotFoundError
-        """
+        """Refuse a point that does not follow the last one."""
 
     def events(self, last: Point, point: Point, number: int) -> list[Any]:
         """Special points between two points, of which *number* is that of the first."""
@@ -166,12 +157,7 @@ class OrbitEquations(Equations):
         return carried(here, x, flow.clock.striker_phase)
 
     def observed(self, point: Point) -> tuple[OrbitEquations, Point]:
-        """The orbit at the phase farthest from contacts, if one is near the phase of the flow; itself otherwise.
-
-        Raises
-        ------
-        OrbitNotFoundError
-        """
+        """The orbit at the phase farthest from contacts, if one is near the phase of the flow; itself otherwise."""
         flow, names = self.family.flow, self.family.names
         if not isinstance(flow, Stroboscope) or not flow.jumps:
             return self, point
@@ -184,12 +170,7 @@ class OrbitEquations(Equations):
         return moved, moved.seen(self, point)
 
     def seen(self, other: OrbitEquations, point: Point) -> Point:
-        """A point of other equations at the phase of these.
-
-        Raises
-        ------
-        OrbitNotFoundError
-        """
+        """A point of other equations at the phase of these."""
         if other.family.flow is self.family.flow:
             return point
         count = self.spans.size

@@ -17,7 +17,7 @@ from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.state import State
 from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
 from snapbeam.util.proportions import proportion
-from snapbeam.util.validation import InputError, InputTypeError, axis, checked, integer, shown
+from snapbeam.util.validation import InputError, InputTypeError, axis, checked, instance, integer, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,10 +98,7 @@ def basins_of_attraction(
     >>> sb.dynamics.basins_of_attraction(found, grid).basin.shape
     (3, 2)
     """
-    if not isinstance(attractors, Attractors):
-        raise InputTypeError(
-            f"attractors = {shown(attractors)}: must be Attractors, as sb.dynamics.find_attractors gives"
-        )
+    instance("attractors", attractors, Attractors, "Attractors, as sb.dynamics.find_attractors gives")
     flow = attractors.flow
     step = integer("every", every, 1, 10**4)
     rates = [-each.exponent for each in attractors.attractors if each.orbit is not None]

@@ -40,13 +40,7 @@ def frequencies_of(
 
 
 def common_cycles(system: System, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.int64]:
-    """Cycles of the primary excitation after which every motion repeats, for each run, shape (runs,).
-
-    Raises
-    ------
-    InputError
-        If a motion does not repeat, or the frequencies have no common period of at most 100 cycles.
-    """
+    """Cycles of the primary excitation after which every motion repeats, for each run, shape (runs,)."""
     cycle = cycles_of(system, columns)
     found = np.ones(cycle.size, dtype=np.int64)
     for section, drive, rates in frequencies_of(system, columns):

@@ -120,10 +120,7 @@ class InitialConditions:
 
 
 def leaving(system: System, rest: State, begun: State, location: ArrayLike | None = None) -> State:
-    """A state beside *rest*, turned about it where it would move the beam towards the first tip.
-
-    *location* is x_s/L, or that of each run of a batch.
-    """
+    """A state beside *rest*, turned about it if it moved the beam towards the first tip, at *location* x_s/L."""
     striker = system.striker
     if striker is None:
         return begun
@@ -144,12 +141,7 @@ def leaving(system: System, rest: State, begun: State, location: ArrayLike | Non
 
 
 def starts_of(given: InitialConditions | int) -> InitialConditions:
-    """Starts, or that many of them.
-
-    Raises
-    ------
-    InputTypeError
-    """
+    """Starts, or that many of them."""
     if isinstance(given, InitialConditions):
         return given
     if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, np.integer)):

@@ -26,7 +26,7 @@ from snapbeam.sweeps.tasks import PointWork, ResultTable
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.proportions import proportion
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, checked, integer, nonnegative, shown, within
+from snapbeam.util.validation import InputError, checked, instance, integer, nonnegative, or_default, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,27 +115,13 @@ class LifetimeFit(NamedTuple):
 def fit_lifetime(
     time: ArrayLike, ended: ArrayLike, delay: float | None = None, confidence: float = 0.95
 ) -> LifetimeFit:
-    """Fit exp(-(t - t0)/tau) to times of which some are only known to be longer.
+    """Fit exp(-(t - t0)/tau) to times of runs, of which some, not *ended*, are only known to be longer; NaN: no run.
 
-    Without a given delay, t0 is the first end from which on the exponential is not refused at 1 % (at most half of
-    the ends are left out; if it is refused still, t0 is the first end and ``goodness`` says so).  Since the
-    exponential forgets, what lasts longer is, counted from t0, a sample without a delay, and the interval is that of
-    complete data where every run ended, with 2 d kappa E distributed as chi squared.  With censored times the rate
-    has the posterior of Jeffreys' prior, gamma(d + 1/2, E), whose intervals cover as they say to a percent or so.
-
-    Parameters
-    ----------
-    time : array_like of shape (..., runs)
-        Lifetimes, or for how long a run was seen to last; NaN: no run.
-    ended : array_like of bool of the same shape
-        True if the run ended at that time; False if it was only seen to last so long.
-    delay : float, optional
-        t0; times before it are left out.
-    confidence : float
-
-    Returns
-    -------
-    LifetimeFit
+    Without a given *delay*, t0 is the first end from which on the exponential is not refused at 1 % (at most half of
+    the ends are left out; if it is refused still, t0 is the first end and ``goodness`` says so).  Since the exponential
+    forgets, what lasts longer is, counted from t0, a sample without a delay, and the interval is that of complete data
+    where every run ended, with 2 d kappa E distributed as chi squared.  With censored times the rate has the posterior
+    of Jeffreys' prior, gamma(d + 1/2, E), whose intervals cover as they say to a percent or so.
     """
     times, ends = np.broadcast_arrays(np.asarray(time, dtype=np.float64), np.asarray(ended, dtype=bool))
     if times.ndim == 0:
@@ -389,15 +375,10 @@ def lifetime_map(
     >>> ds.lifetime.dims
     ('velocity_amplitude',)
     """
-    if not isinstance(system, System):
-        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    instance("system", system, System, "a System")
     require_excitation(system)
-    integration = Integration() if integration is None else integration
-    if not isinstance(integration, Integration):
-        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
-    settings = LifetimeSettings() if settings is None else settings
-    if not isinstance(settings, LifetimeSettings):
-        raise InputTypeError(f"settings = {shown(settings)}: must be a LifetimeSettings")
+    integration = or_default("integration", integration, Integration, "an Integration")
+    settings = or_default("settings", settings, LifetimeSettings, "a LifetimeSettings")
     cycles = CYCLES if integration.cycles is None else integration.cycles
     cycles_after = _after(after, cycles, settings)
     integration = integration.replace(cycles=cycles, early_termination=True)
@@ -410,12 +391,7 @@ def lifetime_map(
 
 
 def require_excitation(system: System) -> None:
-    """Refuse a system that nothing drives.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a system that nothing drives."""
     if not system.moving:
         raise InputError(
             "contacts = []: a beam that nothing strikes or shakes does not go on snapping; give a striker, a "

@@ -295,12 +295,7 @@ def _guess_of(flow: Flow, guess: State | ArrayLike | PeriodicOrbit | None) -> _A
 
 
 def state_of(flow: Flow, name: str, given: State | ArrayLike | None) -> _Array:
-    """One state in the coordinates of a flow, shape (d,); the start of a system by default.
-
-    Raises
-    ------
-    InputError
-    """
+    """One state in the coordinates of a flow, shape (d,); the start of a system by default."""
     if given is None or isinstance(given, State):
         if not isinstance(flow, Stroboscope):
             raise InputTypeError(f"{name} = {shown(given)}: must be an array of {flow.dimension} numbers")

@@ -11,7 +11,7 @@ from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
-from snapbeam.util.validation import InputError, InputTypeError, checked, choice, finite, integer, shown
+from snapbeam.util.validation import InputError, InputTypeError, checked, choice, finite, instance, integer, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,8 +88,7 @@ def poincare_section(
     >>> sorted(section.data_vars)[:3]
     ['displacement_at_striker', 'drive_phase', 'midspan_displacement']
     """
-    if not isinstance(system, System):
-        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    instance("system", system, System, "a System")
     if system.primary_excitation is None:
         raise InputError("contacts = []: a section needs a drive, a base excitation or an axial load")
     total = integer("periods", periods, 1, 10**6)

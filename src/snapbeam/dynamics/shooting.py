@@ -55,14 +55,7 @@ class Shot(NamedTuple):
 
 
 class Family:
-    """A flow over parameters, at any values of them.
-
-    Parameters
-    ----------
-    flow : Flow
-    *names : str
-        Parameters that may be changed; without one the flow stays as it is.
-    """
+    """A flow over the parameters *names*, at any values of them; without one it stays as it is."""
 
     def __init__(self, flow: Flow, *names: str) -> None:
         self.flow, self.names = flow, names
@@ -125,12 +118,7 @@ def impacts_of(advanced: AdvancedStates) -> NDArray[np.int64]:
 
 
 def require_isolated_orbits(flow: Flow) -> None:
-    """Refuse a system whose periodic orbits form a continuum.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a system whose periodic orbits form a continuum."""
     if isinstance(flow, Stroboscope) and flow.space.has_memory:
         raise InputError(
             "contact: a periodic motion keeps any indentation that its impacts do not deepen, so that orbits and attractors are not "
@@ -219,13 +207,7 @@ def _advice(residual: float, tolerance: float) -> str:
 
 
 def orbit_tolerance(value: float) -> float:
-    """The tolerance of an orbit.
-
-    Raises
-    ------
-    InputError
-        Unless it is between 0 and 1e-3.
-    """
+    """The tolerance of an orbit."""
     return within("tolerance", value, 0.0, LARGEST_TOLERANCE, closed="right")
 
 

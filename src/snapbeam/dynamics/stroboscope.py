@@ -25,7 +25,7 @@ from snapbeam.solver.engines import engine_of
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, shown
+from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
 _Array = NDArray[np.float64]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
@@ -41,16 +41,8 @@ _LONGEST = 20_000
 class Stroboscope:
     """The map of a system over the common period of its motions, the tips' mid-positions fixed in space.
 
-    It takes and gives :class:`~snapbeam.dynamics.coordinates.Coordinates`, at a phase of its
-    :class:`~snapbeam.dynamics.clock.Clock`.
-
-    Parameters
-    ----------
-    system : System
-    integration : Integration, optional
-    phase : float, optional
-        Phase of the primary excitation at which the map takes states, rad.  By default each motion has the phase at
-        which a run of the system begins.
+    It takes and gives :class:`~snapbeam.dynamics.coordinates.Coordinates`, at a phase of the primary excitation, rad,
+    by default the one at which a run of the system begins.
     """
 
     system: System
@@ -58,10 +50,8 @@ class Stroboscope:
     phase: float | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.system, System):
-            raise InputTypeError(f"system = {shown(self.system)}: must be a System")
-        if not isinstance(self.integration, Integration):
-            raise InputTypeError(f"integration = {shown(self.integration)}: must be an Integration")
+        instance("system", self.system, System, "a System")
+        instance("integration", self.integration, Integration, "an Integration")
         if self.integration.tolerance is not None:
             raise InputError(
                 f"tolerance = {self.integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
@@ -284,8 +274,7 @@ def flow_of(system: System | Flow, integration: Integration | None = None, accur
     """The flow that a system makes, or one that is one; *accuracy* is meant where no integration is given."""
     if isinstance(system, System):
         return Stroboscope(system, Integration(accuracy=accuracy) if integration is None else integration)
-    if not isinstance(system, Flow):
-        raise InputTypeError(f"system = {shown(system)}: must be a System, or a Flow that takes states a period on")
+    instance("system", system, Flow, "a System, or a Flow that takes states a period on")
     if integration is not None:
         raise InputTypeError("integration: is for a System; a Flow brings its own")
     return system
@@ -299,15 +288,8 @@ def jumps(flow: Flow) -> bool:
 def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tuple[int, str]:
     """The number of periods after which a motion of *flow* counts as settled, and the rule that gave it.
 
-    It is 16 time constants of the slowest mode, 1/min(zeta_j omega_j), but at least *least* and at most 20,000 periods.
-
-    Parameters
-    ----------
-    flow : Flow
-        Flow whose slowest mode is taken.  Of a map, which has no modes, *rates* alone count; without both the number is
-        *least*.
-    rates : array_like
-        Further decay rates, 1/s (per period of a map), such as those towards known attractors.
+    It is 16 time constants of the slowest mode, 1/min(zeta_j omega_j), or of further decay *rates*, 1/s (per period of
+    a map, which has no modes), but at least *least* and at most 20,000 periods.
     """
     known = [float(rate) for rate in np.ravel(np.asarray(rates, dtype=np.float64))]
     if isinstance(flow, Stroboscope):

@@ -23,7 +23,7 @@ from snapbeam.solver.assemble import make_ensemble, run_columns
 from snapbeam.solver.statistics import rows_for
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import ResponseClass, RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, axis, checked, choice, flag, integer, shown
+from snapbeam.util.validation import InputError, InputTypeError, axis, checked, choice, flag, instance, integer, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,8 +38,7 @@ class _Axis:
     """The parameter of sweeps and its values."""
 
     def __init__(self, system: System, name: str, values: ArrayLike) -> None:
-        if not isinstance(system, System):
-            raise InputTypeError(f"system = {shown(system)}: must be a System")
+        instance("system", system, System, "a System")
         row = system.parameter(name)
         if row.quantity.kind is not float:
             raise InputError(f"name = {shown(name)}: must be a parameter that is a number")
@@ -334,13 +333,7 @@ def hysteresis(
 
 
 def _restarts(system: System) -> bool:
-    """Return True if an excitation does not repeat, so that every excitation restarts at each value.
-
-    Raises
-    ------
-    InputError
-        If a tip moves then.
-    """
+    """Return True if an excitation does not repeat, so that every excitation restarts at each value."""
     motions = frequencies_of(system, run_columns(system, {}))
     single = [(section, drive) for section, drive, rates in motions if rates is None]
     if not single:

@@ -220,16 +220,7 @@ _HEIGHT = 345
 
 
 class MapCard:
-    """The map and its controls.
-
-    Parameters
-    ----------
-    look : Look
-    shared : Shared
-    address : Address
-    post, later : callable
-        ``post(work)`` does something on the page's own thread, ``later(work, milliseconds)`` does it later.
-    """
+    """The map and its controls; ``post`` does something on the page's own thread, ``later`` after milliseconds."""
 
     def __init__(
         self, look: style.Look, shared: Shared, address: Address, post: style.Post, later: style.Later
@@ -716,13 +707,7 @@ _PRESETS: dict[str, dict[str, dict[str, Any]]] = {
 
 
 class SystemCard:
-    """Fields of the system at the point that is shown.
-
-    Parameters
-    ----------
-    page : Page
-        Whose system it is.
-    """
+    """Fields of the system of a page at the point that is shown."""
 
     def __init__(self, page: Page) -> None:
         self.page = page
@@ -870,13 +855,7 @@ class SystemCard:
         return typed(name, value) if value.strip() else None
 
     def changed_fields(self) -> dict[str, Any]:
-        """Parameters whose fields were changed, by dotted name; of another contact law all, None for those of the old one.
-
-        Raises
-        ------
-        InputError
-            For what is no number, and for values out of range.
-        """
+        """Parameters of changed fields, by dotted name; of another contact law all, None for those of the old one."""
         found = {name: self._typed(name) for name in self._edited()}
         if self.law.value != self._law:
             law = [row.name for row in parameters().values() if _group(row) == "contact"]
@@ -1029,13 +1008,7 @@ else { navigator.clipboard.writeText(window.location.href).then(() => say('Copie
 
 
 class TakeCard:
-    """Buttons, and text to copy.
-
-    Parameters
-    ----------
-    page : Page
-        Whose views are taken away.
-    """
+    """Buttons by which views of a page are taken away, and text to copy."""
 
     def __init__(self, page: Page) -> None:
         self.page = page

@@ -117,13 +117,7 @@ class Jobs:
 
     @contextmanager
     def turn(self, token: Token) -> Iterator[None]:
-        """The turn of one batch of a window: windows of several pages take turns, first come, first served.
-
-        Raises
-        ------
-        Cancelled
-            If the window was cancelled while it waited.
-        """
+        """The turn of one batch of a window: windows of several pages take turns, first come, first served."""
         ticket = object()
         with self._turns:
             self._queue.append(ticket)
@@ -209,13 +203,7 @@ _AGAIN = 1000
 
 
 class Waiting:
-    """The waits of one page.
-
-    Parameters
-    ----------
-    later : callable
-        ``later(work, milliseconds)``: do something on the page's own thread a little later.
-    """
+    """The waits of one page; ``later(work, milliseconds)`` does something on the page's own thread a little later."""
 
     def __init__(self, later: Callable[[Callable[[], None], int], object]) -> None:
         self._later = later
@@ -277,13 +265,7 @@ def too_large(name: str, size: int) -> str:
 
 
 def check_run(system: System, integration: Integration) -> None:
-    """Refuse a run that one page may not ask for.
-
-    Raises
-    ------
-    InputError
-        For too many modes or cycles.
-    """
+    """Refuse a run that one page may not ask for."""
     if system.model.modes > MODES:
         raise InputError(f"model.modes = {system.model.modes}: a page may ask for at most {MODES}")
     if integration.cycles_or_default > CYCLES:

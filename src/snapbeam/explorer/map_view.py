@@ -29,16 +29,7 @@ _QUASI_STATIC = {"frequency_ratio", "velocity_amplitude", "location"}
 
 
 class MapView:
-    """A figure of a map; it holds no numbers but those it shows.
-
-    Parameters
-    ----------
-    look : Look
-    x, y : Axis
-        The axes shown.
-    height : int
-        Pixels.
-    """
+    """A figure of a map over the axes *x* and *y*, *height* pixels high; it holds no numbers but those it shows."""
 
     def __init__(self, look: Look, x: Axis, y: Axis, height: int = 400) -> None:
         self.look, self.x, self.y = look, x, y

@@ -44,17 +44,7 @@ _HIDDEN = ("status",)
 
 @dataclass(frozen=True)
 class MapLayer:
-    """One number a point: a variable, or one entry of it.
-
-    Attributes
-    ----------
-    variable : str
-    where : dict of str to int
-        Which entry of its further dimension.
-    words, unit : str
-    shown : bool
-        Whether it is offered; limits of intervals and statuses are told with their point alone.
-    """
+    """One number a point: a variable, or the entry *where* of it; those not *shown* are told with their point alone."""
 
     variable: str
     where: dict[str, int]
@@ -303,13 +293,7 @@ _MAPS = ("map", "probability map", "lifetimes")
 
 
 class ResultSource(Source):
-    """A result that is no map: what ``snapbeam plot`` draws of it, and its run if it is one.
-
-    Raises
-    ------
-    InputError
-        If it is no result that has a figure.
-    """
+    """A result that is no map: what ``snapbeam plot`` draws of it, and its run if it is one."""
 
     def __init__(self, dataset: xr.Dataset, name: str = "result", run: sb.Run | None = None) -> None:
         try:
@@ -359,13 +343,7 @@ def _axes_of(skeleton: xr.Dataset) -> list[str]:
 
 
 def default_axes(system: sb.System) -> dict[str, Any]:
-    """Two axes over a system: frequency and amplitude of its excitation, else the first parameters that it has.
-
-    Raises
-    ------
-    InputError
-        If a run of the system has fewer than two parameters.
-    """
+    """Two axes over a system: frequency and amplitude of its excitation, else the first parameters that it has."""
     from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.model.parameter_file import DEFAULT_AXES
 
@@ -528,13 +506,7 @@ def brief(value: Any, other: Any = None) -> str:
 
 
 def system_of(attrs: Mapping[str, Any], name: str) -> sb.System:
-    """System stored in a map.
-
-    Raises
-    ------
-    InputError
-        If it does not say it, or it was driven by a record, which is too long to be kept in a file.
-    """
+    """System stored in a map."""
     text = attrs.get("system")
     if not isinstance(text, str):
         raise sb.InputError(f"{name}: does not hold the system that it was computed of")
@@ -750,14 +722,9 @@ def picture(
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """A source along two axes.
+    """A source along two axes, across and upward; ``fixed`` is the point of each other axis.
 
-    Attributes
-    ----------
-    x, y : Axis
-        Across and upward; of a list, ``at`` are the places of the points, in the order of the list.
-    fixed : dict of str to int
-        Which point of each other axis.
+    Of a list, ``at`` of an axis are the places of the points, in the order of the list.
     """
 
     source: Source
@@ -891,13 +858,7 @@ class Scatter(_Cut):
 
     @classmethod
     def of(cls, source: Source, x: str, y: str) -> Scatter:
-        """A list of points along two parameters.
-
-        Raises
-        ------
-        InputError
-            If its points have no such parameters.
-        """
+        """A list of points along two parameters."""
         cls.check(source, x, y)
         size = source.skeleton.sizes[POINT]
         return cls(source, Axis.scattered(source, x, size), Axis.scattered(source, y, size), {})
@@ -1029,21 +990,9 @@ _MOST_WINDOWS = 512
 class Window:
     """A part of a plane of parameters, on a regular grid of cells.
 
-    Attributes
-    ----------
-    system, integration : System, Integration
-        What is computed; the two axes are set at each point.
-    names : pair of str
-        Dotted names of the axes across and upward.
-    x, y : array of shape (nx,) and (ny,)
-        The values at which runs are made, the centres of cells.
-    bounds : 4 floats
-        Left, right, low and high borders.
-    log : pair of bool
-    stride : array of int8, shape (ny, nx)
-        Cells of the block whose point stands for the cell; 0 where nothing is known.
-    values : dict of arrays of shape (ny, nx)
-        Statistics by name.
+    ``x`` and ``y`` are the values at which runs are made, the centres of cells; ``bounds`` left, right, low and high.
+    ``stride``, (ny, nx), is the cells of the block whose point stands for the cell, 0 where nothing is known;
+    ``values`` the statistics by name.
     """
 
     system: sb.System
@@ -1153,14 +1102,8 @@ def known_cells(
 ) -> tuple[_Array, _Array]:
     """Width and height of the cells of a map and of other windows at each cell of a window, in its cells.
 
-    They are infinite where nothing is known.
-
-    Parameters
-    ----------
-    plane : Plane, optional
-        The cut through the map that is shown; None if it has no numbers, or those of another system.
-    others : list of (Window, array of shape (ny, nx))
-        Windows and the strides of their blocks, in the order in which they are drawn.
+    They are infinite where nothing is known.  *plane* is the cut through the map, None if it has no numbers, or those
+    of another system; *others* are windows and the strides of their blocks, in the order in which they are drawn.
     """
     centers = [_scaled(each, log) for each, log in zip((window.x, window.y), window.log, strict=True)]
     units = [np.ptp(edges) / (edges.size - 1) for edges in window.edges]

@@ -80,15 +80,7 @@ _DRAGGED = 30
 
 
 class Page(jobs.Tab):
-    """Content of one tab of a browser.
-
-    Parameters
-    ----------
-    shared : Shared
-        What all pages of the server share.
-    arguments : mapping
-        Query string of the address.
-    """
+    """Content of one tab of a browser; *arguments* is the query string of the address."""
 
     def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
         super().__init__()
@@ -417,13 +409,7 @@ class Page(jobs.Tab):
         self.shared.jobs.run(work, done, jobs.Token(jobs.RUN_SECONDS))
 
     def use(self, system: System, integration: Integration, given: Collection[str]) -> None:
-        """Compute with another system from now on; the point moves to those of the *given* parameters that the map sweeps.
-
-        Raises
-        ------
-        InputError
-            If a page may not ask for it.
-        """
+        """Compute with another system; the point moves to those of the *given* parameters that the map sweeps."""
         assert self.shared.system is not None
         names = self.card.plane.parameters
         swept = {name: PHYSICAL[name].parameter if name in PHYSICAL else name for name in names}

@@ -32,15 +32,7 @@ _CLICK = "Click on the figure to compute the run that starts there."
 
 
 class ResultPage(Tab):
-    """Figures of a result on the left, and a run of the stored or the clicked state on the right.
-
-    Parameters
-    ----------
-    shared : Shared
-        Its source is a :class:`ResultSource`.
-    arguments : mapping
-        Query string of the address: the look, and the figure.
-    """
+    """Figures of a result on the left, and a run of the stored or the clicked state on the right."""
 
     def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
         super().__init__()

@@ -32,15 +32,7 @@ _ROUNDED = 1e-9
 
 
 class RunPanel:
-    """One view of a run.
-
-    Attributes
-    ----------
-    title : str
-        Of its tab.
-    place : panel.Column
-        Where it stands; empty until :meth:`build`.
-    """
+    """One view of a run, with the *title* of its tab; ``place`` is empty until :meth:`build`."""
 
     title = ""
     picture = "run"
@@ -976,16 +968,7 @@ def _counted(number: int, what: str) -> str:
 
 
 class RunView:
-    """The card of one run.
-
-    Parameters
-    ----------
-    look : Look
-    name : str
-        ``"A"`` or ``"B"``.
-    post, later : callable
-        ``post(work)``: do something on the page's own thread; ``later(work, milliseconds)``: a little later.
-    """
+    """The card of one run, *name* ``"A"`` or ``"B"``; ``post`` and ``later`` as of the map."""
 
     def __init__(self, look: style.Look, name: str, post: style.Post, later: style.Later) -> None:
         self.look, self.name, self.later = look, name, later

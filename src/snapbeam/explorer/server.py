@@ -81,21 +81,10 @@ class _Entered(RequestHandler):
 class Gate(Router):
     """Every request to the server passes here: pages, scripts, sockets, and addresses that do not exist.
 
-    A request must call the server by one of its names, because any page on the Internet may direct a name of its own
-    to the loopback address.  It must come from a page of this server or from the address bar.  A page and its socket
-    need the token: in a cookie or, in the frame of a notebook, which has no cookies, in the address.
-
-    Parameters
-    ----------
-    application : tornado.web.Application
-        Answers the requests that pass.
-    shared : Shared
-        Counts the open pages.
-    hosts : tuple of str
-        Names and ports of the server.
-    prefix : str
-        Path of the page, to which the cookie is limited.
-    token : str
+    A request must call the server by one of its names, because any page on the Internet may direct a name of its own to
+    the loopback address.  It must come from a page of this server or from the address bar.  A page and its socket need
+    the token: in a cookie, limited to the path *prefix*, or, in the frame of a notebook, which has no cookies, in the
+    address.
     """
 
     def __init__(self, application: Any, shared: Shared, hosts: tuple[str, ...], prefix: str, token: str) -> None:
@@ -209,11 +198,6 @@ def make_server(
 
     The address contains the token, a random one unless given.  Port None is 8760 or, if that is in use, the next
     free one; 0 is any free port.
-
-    Raises
-    ------
-    InputError
-        For an address beyond this machine that was not allowed, and for a port in use.
     """
     if not is_loopback(address) and not allow_remote:
         raise InputError(

@@ -16,15 +16,7 @@ _WINDOWS = 48
 
 
 class Shared:
-    """One map and its server.
-
-    Parameters
-    ----------
-    source : Source
-        What is explored.
-    command : str
-        What begins it again: the name of its file or checkpoint, empty if it has none.
-    """
+    """One map and its server; *command* is the file or checkpoint that begins it again, empty if it has none."""
 
     def __init__(self, source: Source, file: Path | None = None) -> None:
         self.source = source

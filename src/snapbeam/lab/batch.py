@@ -31,7 +31,7 @@ from snapbeam.lab.vibrometer import DriveMeasurement, measure_drive, shaker_sign
 from snapbeam.lab.waveform_comparison import LEAST_CYCLES, TOO_SHORT, measure_response
 from snapbeam.util.diagnostics import Diagnostic, Severity, diagnostics_of
 from snapbeam.util.files import atomic_path, check_writable
-from snapbeam.util.input_files import decoded, read_toml
+from snapbeam.util.input_files import decoded, read_toml, rows_of_table
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, instance, integer, positive, require_texts, shown, within
@@ -137,17 +137,7 @@ def _from_table(folder: Path, table: Path) -> list[Test]:
         text = decoded(table.read_bytes(), table.name)
     except OSError as error:
         raise InputError(f"table (--table) = {str(table)!r}: cannot be read, {error.strerror}") from error
-    told = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
-    first = next(told, "")
-    mark = next((one for one in (";", "\t") if one in first), ",")
-    rows = [
-        (number, [cell.strip() for cell in row])
-        for number, row in enumerate(csv.reader(text.splitlines(), delimiter=mark), start=1)
-        if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
-    ]
-    if not rows:
-        raise InputError(f"{table.name}: is empty; its first line must name the columns")
-    header = [name.lower() for name in rows[0][1]]
+    mark, header, rows = rows_of_table(text, table.name)
     for name in header:
         if name not in _COLUMNS:
             raise InputError(f"{table.name}: unknown column {name!r}; must be among {', '.join(_COLUMNS)}")
@@ -157,7 +147,7 @@ def _from_table(folder: Path, table: Path) -> list[Test]:
         if name not in header:
             raise InputError(f"{table.name}: must have a column {name!r}")
     tests = []
-    for number, cells in rows[1:]:
+    for number, cells in rows:
         where = f"{table.name}, line {number}"
         if len(cells) != len(header):
             raise InputError(f"{where}: has {len(cells)} cells, the header names {len(header)}")

@@ -18,17 +18,7 @@ from snapbeam.lab.photron import frame_bytes, header_text
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.packages import needing
-from snapbeam.util.validation import (
-    InputError,
-    InputTypeError,
-    file_path,
-    instance,
-    integer,
-    positive,
-    require_texts,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, file_path, instance, integer, positive, require_texts, shown, within
 
 _LARGEST_PIXEL = 0.01  # m
 
@@ -88,8 +78,7 @@ class Recording:
         diagnostics: tuple[Diagnostic, ...] = (),
         pixel_width: float | None = None,
     ) -> None:
-        if not isinstance(source, FrameSource):
-            raise InputTypeError(f"source = {shown(source)}: must be a source of frames; open_recording opens a file")
+        instance("source", source, FrameSource, "a source of frames (open_recording opens a file)")
         if not isinstance(region, (tuple, list)) or len(region) != 4:
             raise InputError(f"region = {shown(region)}: must be four numbers")
         self.path = path
@@ -276,22 +265,10 @@ _RASTER = 0.005  # px, error of a curve drawn between pixels of another phase
 
 
 def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
-    """Rows by which each profile lies below the reference, and their standard errors.
+    """Rows by which each profile, (n, rows), lies below the reference, (rows,), and their standard errors.
 
-    The shift, a gain and an offset are fitted by least squares, from the shift of whole rows with the best
-    correlation on.
-
-    Parameters
-    ----------
-    profiles
-        Grey levels over rows, shape (n, rows).
-    reference
-        The same where nothing has moved, shape (rows,).
-
-    Raises
-    ------
-    InputError
-        If the reference is too short or too even to show a shift.
+    The shift, a gain and an offset are fitted by least squares, from the shift of whole rows with the best correlation
+    on.
     """
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import gaussian_filter1d

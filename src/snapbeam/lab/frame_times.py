@@ -21,11 +21,6 @@ def numbers_of_stamps(
 
     *tick* [s] is the unit in which the stamps count; *step* [s] is the time between frames as the file states it, to
     begin with.  Stamps that are coarser than the frames tell lost ones only by the total time.
-
-    Raises
-    ------
-    InputError
-        If the stamps do not increase, are uneven, or tell lost frames without their place.
     """
     times = finite_array(f"{path}: time stamps", times, 1)
     plain, steps = np.arange(times.size), np.diff(times)
@@ -79,11 +74,6 @@ def cine_times(path: Path, count: int) -> NDArray[np.float64] | None:
 
     The format is that of Vision Research: blocks between the setup and the table of frames, each with its size, its kind
     and two spare bytes; a time is a fraction of a second in 32 bits and whole seconds in 32 bits.
-
-    Raises
-    ------
-    InputError
-        If the block does not have a time for each frame.
     """
     with open(path, "rb") as file:
         head = file.read(36)

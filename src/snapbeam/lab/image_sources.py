@@ -122,13 +122,7 @@ def _is_picture(shape: tuple[int, ...], dtype: Any) -> bool:
 
 
 def float_range(pictures: list[NDArray[Any]], path: Path) -> float:
-    """Full scale of floating-point images: 1, or the next full scale of 8, 10, 12, 14 and 16 bits.
-
-    Raises
-    ------
-    InputError
-        If the numbers are no grey levels.
-    """
+    """Full scale of floating-point images: 1, or the next full scale of 8, 10, 12, 14 and 16 bits."""
     top = float(np.max([one.max() for one in pictures]))  # NaN if any is
     low = float(np.min([one.min() for one in pictures]))
     if not (np.isfinite(top) and low >= 0.0 and 0.0 < top <= 65535.0):
@@ -518,13 +512,7 @@ def _mosaic(frame: NDArray[Any]) -> tuple[NDArray[np.float64] | None, float]:
 
 
 def load_image(file: Path, *, grey: bool = True) -> NDArray[Any]:
-    """One picture of 8 or 16 bits or floating point numbers, (height, width), or with colours last.
-
-    Raises
-    ------
-    InputError
-        If the file is no such picture.
-    """
+    """One picture of 8 or 16 bits or floating point numbers, (height, width), or with colours last."""
     with needing(f"{file}: reading it", "lab"):
         import cv2
 
@@ -565,11 +553,6 @@ def images_of_header(header: CameraHeader) -> FrameSource:
     """The numbered images beside a header that says its pixels are in images.
 
     Those whose names begin with the header's; where there are none, all of that kind in its folder.
-
-    Raises
-    ------
-    InputError
-        If they are missing, or their number or size is not what the header says.
     """
     folder = header.path.parent
     kinds = (".tif", ".tiff") if header.image_suffix == ".tif" else (header.image_suffix,)
@@ -685,11 +668,6 @@ def _light_of_packed(path: Path, bits: int) -> NDArray[np.uint16]:
     The camera stores its 12 bits in 10 along the curve of ITU-R BT.709, from black (64 of both) to white (1014 and
     4064).  The levels are within 1 of 4095 of those in the table of the library pycine, 3 for level 0; its licence (GPL)
     is not ours.
-
-    Raises
-    ------
-    InputError
-        If the levels do not have 10 bits.
     """
     if bits != 10:
         raise InputError(
@@ -819,13 +797,7 @@ class VideoSource(FrameSource):
 
 
 def open_source(path: Path) -> FrameSource:
-    """The source for a path.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is of no known kind.
-    """
+    """The source for a path."""
     with needing(f"{path}: reading it", "lab"):
         return _open_source(path)
 

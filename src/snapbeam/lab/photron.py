@@ -117,13 +117,7 @@ class HeaderFields:
 
 
 def read_fields(path: Path) -> HeaderFields:
-    """Read the fields of a header.
-
-    Raises
-    ------
-    InputError
-        If the file is no such header.
-    """
+    """Read the fields of a header."""
     kind = path.suffix.lower()
     if kind not in (".cih", ".cihx"):
         raise InputError(f"{path}: a Photron header ends in .cih or .cihx")
@@ -307,11 +301,6 @@ def read_header(path: str | Path) -> CameraHeader:
     ----------
     path
         A ``.cih`` or ``.cihx`` file.
-
-    Raises
-    ------
-    InputError
-        Naming the file and the field that is missing, malformed or not supported.
     """
     fields = read_fields(Path(path))
     kind = fields.text("format", "mraw").lower()

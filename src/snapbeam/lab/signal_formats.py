@@ -927,13 +927,7 @@ def _one_rate(found: Mapping[str, float], where: str) -> float:
 
 
 def _rate_of(name: str, value: Any, decimal_comma: bool = False, known: float | None = None) -> float | None:
-    """Samples per second [Hz] that a named value states; None if it states none, or is 0 or no number.
-
-    Raises
-    ------
-    InputError
-        If the number has two readings and *known* [Hz] is neither.
-    """
+    """Samples per second [Hz] that a named value states; None if it states none, or is 0 or no number."""
     word, suffix = (name, "") if len(name) > _LONGEST_NAME else split_unit(name)
     for key in (_key(name), _key(word)):
         of_name = max((one for one in _RATES + _STEPS if key.startswith(one)), key=len, default="")

@@ -106,13 +106,7 @@ def _decibel(power: float, other: float) -> float:
 
 
 def spectral_peak(samples: SignalSamples, low: float = 0.0, high: float | None = None) -> float:
-    """Frequency [Hz] of the highest peak of the spectrum (Hann window, parabola through its logarithm).
-
-    Raises
-    ------
-    InputError
-        If the signal is constant or the band [low, high] Hz holds no line of the spectrum.
-    """
+    """Frequency [Hz] of the highest peak of the spectrum (Hann window, parabola through its logarithm)."""
     y = samples.values - samples.values.mean()
     n = y.size
     spectrum = np.abs(np.fft.rfft(y * np.hanning(n), 4 * n))

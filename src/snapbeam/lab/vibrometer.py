@@ -926,11 +926,6 @@ def shaker_signal(tracked: xr.Dataset) -> xr.DataArray:
 
     Gaps of up to five frames are bridged by a cubic spline; of what longer gaps part the longest stretch is
     taken.  Only the sine and the start of the motion are read from it, which a few frames do not change.
-
-    Raises
-    ------
-    InputError
-        If no shaker was followed, or in too few frames.
     """
     from scipy.interpolate import CubicSpline
 

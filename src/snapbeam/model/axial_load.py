@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from snapbeam.model.drive.base import Drive, Scale, Timed
 from snapbeam.model.drive.components import STEEPEST, Component, in_pieces, rising
 from snapbeam.model.quantity import RUN, quantity
-from snapbeam.util.validation import InputTypeError, shown
+from snapbeam.util.validation import instance
 
 _Array = NDArray[np.float64]
 
@@ -182,7 +182,4 @@ class AxialLoadModulation:
     """True if the force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.motion, LoadMotion):
-            raise InputTypeError(
-                f"motion = {shown(self.motion)}: must be a HarmonicLoad(frequency_ratio=2.0, amplitude=...) or a LoadRamp"
-            )
+        instance("motion", self.motion, LoadMotion, "a HarmonicLoad(frequency_ratio=2.0, amplitude=...) or a LoadRamp")

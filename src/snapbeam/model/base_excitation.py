@@ -12,7 +12,7 @@ from snapbeam.model.boundary_conditions import modes_between
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.quantity import STRUCTURE, check_fields, quantity
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.util.validation import InputError, InputTypeError, shown
+from snapbeam.util.validation import InputError, instance
 
 DIRECTIONS = ("up", "down")
 
@@ -74,10 +74,7 @@ class BaseExcitation:
     """True if the force depends on the velocity of the structure."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.motion, Drive):
-            raise InputTypeError(
-                f"motion = {shown(self.motion)}: must be a drive, such as AccelerationSine(frequency_ratio=1.2, ...)"
-            )
+        instance("motion", self.motion, Drive, "a drive, such as AccelerationSine(frequency_ratio=1.2, ...)")
         check_fields(self)
         if not self.motion.can_excite_base():
             known = ", ".join(repr(name) for name, kind in _shaking().items() if kind.can_excite_base())
@@ -93,13 +90,7 @@ class BaseExcitation:
 
 
 def rigid_mass(model: ReducedModel) -> NDArray[np.float64]:
-    """rho S integral(phi_i), kg m^-0.5, or m r of a structure given by matrices, shape (N,): what a base accelerates.
-
-    Raises
-    ------
-    InputError
-        For a structure given by matrices without a base_shape.
-    """
+    """rho S integral(phi_i), kg m^-0.5, or m r of given matrices, shape (N,): what a base accelerates."""
     beam = model.beam
     if beam is None:
         if model.base_shape is None:

@@ -11,7 +11,7 @@ from typing import Any
 from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions, Modes, modes_between
 from snapbeam.model.buckling_modes import wavenumbers
 from snapbeam.model.quantity import quantities, quantity
-from snapbeam.util.validation import InputError, InputTypeError, finite, shown
+from snapbeam.util.validation import InputError, finite, instance, shown
 
 
 class _Derived(float):
@@ -98,8 +98,7 @@ class Beam:
     _given: str = dataclasses.field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.boundary, BoundaryConditions):
-            raise InputTypeError(f"boundary = {shown(self.boundary)}: must be BoundaryConditions")
+        instance("boundary", self.boundary, BoundaryConditions, "BoundaryConditions")
         level: float | None = self.buckling_level
         load: float | None = self.axial_load
         # what followed from the other in the beam that dataclasses.replace starts from is not given

@@ -64,6 +64,15 @@ class _Evaluation(NamedTuple):
     amplitude: _Array
 
 
+def _on_beam(x: ArrayLike, length: float) -> _Array:
+    """Positions from 0 to *length*, m."""
+    position = finite_array("x", x)
+    if position.size and (position.min() < 0.0 or position.max() > length):
+        bad = position.min() if position.min() < 0.0 else position.max()
+        raise InputError(f"x = {bad:g}: must lie in [0, {length:g}] m, on the beam")
+    return position
+
+
 class BucklingModes:
     """The first buckling modes phi_i of a clamped-clamped beam, normalised by Eq. (9).
 
@@ -126,10 +135,7 @@ class BucklingModes:
         return np.asarray(-at.amplitude * at.factor * at.k**2 * np.where(at.even, at.sine, at.cosine))
 
     def _at(self, x: ArrayLike) -> _Evaluation:
-        position = finite_array("x", x)
-        if position.size and (position.min() < 0.0 or position.max() > self.length):
-            bad = position.min() if position.min() < 0.0 else position.max()
-            raise InputError(f"x = {bad:g}: must lie in [0, {self.length:g}] m, on the beam")
+        position = _on_beam(x, self.length)
         xi = position[np.newaxis] - 0.5 * self.length
         column = (-1, *(1,) * position.ndim)
         k = self.wavenumber.reshape(column)
@@ -209,15 +215,7 @@ class SpringModes:
 
     Slopes are orthonormal, and the curvatures with the springs' energy have the integrals k_i^2.  Every mode rises from
     the left end.  Between equal springs the modes are written about the centre, so that the antisymmetric ones are
-    exactly 0 there.
-
-    Parameters
-    ----------
-    length : float
-        L, m.
-    count : int
-    left, right : float
-        Rotational stiffnesses over E I/L; infinite for a clamp.
+    exactly 0 there.  *left* and *right* are rotational stiffnesses over E I/L, infinite for a clamp.
     """
 
     def __init__(self, length: float, count: int, left: float, right: float) -> None:
@@ -269,22 +267,15 @@ class SpringModes:
 
     def shape(self, x: ArrayLike) -> _Array:
         """Mode shapes phi_i at the positions *x* (m, 0 to L); shape (N, *x.shape), in m^0.5."""
-        return self._at(self._checked(x), 0)
+        return self._at(_on_beam(x, self.length), 0)
 
     def slope(self, x: ArrayLike) -> _Array:
         """Slopes phi_i' likewise, in m^-0.5."""
-        return self._at(self._checked(x), 1)
+        return self._at(_on_beam(x, self.length), 1)
 
     def curvature(self, x: ArrayLike) -> _Array:
         """Curvatures phi_i'' likewise, in m^-1.5."""
-        return self._at(self._checked(x), 2)
-
-    def _checked(self, x: ArrayLike) -> _Array:
-        position = finite_array("x", x)
-        if position.size and (position.min() < 0.0 or position.max() > self.length):
-            bad = position.min() if position.min() < 0.0 else position.max()
-            raise InputError(f"x = {bad:g}: must lie in [0, {self.length:g}] m, on the beam")
-        return position
+        return self._at(_on_beam(x, self.length), 2)
 
     def _at(self, x: ArrayLike, derivative: int) -> _Array:
         position = np.asarray(x, dtype=np.float64)

@@ -18,27 +18,16 @@ _RESOLVED = 1e-11
 
 
 def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: ArrayLike) -> NDArray[np.float64]:
-    """Minimum potential energy of any shape that passes through a point, with U = 0 for the straight beam.
+    """Minimum potential energy, J, 0 for the straight beam, of any shape through a point x_s in (0, 1), r (m).
 
-    With c_i = phi_i(x_s) and S_1(Lambda) = sum c_i^2/(E I k_i^2 - Lambda), the minimum energy of a shape with
-    w(x_s) = r is the maximum value of
+    With c_i = phi_i(x_s) and S_1(Lambda) = sum c_i^2/(E I k_i^2 - Lambda), the minimum energy of a shape with w(x_s) =
+    r is the maximum value of
 
         r^2/(2 S_1(Lambda)) - (P - Lambda)^2/(4 gamma)
 
-    over Lambda below the first zero of S_1: Lagrange duality with the tension as the multiplier, and no
-    gap, since the energy is convex in the shape once the tension is fixed below the load that buckles the
-    beam pinned at x_s.  Any Lambda gives a valid lower bound.
-
-    Parameters
-    ----------
-    location : array_like
-        x_s, each in (0, 1).
-    displacement : array_like
-        r, m; broadcast against *location*.
-
-    Returns
-    -------
-    array of the broadcast shape, J
+    over Lambda below the first zero of S_1: Lagrange duality with the tension as the multiplier, and no gap, since the
+    energy is convex in the shape once the tension is fixed below the load that buckles the beam pinned at x_s.  Any
+    Lambda gives a valid lower bound.
     """
     x, r = np.broadcast_arrays(np.asarray(location, float), np.asarray(displacement, float))
     places, which = np.unique(x.ravel(), return_inverse=True)

@@ -46,33 +46,19 @@ class Equilibrium:
 
 
 def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[tuple[_Array, int]]:
-    """All solutions alpha of K0 alpha + gamma (alpha . alpha) alpha = B.
+    """All solutions alpha of K0 alpha + gamma (alpha . alpha) alpha = B, with their numbers of negative eigenvalues.
 
-    With the eigenvalues kappa_i of K0 and B in its eigenvectors, alpha_i = B_i/(kappa_i + gamma s), where
-    s = alpha . alpha solves one secular equation,
+    With the eigenvalues kappa_i of K0, (N,) or (N, N), and B in its eigenvectors, alpha_i = B_i/(kappa_i + gamma s),
+    where s = alpha . alpha solves one secular equation,
 
         h(s) = sum B_i^2/(kappa_i + gamma s)^2 - s = 0.
 
     Between two of its poles h is convex and has no root or two; beyond the last it falls, with one root, the well of
-    minimum energy.  So all roots are found: the minimum value between two poles decides.  Where B_i = 0 and
-    kappa_i < 0 a pair with alpha_i of either sign may branch off at kappa_i + gamma s = 0.
+    minimum energy.  So all roots are found: the minimum value between two poles decides.  Where B_i = 0 and kappa_i < 0
+    a pair with alpha_i of either sign may branch off at kappa_i + gamma s = 0.
 
-    The tangent stiffness is K0 + gamma s and 2 gamma alpha alpha^T, of rank one: it has as many negative
-    eigenvalues as there are kappa_i + gamma s < 0, less one where h rises.
-
-    Parameters
-    ----------
-    stiffness : array of shape (N,) or (N, N)
-        K0.
-    gamma : float
-        Coefficient of the tension term, at least 0.
-    force : array of shape (N,)
-        B.
-
-    Returns
-    -------
-    list of pairs
-        alpha, shape (N,), and the number of negative eigenvalues there.
+    The tangent stiffness is K0 + gamma s and 2 gamma alpha alpha^T, of rank one: it has as many negative eigenvalues as
+    there are kappa_i + gamma s < 0, less one where h rises.
     """
     if stiffness.ndim == 1:
         kappa, turned, axes = stiffness, force, None
@@ -278,13 +264,7 @@ class Condensed(NamedTuple):
 
 
 def condensed(stiffness: _Array, force: _Array, elongation: _Array) -> Condensed:
-    """Eliminate the coordinates that do not change the elongation alpha . S alpha, by static condensation.
-
-    Raises
-    ------
-    InputError
-        If the stiffness of these coordinates is singular.
-    """
+    """Eliminate the coordinates that do not change the elongation alpha . S alpha, by static condensation."""
     full = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
     value, axes = np.linalg.eigh(elongation)
     stretched = value > 1e-12 * value[-1]
@@ -312,11 +292,6 @@ def landscape_of(
 
     At most two of them are stable: beyond the second eigenvalue of K0 + gamma s the term 2 gamma alpha alpha^T, of rank
     one, cannot make up for two negative ones.
-
-    Raises
-    ------
-    InputError
-        If no equilibrium is stable, or the wells do not differ at mid-span.
     """
     found = []
     if elongation is None:
@@ -357,33 +332,16 @@ _BESIDE = 1e-9
 
 
 def least_energy_through(stiffness: _Array, gamma: float, force: _Array, shapes: _Array, heights: _Array) -> _Array:
-    """Minimum potential energy of any amplitudes with c . alpha = r, J.
+    """Minimum potential energy, J, (runs,), of any amplitudes with c . alpha = r, of *shapes* c and *heights* r, m.
 
     With S_cc = sum c_i^2/(K0_i - mu), S_cB = sum c_i B_i/(K0_i - mu) and S_BB alike, it is the maximum value of
 
         (r - S_cB)^2/(2 S_cc) - S_BB/2 - mu^2/(4 gamma)
 
     over mu below the first zero of S_cc.  For every mu, gamma s^2/4 >= -mu s/2 - mu^2/(4 gamma), s = alpha . alpha, so
-    that the minimum of the remaining quadratic form on the plane is a lower bound.  It is attained: the bound
-    is concave in mu, its slope is -(s + mu/gamma)/2 with the s of the minimising shape, and vanishes at
-    mu = -gamma s.
+    that the minimum of the remaining quadratic form on the plane is a lower bound.  It is attained: the bound is
+    concave in mu, its slope is -(s + mu/gamma)/2 with the s of the minimising shape, and vanishes at mu = -gamma s.
     Without B it is that of equal wells.
-
-    Parameters
-    ----------
-    stiffness : array of shape (N,)
-        K0, diagonal.
-    gamma : float
-    force : array of shape (N,)
-        B.
-    shapes : array of shape (runs, N)
-        c of each run.
-    heights : array of shape (runs,)
-        r, m.
-
-    Returns
-    -------
-    array of shape (runs,)
     """
     squares = shapes * shapes
     different, which = np.unique(squares, axis=0, return_inverse=True)

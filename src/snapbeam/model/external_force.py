@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from snapbeam.model.drive.base import Drive, Scale, Timed
 from snapbeam.model.drive.components import Component, Tone, hermite, sampled
 from snapbeam.model.drive.sampled import FileKeys, Sampled, require_unit
-from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, quantity
-from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
+from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, keep_shape, quantity
+from snapbeam.model.reduced_model import ReducedModel, row_of_matrices
+from snapbeam.util.validation import InputError, InputTypeError, shown
 
 _Array = NDArray[np.float64]
 
@@ -269,10 +269,7 @@ class ExternalForce:
             )
         check_fields(self)
         check_label(self.label)
-        if self.shape is not None:
-            shape = finite_array("shape", self.shape, 1).copy()
-            shape.setflags(write=False)
-            object.__setattr__(self, "shape", shape)
+        keep_shape(self)
 
     @property
     def constant_part(self) -> float:
@@ -298,13 +295,4 @@ class ExternalForce:
             raise InputError(
                 f"force.location = {self.location:g}: a structure given by matrices has no length; give shape"
             )
-        if self.shape is None:
-            assert model.contact_shape is not None
-            return model.contact_shape
-        if self.shape.shape != (model.modes,):
-            raise InputError(
-                f"force.shape of shape {self.shape.shape}: must be ({model.modes},); give one number for each "
-                "coordinate"
-            )
-        found: _Array = self.shape
-        return found
+        return row_of_matrices(model, self.shape)

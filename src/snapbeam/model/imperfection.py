@@ -25,22 +25,10 @@ _POINTS = 16
 
 
 def projected(modes: Modes, profile: _Array, symmetric: bool = False) -> _Array:
-    """The integrals of w0' phi_i', m^0.5, of a shape through points.
+    """The integrals of w0' phi_i', m^0.5, of a shape through points: places from 0 to 1 and heights, m, (2, points).
 
     The slopes of the modes are orthonormal, so that sum alpha0_i phi_i is the shape among those of the modes whose
-    slope is nearest to that of w0.
-
-    Parameters
-    ----------
-    modes : BucklingModes or SpringModes
-    profile : array of shape (2, points)
-        Places over the length from 0 to 1, and heights, m, zero at the ends.
-    symmetric : bool
-        True if the shape is known to be symmetric, so that the antisymmetric modes have no part in it.
-
-    Returns
-    -------
-    array of shape (N,)
+    slope is nearest to that of w0.  Antisymmetric modes have no part in a *symmetric* shape.
     """
     from scipy.interpolate import CubicSpline
 

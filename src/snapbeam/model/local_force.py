@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.extension import check_defined, check_names, check_pair, overrides
-from snapbeam.model.quantity import STRUCTURE, check_fields, check_label, numbers_type, quantity
-from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.util.validation import InputError, finite_array
+from snapbeam.model.quantity import STRUCTURE, check_fields, check_label, keep_shape, numbers_type, quantity
+from snapbeam.model.reduced_model import ReducedModel, row_of_matrices
+from snapbeam.util.validation import InputError
 
 _Array = NDArray[np.float64]
 
@@ -130,10 +130,7 @@ class LocalForce:
     def __post_init__(self) -> None:
         check_fields(self)
         check_label(self.label)
-        if self.shape is not None:
-            shape = finite_array("shape", self.shape, 1).copy()
-            shape.setflags(write=False)
-            object.__setattr__(self, "shape", shape)
+        keep_shape(self)
 
     @staticmethod
     def force(law: Any, displacement: float) -> float:
@@ -219,15 +216,7 @@ class LocalForce:
                 f"force.location = {self.location}, coordinate = {self.coordinate!r}: a structure given by matrices has "
                 "no length; give shape"
             )
-        if self.shape is None:
-            assert model.contact_shape is not None
-            return model.contact_shape
-        if self.shape.shape != (model.modes,):
-            raise InputError(
-                f"force.shape of shape {self.shape.shape}: must be ({model.modes},); give one number for each coordinate"
-            )
-        found: _Array = self.shape
-        return found
+        return row_of_matrices(model, self.shape)
 
     def largest_displacement(self, model: ReducedModel) -> float:
         """Displacement that an interwell motion may reach, m or rad: twice that of a well or of the length scale."""

@@ -256,13 +256,7 @@ def _chosen(values: Mapping[str, Any], section: str) -> Any:
 
 
 def read_file(section: str, values: Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> dict[str, Any]:
-    """The values of a section with the record that its ``file``, relative to *folder*, contains in place of the keys of files.
-
-    Raises
-    ------
-    InputError
-        For a type without a record, a file that cannot be read, and values that are missing or given twice.
-    """
+    """The values of a section with the record of its ``file``, relative to *folder*, in place of the keys of files."""
     kinds = kinds_of(numbered(section)[0])
     kind = kinds.get(str(values.get("type")))
     if kind is None or not hasattr(kind, "from_file"):

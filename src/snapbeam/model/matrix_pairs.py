@@ -178,23 +178,12 @@ def eigenpairs(stiffness: Any, mass: Any, magnitude: Any = None, count: int | No
     """Solve K x = lambda M x for all eigenvalues or the *count* lowest, and decide which of them are 0.
 
     Coordinates that nothing connects are solved apart, so that each part has a scale of its own.  Small eigenvalues of
-    a part come from inverse iteration.  With the terms t_ij = x_i K_ij x_j of its Rayleigh quotient, an eigenvalue has the
-    error eps min(sum |t_ij|, 32 sqrt(sum t_ij^2))/(x . M x).  (Rigid modes of 30 pairs, meshes of 50 to 5000 elements and
-    random ones of 5 to 800 coordinates, had at most a quarter of the first and a sixth of the second.)  An eigenvalue is 0
-    if it is below its error, and if the first one that is not 0 is 100 times as large as that error.
-
-    Parameters
-    ----------
-    stiffness, mass : array or sparse matrix of shape (N, N)
-        Symmetric matrices; the mass is positive definite.
-    magnitude : array of shape (N, N), optional
-        Sum of the moduli of the terms that the stiffness is the sum of; |K| by default.
-    count : int, optional
-
-    Raises
-    ------
-    InputError
-        If rounding hides whether an eigenvalue is 0.
+    a part come from inverse iteration.  With the terms t_ij = x_i K_ij x_j of its Rayleigh quotient, an eigenvalue has
+    the error eps min(sum |t_ij|, 32 sqrt(sum t_ij^2))/(x . M x).  (Rigid modes of 30 pairs, meshes of 50 to 5000
+    elements and random ones of 5 to 800 coordinates, had at most a quarter of the first and a sixth of the second.)  An
+    eigenvalue is 0 if it is below its error, and if the first one that is not 0 is 100 times as large as that error; an
+    error is raised if rounding hides it.  *magnitude* is the sum of the moduli of the terms that the stiffness is the
+    sum of, |K| by default.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components

@@ -99,13 +99,7 @@ def _change(system: System, more: System, quantity: Callable[[System], ArrayLike
 
 
 def error_of_auto(text: object) -> float | None:
-    """The relative error that a number of modes given as text asks for: ``"auto"``, ``"auto 0.2%"``; None for others.
-
-    Raises
-    ------
-    InputError
-        If the error is not between 0.001 % and 50 %.
-    """
+    """The relative error asked for by a number of modes such as ``"auto"``, ``"auto 0.2%"``; None for others."""
     found = _AUTO.fullmatch(text.strip()) if isinstance(text, str) else None
     if found is None:
         return None

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.beam import Beam
 from snapbeam.model.buckling_modes import MAX_MODES
-from snapbeam.util.validation import InputError, InputTypeError, integer, shown
+from snapbeam.util.validation import InputError, instance, integer
 
 # ----------------------------------------------------------------------------------------------------
 # Exact natural frequencies of a beam between rotational springs, straight or buckled.
@@ -42,13 +42,7 @@ _STEPS = 60
 
 
 def spring_natural_frequency(beam: Beam, count: int, reduced: _Array) -> _Array:
-    """The first *count* frequencies, Hz, near those of a reduced model, which are upper bounds of them.
-
-    Raises
-    ------
-    InputError
-        If one is not found near the value of the reduced model.
-    """
+    """The first *count* frequencies, Hz, near those of a reduced model, which are upper bounds of them."""
     balance = _balance_of(beam)
     found: list[float] = []
     for at in range(count):
@@ -182,8 +176,7 @@ def exact_natural_frequencies(beam: Beam, count: int = 10) -> _Array:
     --------
     snapbeam.Beam, snapbeam.ReducedModel
     """
-    if not isinstance(beam, Beam):
-        raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
+    instance("beam", beam, Beam, "a Beam")
     count = integer("count", count, 1, _MAX_COUNT)
     if beam.boundary.is_elastic:
         return _between_springs(beam, integer("count", count, 1, MAX_MODES // 4))

@@ -36,28 +36,11 @@ _WHOLE = "a whole number, whole numbers separated by commas, such as 1,32, or st
 
 
 def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool = False, unit: str = "1") -> Axis:
-    """Return *value* as one number, or as a strictly increasing axis.
+    """Return *value* as one number, or as a strictly increasing axis, in *unit*; *name* stands in refusals.
 
-    Parameters
-    ----------
-    name : str
-        The parameter to name in a refusal.
-    value : float, str or sequence of float
-        ``0.18``, ``"0.18"``, ``"1/2.1"``, ``"0.1,0.2,0.5"``, or ``"0.1:4:64"`` for 64 points from 0.1 to 4,
-        both included, ``"1e3:1e6:7:log"`` for a geometric sequence.  Numbers of text may have a unit that pint knows: ``"1.9um:2.1um:5"``, ``"1kohm,1Mohm"``.
-    whole : bool
-        True if the numbers must be integers, for the error message.
-    unit : str
-        Unit of the parameter, in which the result is.
-
-    Returns
-    -------
-    float or array of shape (points,)
-
-    Raises
-    ------
-    InputError
-        If it cannot be read so, is not finite, or does not increase.
+    It is ``0.18``, ``"0.18"``, ``"1/2.1"``, ``"0.1,0.2,0.5"``, or ``"0.1:4:64"`` for 64 points from 0.1 to 4, both
+    included, ``"1e3:1e6:7:log"`` for a geometric sequence.  Numbers of text may have a unit that pint knows:
+    ``"1.9um:2.1um:5"``, ``"1kohm,1Mohm"``.  *whole* numbers are integers.
     """
     instance("name", name, str, "text")
     flag("whole", whole)
@@ -152,13 +135,7 @@ def from_physical(system: System, name: str, value: ArrayLike) -> Any:
 
 
 def checked_physical(system: System, name: str, value: float, shown: str) -> float:
-    """The ratio that a value in the physical unit of *name* is, refused, with the name *shown*, where it cannot be.
-
-    Raises
-    ------
-    InputError
-        If the ratio is out of its range; the message contains both.
-    """
+    """The ratio that a value in the physical unit of *name* is, refused, with the name *shown*, where it cannot be."""
     ratio, row = float(from_physical(system, name, value)), lookup(PHYSICAL[name].parameter)
     short = split_name(row.name)[1]
     try:

@@ -80,12 +80,7 @@ def law_of(values: Mapping[str, Any]) -> str:
 
 
 def contact_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The section of a system, complete: the paper's stiffness where none was given, a loss from a restitution.
-
-    Raises
-    ------
-    InputError
-    """
+    """The section of a system, complete: the paper's stiffness where none was given, a loss from a restitution."""
     values = dict(given)
     law = values["type"] = law_of(values)
     materials = {name: values.pop(name) for name in MATERIALS if name in values}
@@ -549,12 +544,7 @@ class Config:
         return {section: own.get(section, {}) for section in found}
 
     def _require(self, *sections: str) -> None:
-        """Refuse values of *sections* that only the paper's beam has.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse values of *sections* that only the paper's beam has."""
         if self.extends_paper:
             return
         lines, of_paper = [], self._of_paper()
@@ -938,11 +928,6 @@ def read_parameter_file(name: str, path: str | os.PathLike[str]) -> dict[str, An
 
     The path is relative to the folder of the file that contains it.  A section of another type replaces that of the extended
     file.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be read or is no TOML, and for files that extend each other.
     """
     return _extended(name, file_path(name, path), ())
 
@@ -977,13 +962,7 @@ def _extended(name: str, file: Path, above: tuple[Path, ...]) -> dict[str, Any]:
 
 
 def system_of_file(path: str | os.PathLike[str]) -> System:
-    """The system of a parameter file, or of a file that :meth:`~snapbeam.System.save` wrote.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
-    """
+    """The system of a parameter file, or of a file that :meth:`~snapbeam.System.save` wrote."""
     sections = read_parameter_file("path", path)
     if _is_saved_system(sections):
         return System.from_mapping(sections)

@@ -18,6 +18,7 @@ from snapbeam.util.validation import (
     InputError,
     choice,
     finite,
+    finite_array,
     flag,
     integer,
     nonnegative,
@@ -160,6 +161,14 @@ def check_label(label: Any) -> None:
         raise InputError(
             f"label = {shown(label)}: must be printable text without spaces at its ends, and not a number, such as 'tip'"
         )
+
+
+def keep_shape(force: Any) -> None:
+    """Replace the ``shape`` of a force, unless it is None, by a read-only array."""
+    if force.shape is not None:
+        shape = finite_array("shape", force.shape, 1).copy()
+        shape.setflags(write=False)
+        object.__setattr__(force, "shape", shape)
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -19,7 +19,16 @@ from snapbeam.model.equilibria import Equilibrium, Landscape, condensed, landsca
 from snapbeam.model.imperfection import Imperfection, perfect_equilibria
 from snapbeam.model.matrix_pairs import eigenpairs
 from snapbeam.model.quantity import ParameterField, quantities
-from snapbeam.util.validation import InputError, InputTypeError, finite_array, integer, positive, shown, within
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    finite_array,
+    instance,
+    integer,
+    positive,
+    shown,
+    within,
+)
 
 # ----------------------------------------------------------------------------------------------------
 # Eigenvalues of the diagonal-plus-rank-one problems into which a buckled beam splits.
@@ -30,27 +39,13 @@ _HALVINGS = 2200
 
 
 def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
-    """Solve diag(d) y = lam (Id + c 1 1^T) y to high relative accuracy.
+    """Solve diag(d) y = lam (Id + c 1 1^T) y, d_i >= 0, c > 0, to high relative accuracy; Y^T (Id + c 1 1^T) Y = Id.
 
-    The eigenvalues are the roots of 1 - c' sum d_i/(d_i - lam) with c' = c/(1 + c n).  The sum falls
-    from +inf to -inf between neighbouring d_i, and from a positive value at lam = 0 to -inf at the
-    smallest d_i, so each interval holds exactly one root.  Bisection for its distance from the nearer
-    pole keeps the differences d_i - lam, and with them the eigenvectors y_i = 1/(d_i - lam), accurate
-    whatever the spread of the d_i, which grows like n^4 here (cf. Golub, SIAM Rev. 15, 1973).
-
-    Parameters
-    ----------
-    diagonal : array of shape (n,)
-        d_i >= 0, in any order.
-    c : float
-        Weight c > 0 of the rank-one part.
-
-    Returns
-    -------
-    eigenvalues : array of shape (n,)
-        Eigenvalues, ascending.
-    vectors : array of shape (n, n)
-        Columns with Y^T (Id + c 1 1^T) Y = Id.
+    The eigenvalues, returned ascending, are the roots of 1 - c' sum d_i/(d_i - lam) with c' = c/(1 + c n).  The sum
+    falls from +inf to -inf between neighbouring d_i, and from a positive value at lam = 0 to -inf at the smallest d_i,
+    so each interval holds exactly one root.  Bisection for its distance from the nearer pole keeps the differences d_i
+    - lam, and with them the eigenvectors y_i = 1/(d_i - lam), accurate whatever the spread of the d_i, which grows like
+    n^4 here (cf. Golub, SIAM Rev. 15, 1973).
     """
     n = diagonal.size
     if not (np.isfinite(diagonal).all() and math.isfinite(c)):
@@ -144,11 +139,6 @@ def linear_modes_about(
     """Linear modes about the equilibrium alpha of a tangent stiffness; each parity by itself where the tangent does not couple the two.
 
     *magnitude* is the sum of the moduli of its terms, from which rounding follows.  Rigid modes have the frequency 0.
-
-    Raises
-    ------
-    InputError
-        If an eigenvalue is negative, or if rounding hides whether one is 0.
     """
     count = mass.shape[0]
     odd = np.zeros(count, dtype=bool) if parity is None else parity < 0
@@ -585,8 +575,7 @@ class ReducedModel(Wells):
             Imperfection, which makes the wells unequal; a zero one is ignored.  Damping is that of the linear
             modes about the well that the striker pushes away from, and the same matrix everywhere.
         """
-        if not isinstance(beam, Beam):
-            raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
+        instance("beam", beam, Beam, "a Beam")
         count = integer("modes", modes, 1, MAX_MODES)
         shapes = beam.buckling_modes(count)
         k = shapes.wavenumber
@@ -942,26 +931,22 @@ def _coupling(parity: NDArray[np.int_]) -> _Array:
 # The shape of a beam along its length, from the amplitudes of its buckling modes.
 
 
+def row_of_matrices(model: ReducedModel, shape: _Array | None) -> _Array:
+    """Row of a force on a structure given by matrices, (N,): its *shape*, by default that of the contact."""
+    if shape is None:
+        assert model.contact_shape is not None
+        return model.contact_shape
+    if shape.shape != (model.modes,):
+        raise InputError(
+            f"force.shape of shape {shape.shape}: must be ({model.modes},); give one number for each coordinate"
+        )
+    return shape
+
+
 def displacement_along(
     length: float, amplitude: ArrayLike, positions: ArrayLike, modes: Modes | None = None
 ) -> NDArray[np.float64]:
-    """Displacement w = sum alpha_i phi_i(x), m.
-
-    Parameters
-    ----------
-    length : float
-        L, m.
-    amplitude : array_like of shape (..., N)
-        alpha, m^0.5.
-    positions : array_like of shape (points,)
-        x over L, each in [0, 1].
-    modes : optional
-        Buckling modes of other ends than clamps.
-
-    Returns
-    -------
-    array of shape (..., points)
-    """
+    """Displacement w = sum alpha_i phi_i(x), m, (..., points), of amplitudes (..., N) at *positions* x/L in [0, 1]."""
     alpha, x = finite_array("amplitude", amplitude), finite_array("positions", positions, 1)
     if x.size and (x.min() < 0.0 or x.max() > 1.0):
         raise InputError(f"positions from {x.min():g} to {x.max():g}: must lie in [0, 1]")

@@ -9,7 +9,7 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, quantity
-from snapbeam.util.validation import InputError, InputTypeError, shown
+from snapbeam.util.validation import InputError, instance
 
 SIDES = ("below", "above")
 
@@ -78,10 +78,7 @@ class Striker:
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        if not isinstance(self.drive, Drive):
-            raise InputTypeError(
-                f"drive = {shown(self.drive)}: must be a drive, such as Sine(frequency_ratio=1.2, ...)"
-            )
+        instance("drive", self.drive, Drive, "a drive, such as Sine(frequency_ratio=1.2, ...)")
         check_fields(self)
         if self.mass is None:
             for name in ("suspension_stiffness", "suspension_damping"):
@@ -200,8 +197,6 @@ class Contact:
     def __post_init__(self) -> None:
         if isinstance(self.striker, Shaker):
             object.__setattr__(self, "striker", self.striker.striker())
-        if not isinstance(self.striker, Striker):
-            raise InputTypeError(f"striker = {shown(self.striker)}: must be a Striker or a Shaker")
-        if not isinstance(self.law, ContactLaw):
-            raise InputTypeError(f"law = {shown(self.law)}: must be a law of contact, such as HertzContact(stiffness)")
+        instance("striker", self.striker, Striker, "a Striker or a Shaker")
+        instance("law", self.law, ContactLaw, "a law of contact, such as HertzContact(stiffness)")
         check_label(self.label)

@@ -115,8 +115,7 @@ class System:
 
     def __post_init__(self) -> None:
         model, start = self.model, self.initial_state
-        if not isinstance(model, ReducedModel):
-            raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
+        instance("model", model, ReducedModel, "a ReducedModel")
         for name, (kind, words) in _A.items():
             given = getattr(self, name)
             if name.endswith("s"):
@@ -145,8 +144,7 @@ class System:
         if model.length_scale is None:
             model.require_bistable("a run")
         if start is not None:
-            if not isinstance(start, State):
-                raise InputTypeError(f"initial_state = {shown(start)}: must be a State")
+            instance("initial_state", start, State, "a State")
             if start.batch:
                 raise InputError(f"initial_state: a batch of shape {start.batch}: must be one state")
             if start.modes != model.modes:

@@ -213,13 +213,7 @@ def _kind_of(dataset: xr.Dataset) -> _Kind:
 
 
 def figures_of(dataset: xr.Dataset) -> tuple[str, dict[str, _Draws]]:
-    """Return the kind of a dataset, and a function that draws for each name that can be drawn, the default first.
-
-    Raises
-    ------
-    InputError
-        If the dataset is not a result of snapbeam that has a figure.
-    """
+    """Return the kind of a dataset, and a function that draws for each name that can be drawn, the default first."""
     kind = _kind_of(dataset)
     return kind.words, kind.figures(dataset)
 

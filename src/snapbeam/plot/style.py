@@ -440,15 +440,7 @@ def cell_edges(points: ArrayLike, low: float = -np.inf, high: float = np.inf) ->
 
 
 def class_cells(ax: Axes, x: ArrayLike, y: ArrayLike, kinds: ArrayLike) -> None:
-    """Colour cells by their response class.
-
-    Parameters
-    ----------
-    x, y : array_like
-        Borders of the cells, of shapes (columns + 1,) and (rows + 1,), or both (rows + 1, columns + 1).
-    kinds : array_like, shape (rows, columns)
-        :class:`~snapbeam.ResponseClass` of each.
-    """
+    """Colour cells, borders *x* and *y* as of pcolormesh, by the response class of each, *kinds* (rows, columns)."""
     order = sorted(CLASS_COLORS)
     ax.pcolormesh(
         np.asarray(x),

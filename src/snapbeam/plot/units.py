@@ -112,15 +112,7 @@ def in_symbols(words: str) -> str:
 
 
 def scale_text(attrs: Mapping[Any, Any], words: str) -> str:
-    """Words with the length scale b behind them, as in ``w/b (b = 6 µm)``; as they are where it is not known.
-
-    Parameters
-    ----------
-    attrs : mapping
-        Attributes of a dataset.
-    words : str
-        Words of a quantity over b.
-    """
+    """*words* with the length scale b behind them, as in ``w/b (b = 6 µm)``; as they are where it is not known."""
     names = ("length_scale", "beam_buckling_level", "fixed_beam_buckling_level")  # the last of designs
     scale = next((attrs[name] for name in names if attrs.get(name)), None)
     symbol = "$b$" if "$" in words else "b"

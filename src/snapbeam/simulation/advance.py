@@ -92,8 +92,7 @@ def advance(
     >>> state.amplitude.shape
     (1,)
     """
-    if not isinstance(system, System):
-        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    instance("system", system, System, "a System")
     if state is not None and not isinstance(state, State):
         raise InputTypeError(f"state = {shown(state)}: must be a State")
     integration = instance(

@@ -9,28 +9,13 @@ import numpy as np
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.util.validation import InputError, InputTypeError, shown
+from snapbeam.util.validation import InputError, instance, or_default
 
 
 def checked_request(system: Any, integration: Any) -> tuple[System, Integration]:
-    """Check a system and an integration.
-
-    Parameters
-    ----------
-    system : System
-    integration : Integration or None
-        None selects the default settings.
-
-    Raises
-    ------
-    InputError
-        If an argument has the wrong type, or nothing in the system can move.
-    """
-    if not isinstance(system, System):
-        raise InputTypeError(f"system = {shown(system)}: must be a System")
-    integration = Integration() if integration is None else integration
-    if not isinstance(integration, Integration):
-        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
+    """Check a system and an integration, None for the default settings."""
+    instance("system", system, System, "a System")
+    integration = or_default("integration", integration, Integration, "an Integration")
     require_motion(system)
     return system, integration
 

@@ -175,13 +175,7 @@ def even_instants(end: float, count: int) -> _Array:
 
 
 def prepared(system: System, integration: Integration, sample_times: ArrayLike | None) -> Prepared:
-    """Choose the steps and the sample times of a run, and report the diagnostics of the system.
-
-    Raises
-    ------
-    InputError
-        If the sample times are not increasing times within the run.
-    """
+    """Choose the steps and the sample times of a run, and report the diagnostics of the system."""
     tell(system.diagnostics())
     plan, accuracy = plans_of(system, integration, run_columns(system, {}))[0], None
     if integration.tolerance is not None:

@@ -31,7 +31,7 @@ from snapbeam.util.files import NoRoomError, check_writable, missing_room
 from snapbeam.util.interrupts import raise_held
 from snapbeam.util.netcdf import netcdf_stream, read_netcdf
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputTypeError, instance, shown
+from snapbeam.util.validation import instance
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -96,8 +96,7 @@ def simulate_to_file(
     >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> summary = sb.simulate_to_file(system, sb.Integration(cycles=2), path="run.nc")
     """
-    if not isinstance(system, System):
-        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    instance("system", system, System, "a System")
     integration = instance(
         "integration", Integration() if integration is None else integration, Integration, "an Integration"
     )

@@ -296,12 +296,8 @@ def compute_table(
 ) -> tuple[ResultTable, dict[str, Any]]:
     """Compute any work over the points of its sweep, with a checkpoint if its options give one.
 
-    Returns
-    -------
-    table : ResultTable
-        One row for each point, in the order of counting.
-    made_with : dict
-        Attributes of the checkpoint: what computed it, and whether the results are reproducible.
+    Returned are the table, a row for each point in the order of counting, and the attributes of the checkpoint: what
+    computed it, and whether the results are reproducible.
     """
     if progress is not None and not callable(progress):
         raise InputTypeError(f"progress = {shown(progress)}: must be callable, as progress(done, total)")

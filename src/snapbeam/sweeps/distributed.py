@@ -60,13 +60,7 @@ class WorkerPool:
         self._restarts = 0
 
     def now(self, there: Mapping[str, int]) -> None:
-        """Update the pool with the present workers.
-
-        Raises
-        ------
-        CheckpointError
-            If workers are lost again and again without a result, or none can be started.
-        """
+        """Update the pool with the present workers."""
         before, self._known = self._known, set(there)
         if before is None or bool(before) != bool(there):
             self.note("waiting for workers" if not there else f"workers: {len(there)}")
@@ -350,19 +344,7 @@ class Cluster:
 
 
 def parse_cluster(text: str) -> Cluster:
-    """Parse the argument *cluster*.
-
-    Parameters
-    ----------
-    text : str
-        ``"local:4"`` for four local processes, ``"tcp://host:8786"`` or ``"tls://host:8786"`` for a running
-        scheduler, or the path of a TOML file with a section ``[slurm]``.
-
-    Raises
-    ------
-    InputError
-        If the text has another form, or a key of the file is wrong.
-    """
+    """Parse ``"local:4"`` (processes), ``"tcp://host:8786"`` (a scheduler) or a TOML file with ``[slurm]``."""
     if not isinstance(text, str) or not text:
         raise InputError(f"cluster = {shown(text)}: must be {_FORMS}")
     kind, colon, rest = text.partition(":")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 import re
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.util.input_files import decoded, input_bytes
+from snapbeam.util.input_files import decoded, input_bytes, rows_of_table
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, InputTypeError, file_path, positive
 
@@ -122,16 +121,7 @@ def read_measured_points(
     """
     file = file_path("path", path)
     text = decoded(input_bytes("measurements", file), file.name)
-    first = next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
-    mark = next((one for one in (";", "\t") if one in first), ",")
-    rows = [
-        (number, [cell.strip() for cell in cells])
-        for number, cells in enumerate(csv.reader(text.splitlines(), delimiter=mark), start=1)
-        if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#")
-    ]
-    if not rows:
-        raise InputError(f"{file.name}: is empty; its first line must name the columns")
-    header = [name.lower() for name in rows[0][1]]
+    mark, header, rows = rows_of_table(text, file.name)
     _check_header(file.name, header)
     frequency_scale, velocity_scale = 1.0, 1.0
     if "frequency_hz" in header:
@@ -144,7 +134,7 @@ def read_measured_points(
     velocity = header.index(next(name for name in _VELOCITY if name in header))
     place = header.index("location") if "location" in header else None
     points, kinds = [], []
-    for number, raw in rows[1:]:
+    for number, raw in rows:
         cells = raw if mark == "," else [_pointed(cell) for cell in raw]
         if len(cells) != len(header):
             raise InputError(f"{file.name}, line {number}: has {len(cells)} cells, the header names {len(header)}")

@@ -16,7 +16,7 @@ from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physic
 from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters, ratio_of, refuse_well_axis, short_names
 from snapbeam.model.quantity import split_name
 from snapbeam.util.provenance import array_hash
-from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, require_texts, shown
+from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, instance, require_texts, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -170,23 +170,13 @@ def require_memory(points: int, remedy: str, bytes_each: int = _POINT_BYTES) -> 
 
 
 def points_of(given: Mapping[str, Any] | xr.Dataset | Any, system: System | None = None) -> Points:
-    """Return the points of a request.
+    """Return the points of a request, an error naming what is unknown, cannot be swept or is out of range.
 
-    Parameters
-    ----------
-    given : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
-        A mapping defines a grid: names of parameters, dotted or short, with strictly increasing numbers or different
-        words.  A dataset with one-dimensional variables along one dimension, or a data frame, defines a list.  Its
-        columns that are not parameters become labels; a name that is almost a parameter's is refused.
-    system : System, optional
-        The system that the names belong to.  Values in Hz, m/s, g, um or m become ratios of it.  Where another axis
-        changes the structure, and with it the unit of a ratio, they stay as they are given;
-        :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
-
-    Raises
-    ------
-    InputError
-        For unknown names, parameters that cannot be swept, and values out of range.
+    A mapping defines a grid: names of parameters, dotted or short, with strictly increasing numbers or different words.
+    A dataset with one-dimensional variables along one dimension, or a data frame, defines a list.  Its columns that are
+    not parameters become labels; a name that is almost a parameter's is refused.  Values in Hz, m/s, g, um or m become
+    ratios of the *system*.  Where another axis changes the structure, and with it the unit of a ratio, they stay as
+    they are given; :meth:`~snapbeam.sweeps.setup.SweepSetup.groups` makes the ratios of each structure.
     """
     from snapbeam.util.datasets import xr
 
@@ -197,10 +187,7 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any, system: System | None
         return _list_in_ratios(_list_of(columns), system)
     if hasattr(given, "columns") and hasattr(given, "to_dict"):
         return _list_in_ratios(_list_of({str(name): np.asarray(given[name]) for name in given.columns}), system)
-    if not isinstance(given, Mapping):
-        raise InputTypeError(
-            f"axes = {shown(given)}: must be a mapping of parameters to values, an xarray.Dataset or a table of points"
-        )
+    instance("axes", given, Mapping, "a mapping of parameters to values, an xarray.Dataset or a table of points")
     if not given:
         raise InputError("axes: must name at least one parameter to sweep")
     rows: dict[str, Parameter] = {}
@@ -303,13 +290,7 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
 
 
 def _is_label(name: str) -> bool:
-    """Return whether a column of a table of points is a label, not a parameter.
-
-    Raises
-    ------
-    InputError
-        For a name that is almost the name of a parameter.
-    """
+    """Return whether a column of a table of points is a label, not a parameter."""
     table = parameters()
     known = [*table, *short_names(), *(split_name(full)[1] for full in (*table, *PHYSICAL))]
     if name in known:

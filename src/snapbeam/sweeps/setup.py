@@ -30,7 +30,7 @@ from snapbeam.sweeps.points import Columns, Grid, PointList, Points, labels_of, 
 from snapbeam.util.cores import usable_cores
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.status_codes import ResponseClass, RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, shown
+from snapbeam.util.validation import InputError, instance, or_default
 
 # ----------------------------------------------------------------------------------------------------
 # Checks and diagnostics of a sweep before any run.
@@ -134,19 +134,8 @@ class SweepSetup:
     ) -> dict[str, NDArray[Any]]:
         """Integrate runs and return their statistics, arrays of shape (runs,) by name.
 
-        The results of a run depend only on its own point, not on the other runs of its batch.
-
-        Parameters
-        ----------
-        columns : dict of str to array of shape (runs,)
-            The points.
-        threads, progress
-            Number of threads and report of progress, as for an engine.
-        start : callable, optional
-            ``start(system, state) -> State`` returns other initial conditions; *state* is that of the points, or
-            None if they do not determine it.
-        step_factor : float
-            Factor of all steps.
+        The results of a run depend only on its own point, not on the other runs of its batch.  ``start(system, state)``
+        returns other initial conditions; *state* is that of the points, or None if they do not determine it.
         """
         total = next(iter(columns.values())).size
         found: dict[str, NDArray[Any]] = {}
@@ -393,11 +382,8 @@ class SweepSetup:
 
 def sweep_setup(system: System, axes: Any, integration: Integration | None = None) -> SweepSetup:
     """Check a sweep; the parameters are those of :func:`snapbeam.sweep`."""
-    if not isinstance(system, System):
-        raise InputTypeError(f"system = {shown(system)}: must be a System")
-    integration = Integration() if integration is None else integration
-    if not isinstance(integration, Integration):
-        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
+    instance("system", system, System, "a System")
+    integration = or_default("integration", integration, Integration, "an Integration")
     if integration.tolerance is not None:
         raise InputError(
             f"tolerance = {integration.tolerance:g}: applies to single runs; for a sweep give step, or accuracy = 'reference'"

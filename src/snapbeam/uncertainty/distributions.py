@@ -397,10 +397,6 @@ def uncertainty_from_mapping(
     Each parameter has a table that names one distribution: ``{normal = 0.02, relative = true}``, ``{uniform =
     1e-5}``, ``{lognormal = 0.3}`` or ``{range = [3.14, 6.28]}``; further keys are ``displacement``, ``phase``,
     ``hold_fixed`` and ``seed``.  *full_name* returns the dotted name of a parameter of the system of the file.
-
-    Raises
-    ------
-    InputError
     """
     if not isinstance(given, Mapping):
         raise InputTypeError(f"{name} = {shown(given)}: must be a table")

@@ -29,7 +29,17 @@ from snapbeam.uncertainty.distributions import Distribution, Normal, ParameterUn
 from snapbeam.util.diagnostics import DiagnosticWarning
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.units import number_in_unit, unit_in_text
-from snapbeam.util.validation import InputError, InputTypeError, checked, choice, integer, shown, text
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    checked,
+    choice,
+    instance,
+    integer,
+    or_default,
+    shown,
+    text,
+)
 
 Statistics = dict[str, NDArray[Any]]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
@@ -94,17 +104,7 @@ class Trials:
     """True if statistics have beside them the length and the velocity of the sample that they are over."""
 
     def columns(self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None) -> Columns:
-        """The parameters of the samples: those of the points, and those that are sampled around them.
-
-        Parameters
-        ----------
-        points : dict of str to array of shape (runs,)
-            Nominal values by dotted name.
-        numbers : int array of shape (runs,)
-            Number of the sample of each run.
-        scores : array of shape (runs, parameters), optional
-            Standard normal scores of the parameters, in place of those of the samples; the start is that of the sample.
-        """
+        """Parameters of samples by their *numbers*, about *points*; *scores* (runs, parameters) replace their own."""
         uncertainty, found = self.uncertainty, dict(points)
         if scores is None:
             scores = uncertainty.normals(numbers)
@@ -260,13 +260,7 @@ class Trials:
 
 
 def _folder(path: Path) -> Path:
-    """The folder of a store of rounds, made where it is not there.
-
-    Raises
-    ------
-    InputError
-        If it cannot be one, or holds a sweep.
-    """
+    """The folder of a store of rounds, made where it is not there."""
     if path.exists() and not path.is_dir():
         raise InputError(f"checkpoint = {str(path)!r}: is a file; must be a folder")
     if not path.absolute().parent.is_dir():
@@ -307,20 +301,10 @@ def trials_of(
     early: bool = True,
     statistics: Iterable[str] = (),
 ) -> Trials:
-    """Check what is sampled of a system; with *statistics*, which need whole runs, none ends early.
-
-    Raises
-    ------
-    InputError
-    """
-    if not isinstance(system, System):
-        raise InputTypeError(f"system = {shown(system)}: must be a System")
-    uncertainty = ParameterUncertainty() if uncertainty is None else uncertainty
-    if not isinstance(uncertainty, ParameterUncertainty):
-        raise InputTypeError(f"uncertainty = {shown(uncertainty)}: must be a ParameterUncertainty")
-    integration = Integration() if integration is None else integration
-    if not isinstance(integration, Integration):
-        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
+    """Check what is sampled of a system; with *statistics*, which need whole runs, none ends early."""
+    instance("system", system, System, "a System")
+    uncertainty = or_default("uncertainty", uncertainty, ParameterUncertainty, "a ParameterUncertainty")
+    integration = or_default("integration", integration, Integration, "an Integration")
     if uncertainty.hold_fixed == "physical" and uncertainty.structural:
         loose = [name for name in system.parameters if _has_no_unit(name)]
         if loose:
@@ -441,13 +425,7 @@ _SCALES = {"b": ("length_scale", "m"), "b omega_1": ("velocity_scale", "m/s")}
 
 
 def outcome_named(given: Any, name: str = "outcome") -> tuple[str, Event]:
-    """Return an outcome and its name: one of :data:`OUTCOMES`, or a statistic beyond a value, such as ``"peak_force > 60 N"``.
-
-    Raises
-    ------
-    InputError
-        If there is none, the statistic is no number, or the unit of the value does not fit.
-    """
+    """Return an outcome, one of :data:`OUTCOMES` or such as ``"peak_force > 60 N"``, and its name."""
     short = " ".join(text(name, given).split()) if isinstance(given, str) else ""
     if short in OUTCOMES:
         return short, OUTCOMES[short]
@@ -480,12 +458,7 @@ def metres_key(statistic: str) -> str:
 
 
 def number_statistic(name: str, statistic: Any) -> Statistic:
-    """Return the row of a statistic that is a number.
-
-    Raises
-    ------
-    InputError
-    """
+    """Return the row of a statistic that is a number."""
     if not isinstance(statistic, str) or of_one_named(statistic) is None:
         choice(name, statistic, tuple(each for each, row in STATISTICS.items() if row.dtype in ("float64", "int32")))
     return STATISTICS[statistic]
@@ -497,12 +470,7 @@ def reached(found: Statistics) -> NDArray[np.bool_]:
 
 
 def require_held(names: Iterable[str], system: System) -> None:
-    """Refuse statistics that runs of a system do not have: those of one of several strikers, if it is not there.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse statistics that runs of a system do not have: those of one of several strikers, if it is not there."""
     strikers = len(system.contacts)
     held = rows_for(strikers)
     for name in names:

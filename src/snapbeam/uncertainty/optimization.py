@@ -31,6 +31,7 @@ from snapbeam.util.validation import (
     finite_array,
     instance,
     integer,
+    or_default,
     positive,
     shown,
     within,
@@ -107,13 +108,7 @@ OWN: dict[str, DesignQuantity] = {
 
 
 def quantity_of(name: str) -> DesignQuantity:
-    """A quantity by name: an outcome, a statistic, one of :data:`OWN`, or a parameter of the design.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """A quantity by name: an outcome, a statistic, one of :data:`OWN`, or a parameter of the design."""
     if instance("quantity", name, str, "a name") in OWN:
         return OWN[name]
     if name in OUTCOMES:
@@ -306,12 +301,7 @@ class Constraint:
 
 
 def require_kinds(objectives: Any, constraints: Any) -> tuple[tuple[Objective, ...], tuple[Constraint, ...]]:
-    """Objectives and constraints as tuples.
-
-    Raises
-    ------
-    InputError
-    """
+    """Objectives and constraints as tuples."""
     listed = (objectives,) if isinstance(objectives, (str, Objective)) else tuple(objectives)
     made = tuple(Objective(quantity=each) if isinstance(each, str) else each for each in listed)
     kept = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
@@ -580,12 +570,7 @@ def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
 def problem_of(
     trials: Trials, variables: Any, objectives: Any, constraints: Any, samples: int, validation_samples: int
 ) -> DesignProblem:
-    """Check variables, objectives and constraints.
-
-    Raises
-    ------
-    InputError
-    """
+    """Check variables, objectives and constraints."""
     if not isinstance(variables, Mapping) or not variables:
         raise InputTypeError(f"variables = {shown(variables)}: must map at least one parameter to (low, high)")
     bounds: dict[str, tuple[float, float]] = {}
@@ -819,9 +804,7 @@ def optimize_design(
     >>> best.velocity_amplitude.dims
     ('design',)
     """
-    settings = OptimizerSettings() if settings is None else settings
-    if not isinstance(settings, OptimizerSettings):
-        raise InputTypeError(f"settings = {shown(settings)}: must be an OptimizerSettings")
+    settings = or_default("settings", settings, OptimizerSettings, "an OptimizerSettings")
     problem = design_problem(
         system,
         variables,

@@ -36,6 +36,7 @@ from snapbeam.util.validation import (
     checked,
     choice,
     finite_array,
+    instance,
     integer,
     positive,
     seed_of,
@@ -190,8 +191,7 @@ class Waveform:
     drive_error: float = 1e-4
 
     def __post_init__(self) -> None:
-        if not isinstance(self.system, System):
-            raise InputTypeError(f"system = {shown(self.system)}: must be a System")
+        instance("system", self.system, System, "a System")
         striker = self.system.striker
         if striker is None or not striker.drive.harmonic or not hasattr(striker.drive, "velocity_amplitude"):
             raise InputError("system: must have a striker with a sine of given velocity")
@@ -493,8 +493,7 @@ def estimate_posterior(
     """
     if measured is not None and not isinstance(measured, Measurements):
         raise InputTypeError(f"measured = {shown(measured)}: must be Measurements")
-    if not isinstance(beam, Beam):
-        raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
+    instance("beam", beam, Beam, "a Beam")
     tracked = _checked_waveforms(waveforms)
     if measured is None and not tracked:
         raise InputError("measured = None: give measurements, waveforms, or both")

@@ -309,12 +309,7 @@ def statistics_of(given: Any) -> list[str]:
 
 
 def levels_of(given: Any) -> tuple[float, ...]:
-    """Probabilities of quantiles, increasing, each in (0, 1).
-
-    Raises
-    ------
-    InputError
-    """
+    """Probabilities of quantiles, increasing, each in (0, 1)."""
     found = tuple(
         within("quantiles", each, 0.0, 1.0) for each in np.atleast_1d(finite_array("quantiles", given)).ravel()
     )
@@ -324,12 +319,7 @@ def levels_of(given: Any) -> tuple[float, ...]:
 
 
 def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
-    """Sampling plan from the argument *runs*.
-
-    Raises
-    ------
-    InputTypeError
-    """
+    """Sampling plan from the argument *runs*."""
     if runs is None:
         return SamplingPlan()
     if isinstance(runs, SamplingPlan):

@@ -22,7 +22,16 @@ from snapbeam.uncertainty.monte_carlo import Trials, outcome_named, trials_of
 from snapbeam.util.diagnostics import counting
 from snapbeam.util.proportions import proportion
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, shown, within
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    checked,
+    finite_array,
+    integer,
+    or_default,
+    shown,
+    within,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -184,16 +193,10 @@ _STEPS, _SMALL = 60, 1e-9
 def local_crossing(
     values: _Array, hits: NDArray[Any], probability: float, low: float, high: float, reach: float = 2.0
 ) -> float:
-    """Value at which a local logistic regression about an interval crosses *probability*.
+    """Value at which a local logistic regression about an interval crosses *probability*; NaN if it does not.
 
-    Runs count by the tricube of their distance from the middle of the interval over *reach* times its half width.
-    The fit is Firth's (Biometrika 80 (1993) 27), whose bias is of second order and which is finite for separated
-    runs.
-
-    Returns
-    -------
-    float
-        NaN if the curve does not rise there, or the fit does not converge within 60 steps.
+    Runs count by the tricube of their distance from the middle of the interval over *reach* times its half width. The
+    fit is Firth's (Biometrika 80 (1993) 27), whose bias is of second order and which is finite for separated runs.
     """
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
     distance = (values - middle) / half
@@ -425,9 +428,7 @@ def quantile_threshold(
             f"parameter = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
     low, high = _range(row.name, bounds)
-    options = QuantileSearchSettings() if options is None else options
-    if not isinstance(options, QuantileSearchSettings):
-        raise InputTypeError(f"options = {shown(options)}: must be a QuantileSearchSettings")
+    options = or_default("options", options, QuantileSearchSettings, "a QuantileSearchSettings")
     watched = outcome_named(options.outcome)[1].statistic
     trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, statistics=[watched])
     if axes is not None and not isinstance(axes, Mapping):

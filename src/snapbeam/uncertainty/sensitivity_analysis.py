@@ -417,12 +417,7 @@ def _listed(columns: dict[str, Any]) -> PointList:
 
 
 def quantity_of_interest(given: QuantityOfInterest | str) -> QuantityOfInterest:
-    """Return the quantity of interest, or that of a statistic by its name.
-
-    Raises
-    ------
-    InputError
-    """
+    """Return the quantity of interest, or that of a statistic by its name."""
     if isinstance(given, str):
         return StatisticQoI(given)
     if not hasattr(given, "of") or not hasattr(given, "unit"):

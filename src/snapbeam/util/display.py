@@ -30,12 +30,7 @@ def html_table(title: str, rows: Iterable[Sequence[object]]) -> str:
 
 
 class DatasetFigures:
-    """Figures of a dataset, as ``dataset.snapbeam``.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-    """
+    """Figures of a dataset, as ``dataset.snapbeam``."""
 
     def __init__(self, dataset: Any) -> None:
         self._dataset = dataset

@@ -86,18 +86,10 @@ _GUARD: ContextVar[_Guard | None] = ContextVar("guard", default=None)
 def foreign_files_kept(
     named: Sequence[Path] = (), *, defaults: Sequence[Path] = (), request: object = None, force: bool = False
 ) -> Iterator[None]:
-    """In the block, refuse to replace files that snapbeam did not write, and those that are read too.
+    """In the block, refuse to replace files that snapbeam did not write, and those that are read too, unless *force*.
 
-    Parameters
-    ----------
-    named : sequence of path
-        Every file that a command names: one that stands there twice is read as well as written.
-    defaults : sequence of path
-        Files and folders that a command writes to since no other was named: results of another request stay.
-    request : object
-        Parameters of the command; its NetCDF files get their hash.
-    force : bool
-        Whether any file may be replaced.
+    A file that stands twice among *named* is read as well as written.  In *defaults*, written to since no other was
+    named, results of another *request* stay; the hash of the request is in the NetCDF files.
     """
     guard = _Guard(
         tuple(path.resolve() for path in named), tuple(path.resolve() for path in defaults), _hash(request), force
@@ -170,14 +162,7 @@ def refuse_foreign(target: Path, name: str, begin: str = "") -> None:
 
 
 def is_ours(path: str | os.PathLike[str], begin: str = "") -> bool:
-    """Return whether snapbeam made a file; True for an empty file.
-
-    Parameters
-    ----------
-    path : path
-    begin : str
-        What text of this kind begins with, such as the names of the columns of a table.
-    """
+    """Return whether snapbeam made a file, of which text starts with *begin*; True for an empty file."""
     path = Path(path)
     if not path.is_file():
         return False
@@ -287,22 +272,12 @@ def missing_room(path: str | os.PathLike[str], size: float, name: str = "output"
 
 
 def require_room(path: str | os.PathLike[str], size: float, name: str = "output") -> None:
-    """Refuse an output for which the disk has no room, before any work; *size* is its least estimated size in bytes.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse an output for which the disk has no room, before any work; *size* is its least estimated size in bytes."""
     require_room_of({name: (path, size)})
 
 
 def require_room_of(outputs: Mapping[str, tuple[str | os.PathLike[str], float]]) -> None:
-    """Refuse outputs, paths and least sizes in bytes by name, for which together a disk has no room.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse outputs, paths and least sizes in bytes by name, for which together a disk has no room."""
     disks: dict[int, list[str]] = {}
     for name, (path, _) in outputs.items():
         folder = Path(path).absolute().parent

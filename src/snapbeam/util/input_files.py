@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import stat
@@ -22,22 +23,7 @@ _KEY_PARTS = 8
 
 
 def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_INPUT) -> bytes:
-    """Return the contents of a regular file.
-
-    Parameters
-    ----------
-    name : str
-        The parameter to name in a refusal.
-    path : path
-        The file.
-    largest : int
-        Largest size, bytes.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is larger, or is no regular file, such as a device or a pipe.
-    """
+    """Return the contents of a regular file, *name* in refusals, of at most *largest* bytes."""
     file = file_path(name, path)
     try:
         kind = file.stat().st_mode
@@ -53,24 +39,10 @@ def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_
 
 
 def refuse_inflated(name: str, path: str | os.PathLike[str], size: int) -> None:
-    """Refuse a small file with a large content, before memory is allocated for it.
+    """Refuse a content above 512 MiB and twenty times its file, before memory is allocated for it.
 
-    Compression, fill values and false headers can turn a file of some kilobytes into any size.  Every reader calls this
-    with the size that the header of the file states.
-
-    Parameters
-    ----------
-    name : str
-        The parameter to name in a refusal.
-    path : path
-        The file.
-    size : int
-        Size of the content in memory, bytes, at 8 bytes for a number.
-
-    Raises
-    ------
-    InputError
-        If the content needs more than 512 MiB and more than twenty times the file.
+    Compression, fill values and false headers can turn a file of some kilobytes into any *size* in bytes, at 8 for a
+    number. Every reader calls this with the size that the header of the file states.
     """
     found = os.stat(path)
     stored = min(found.st_size, getattr(found, "st_blocks", found.st_size) * 512)
@@ -82,13 +54,7 @@ def refuse_inflated(name: str, path: str | os.PathLike[str], size: int) -> None:
 
 
 def input_text(name: str, path: str | os.PathLike[str]) -> str:
-    """Return the text of a regular file in UTF-8.
-
-    Raises
-    ------
-    InputError
-        For anything :func:`input_bytes` refuses, and if the file is not in UTF-8.
-    """
+    """Return the text of a regular file in UTF-8."""
     try:
         return input_bytes(name, path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -96,20 +62,7 @@ def input_text(name: str, path: str | os.PathLike[str]) -> str:
 
 
 def decoded(raw: bytes, where: str) -> str:
-    """Return the text of a table that an instrument or a spreadsheet wrote: UTF-8, UTF-16 or Latin-1.
-
-    Parameters
-    ----------
-    raw : bytes
-        Contents of the file.
-    where : str
-        Name of the file, for the message.
-
-    Raises
-    ------
-    InputError
-        If the bytes are not text.
-    """
+    """Return the text of a table that an instrument or a spreadsheet wrote: UTF-8, UTF-16 or Latin-1."""
     start = raw[:400]
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         kind = "utf-16"
@@ -128,6 +81,20 @@ def decoded(raw: bytes, where: str) -> str:
     return text
 
 
+def rows_of_table(text: str, where: str) -> tuple[str, list[str], list[tuple[int, list[str]]]]:
+    """The separator of a text table, names of its columns, small, and its rows: numbers of lines, cells."""
+    first = next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
+    mark = next((one for one in (";", "\t") if one in first), ",")
+    rows = [
+        (number, [cell.strip() for cell in cells])
+        for number, cells in enumerate(csv.reader(text.splitlines(), delimiter=mark), start=1)
+        if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#")
+    ]
+    if not rows:
+        raise InputError(f"{where}: is empty; its first line must name the columns")
+    return mark, [name.lower() for name in rows[0][1]], rows[1:]
+
+
 # Strings and comments, which may contain any number of full stops.  Each alternative also matches a string without an
 # end, so that the search takes a time proportional to the length of the text.
 _STRINGS = re.compile(
@@ -141,19 +108,7 @@ _DEEP = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_KEY_PARTS}}}")
 
 
 def parsed_toml(text: str, what: str) -> dict[str, Any]:
-    """Return the sections of a TOML text.
-
-    Parameters
-    ----------
-    text : str
-    what : str
-        What a refusal names, such as ``config = 'system.toml'``.
-
-    Raises
-    ------
-    InputError
-        If the text is no TOML, or a key has more than eight parts.
-    """
+    """Return the sections of a TOML text, whose keys have at most eight parts; refusals name *what*."""
     plain = _STRINGS.sub(lambda found: "" if found[0].startswith("#") else "s", text)
     if _DEEP.search(plain):
         raise InputError(f"{what}: a key must have at most {_KEY_PARTS} parts separated by full stops")
@@ -166,11 +121,5 @@ def parsed_toml(text: str, what: str) -> dict[str, Any]:
 
 
 def read_toml(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the sections of a TOML file.
-
-    Raises
-    ------
-    InputError
-        For anything :func:`input_text` and :func:`parsed_toml` refuse.
-    """
+    """Return the sections of a TOML file."""
     return parsed_toml(input_text(name, path), f"{name} = {str(Path(path))!r}")

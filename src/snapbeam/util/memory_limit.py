@@ -42,13 +42,7 @@ def sufficient() -> int:
 
 
 def not_sufficient(said: str = "") -> str:
-    """One sentence on a lack of memory: the limit, if there is one, and the need.
-
-    Parameters
-    ----------
-    said : str
-        Words of the error.
-    """
+    """One sentence on a lack of memory: the limit, if there is one, and the need *said* by the error."""
     text = f"the memory is not sufficient{f' ({said})' if said else ''}"
     allowed = limit()
     if allowed == float("inf"):

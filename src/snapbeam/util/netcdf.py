@@ -32,13 +32,7 @@ if TYPE_CHECKING:
 def read_netcdf(
     path: str | os.PathLike[str], name: str = "path", group: str | None = None, *, lazily: bool = False
 ) -> xr.Dataset:
-    """Read the dataset in a NetCDF file, or in a group of it, into memory unless *lazily*.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is none of NetCDF, or is damaged; *name* is that of the parameter.
-    """
+    """Read the dataset in a NetCDF file, or in a group of it, into memory unless *lazily*."""
     from snapbeam.util.datasets import xr
 
     if not file_path(name, path).is_file():
@@ -69,13 +63,7 @@ def split_group(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
 
 
 def read_result(path: str | os.PathLike[str], name: str = "path", *, lazily: bool = False) -> xr.Dataset:
-    """Read the dataset in a file of a result; of a file of several, that of ``FILE.nc:GROUP``.
-
-    Raises
-    ------
-    InputError
-        As of :func:`read_netcdf`, and if the file has several datasets and none is named, or not the one that is.
-    """
+    """Read the dataset in a file of a result; of a file of several, that of ``FILE.nc:GROUP``."""
     import h5py
 
     file, group = split_group(file_path(name, path))

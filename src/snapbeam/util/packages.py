@@ -39,12 +39,7 @@ def needs(what: str, package: str | None, extra: str) -> str:
 
 @contextmanager
 def needing(what: str, extra: str) -> Iterator[None]:
-    """Turn a missing package in the block into the message of :func:`needs`.
-
-    Raises
-    ------
-    InputError
-    """
+    """Turn a missing package in the block into the message of :func:`needs`."""
     try:
         yield
     except ImportError as error:

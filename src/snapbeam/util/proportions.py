@@ -34,13 +34,7 @@ def proportion(
 
 
 def mean_interval(values: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:
-    """Return the mean along the last axis with Student's interval; NaN are left out, and make the interval infinite.
-
-    Returns
-    -------
-    mean, low, high : arrays
-        The mean is NaN without values, the limits are infinite with fewer than two.
-    """
+    """Return the mean along the last axis, without NaN, and Student's interval, infinite for fewer than two values."""
     given = np.asarray(values, dtype=np.float64)
     known = ~np.isnan(given)
     count = known.sum(axis=-1)

@@ -10,17 +10,7 @@ _PREFIXES = ("y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P
 
 
 def prefixed(value: float, unit: str, digits: int = 3) -> str:
-    """A number with a prefix of the SI: ``16.1 cm`` is not one, ``161 mm`` is.
-
-    Parameters
-    ----------
-    value
-        In the unit.
-    unit
-        Without a prefix, such as ``"m"``.
-    digits
-        Significant ones; the number is rounded to them before its prefix is chosen.
-    """
+    """A number in *unit*, rounded to *digits*, with a prefix of the SI: ``161 mm``, not ``16.1 cm``."""
     if value == 0.0 or not np.isfinite(value):
         return f"{value:g} {unit}"
     rounded = float(f"{value:.{digits - 1}e}")

@@ -30,13 +30,7 @@ def _finite(*arrays: Any) -> None:
 
 
 def lstsq(matrix: Any, values: Any, rcond: float | None = None) -> Any:
-    """Return the solution of :func:`numpy.linalg.lstsq` for finite numbers.
-
-    Raises
-    ------
-    NotFiniteError
-        For NaN or infinite elements.
-    """
+    """Return the solution of :func:`numpy.linalg.lstsq` for finite numbers."""
     _finite(matrix, values)
     return np.linalg.lstsq(matrix, values, rcond=rcond)[0]
 

@@ -29,26 +29,10 @@ _TIME_RESPONSE, _FREQUENCY_RESPONSE, _COHERENCE = 1, 4, 6
 def data_frame(dataset: xr.Dataset, *, units: bool = False) -> pd.DataFrame:
     """Return a dataset as a data frame: one row for each point of the dimensions that most variables have.
 
-    Of a threshold there is a row for each value of the parameter at each point, with the threshold of the point.
-    A variable with one dimension more, such as ``modal_amplitude``, has a column for each of its values:
+    Of a threshold there is a row for each value of the parameter at each point, with the threshold of the point. A
+    variable with one dimension more, such as ``modal_amplitude``, has a column for each of its values:
     ``modal_amplitude_1``, ``modal_amplitude_2``.  Other variables are left out; ``attrs["left_out"]`` contains their
-    names.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A run, a map, or another result.
-    units : bool
-        Whether the names of the columns end with the unit, as ``time (s)``.
-
-    Returns
-    -------
-    pandas.DataFrame
-
-    Raises
-    ------
-    InputError
-        If the dataset has no variable with a dimension.
+    names.  With *units* the names of the columns end with the unit, as ``time (s)``.
     """
     import pandas as pd
 
@@ -183,23 +167,10 @@ def universal_record(
     function: int = _TIME_RESPONSE,
     below: str = "",
 ) -> dict[str, Any]:
-    """A binary record of dataset 58 of even samples over time or frequency.
+    """A binary record of dataset 58 of even samples over time [s] or frequency [Hz]; *words* is its second line.
 
-    Parameters
-    ----------
-    name : str
-    unit : str
-        Unit of the values, or of the response of a frequency response.
-    abscissa : array of shape (samples,)
-        Even times [s], or frequencies [Hz] of a frequency response or a coherence.
-    values : array of shape (samples,)
-        Real or complex numbers.
-    words : str
-        Second line of the record.
-    function : int
-        Code of the function; a response over time by default.
-    below : str
-        Unit of the excitation of a frequency response.
+    *function* is the code of the function, a response over time by default; *below* the unit of the excitation of a
+    frequency response, *unit* that of the values or of the response.
     """
     import pyuff
 

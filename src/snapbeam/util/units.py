@@ -66,13 +66,7 @@ def _in_roots(unit: Any) -> Any:
 
 
 def number_in_unit(text: str, unit: str) -> float | None:
-    """The number that a text states, in *unit*; without a unit of its own it is in that unit already.  None if it is none.
-
-    Raises
-    ------
-    InputError
-        If the unit of the text does not fit.
-    """
+    """The number that a text states, in *unit*, which is the default; None if it is none."""
     found = _TEXT.fullmatch(text)
     if found is None or (found[3] and _OPERATOR.search(found[3])):
         return _product(text, unit)

@@ -336,6 +336,11 @@ def instance(name: str, value: Any, kind: type, words: str) -> Any:
     return value
 
 
+def or_default(name: str, value: Any, kind: type, words: str) -> Any:
+    """Return *value* if it is of a kind, and one of that kind with its default values for None."""
+    return instance(name, kind() if value is None else value, kind, words)
+
+
 # Types of the arguments of public functions, checked against their annotations.
 
 
@@ -471,15 +476,7 @@ def checked(function: _F) -> _F:
 
 
 class NamedTable(dict[str, Kind]):
-    """A list of things by name that knows more names than it lists, as ``sine+burst`` or ``impacts_contact_2``.
-
-    Parameters
-    ----------
-    find : callable
-        Function that returns the object of an unlisted name, or None.
-    listed : pairs, optional
-        Of name and thing.
-    """
+    """A list of things by name, *listed* or by *find*, such as ``sine+burst`` or ``impacts_contact_2``."""
 
     def __init__(self, find: Callable[[str], Kind | None], listed: Iterable[tuple[str, Kind]] = ()) -> None:
         super().__init__(listed)

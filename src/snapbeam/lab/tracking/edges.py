@@ -72,20 +72,10 @@ def fit_edges(
     weights: Floats | None = None,
     iterations: int = 4,
 ) -> EdgeFit:
-    """Fit a blurred step a + c E(r - y) to the last axis of *windows* by Gauss-Newton.
+    """Fit a blurred step a + c E(r - y) to the last axis of *windows*, an odd number of rows, by Gauss-Newton.
 
-    Parameters
-    ----------
-    windows
-        Grey levels, shape (..., rows), an odd number of rows.
-    width
-        Blur of the edges, standard deviation in pixels.
-    sign
-        +1 for levels that rise with the row, -1 for falling ones.
-    weights
-        0 for pixels to leave out, 1 for the others; same shape as *windows*.
-    iterations
-        Gauss-Newton steps; from a start within 3 pixels four steps leave less than 1e-3 px.
+    *width* is the blur [px], *sign* +1 for levels that rise with the row, *weights* are 0 for pixels to leave out.
+    From a start within 3 pixels four steps leave less than 1e-3 px.
     """
     data = np.asarray(windows, dtype=np.float64) * sign
     rows = data.shape[-1]
@@ -142,15 +132,7 @@ def width_calibration(width: float, rows: int) -> tuple[Floats, Floats]:
 
 
 def edge_noise(width: float, noise: float, contrast: float) -> float:
-    """Minimum standard deviation [px] of the row of one edge in white noise: sqrt(2 sqrt(pi) s) n/c; 0 if not known.
-
-    Parameters
-    ----------
-    width
-        Blur s of the edge [px].
-    noise, contrast
-        Standard deviation n of a pixel, and step c at the edge, in grey levels.
-    """
+    """Minimum standard deviation [px] of an edge in white noise n, step c, blur s: sqrt(2 sqrt(pi) s) n/c, or 0."""
     least = math.sqrt(2.0 * math.sqrt(math.pi) * max(width, MIN_WIDTH)) * noise / max(contrast, 1e-12)
     return least if math.isfinite(least) else 0.0
 
@@ -188,16 +170,11 @@ def alike_columns(off: Floats, kept: NDArray[np.bool_], fitted: int) -> float:
 def fit_line(
     x: Floats, y: Floats, good: NDArray[np.bool_], limit: float, noise: float = 0.0
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
-    """Robust straight lines through columns: y = value + slope x, one line for each row of *y*.
+    """Straight lines, one for each row of *y*: value at x = 0, its standard error, slope and the points kept.
 
-    Points further than *limit* or four robust standard deviations from the line are left out, in two passes.  Of a
-    few points the nearest may lie on a line by chance, so the deviation is never taken as less than the *noise*
-    that each point has.
-
-    Returns
-    -------
-    tuple
-        Value at x = 0, its standard error, the slope, and the points kept; NaN where fewer than three are.
+    Points further than *limit* or four robust standard deviations from the line are left out, in two passes; with fewer
+    than three all is NaN.  Of a few points the nearest may lie on a line by chance, so the deviation is never taken as
+    less than the *noise* that each point has.
     """
     least = min(max(0.1, 4.0 * noise), limit)
     kept = good & np.isfinite(y)

@@ -839,18 +839,11 @@ _LAG = 0.04  # of the square of the speed by which the square of the blur must e
 
 
 def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> tuple[float, float]:
-    """Share of the frame before that a frame still shows, and frames by which its instant is open; 0 where none is told.
+    """Share of the frame before that a frame still shows, and frames by which its instant is open; 0 if unknown.
 
-    Motion at a speed v a frame adds v^2 s^2/12 to the square of an edge's blur, s the exposure over the time between
-    frames; a share a of the frame before adds v^2 a (1 - a).  Less than that is
-    added by light that is shorter than the exposure, at an instant that is not known.
-
-    Parameters
-    ----------
-    row, width
-        Of the beam's edge, over the frames [px].
-    exposure
-        Over the time between frames; None where it is not known.
+    Motion at a speed v a frame adds v^2 s^2/12 to the square of an edge's blur, s the *exposure* over the time between
+    frames (None if unknown); a share a of the frame before adds v^2 a (1 - a).  Less than that is added by light that
+    is shorter than the exposure, at an instant that is not known.
     """
     speed = np.full(row.size, np.nan)
     speed[1:-1] = 0.5 * (row[2:] - row[:-2])

@@ -44,12 +44,8 @@ def seen_rulers(
 ) -> tuple[list[Ruler], list[str]]:
     """Pixel sizes by the lengths that were given, and those lengths that the recording does not show.
 
-    Parameters
-    ----------
-    shaker
-        Rows of the striker [px].
-    open_share
-        Exposure over the time between frames, over which the amplitude of a sine is averaged.
+    *shaker* holds rows [px]; over *open_share*, the exposure over the time between frames, the amplitude of a sine is
+    averaged.
     """
     rulers, unseen = [], []
     for name, relative in RULERS.items():

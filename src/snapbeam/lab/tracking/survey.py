@@ -326,13 +326,7 @@ class BeamBands(NamedTuple):
 
 
 def find_bands(objects: ColumnObjects, height: int, level: float, bright: bool) -> BeamBands:
-    """The band that crosses the picture.
-
-    Raises
-    ------
-    InputError
-        If none does, with what to change.
-    """
+    """The band that crosses the picture."""
     length = objects.end - objects.start
     usable = objects.found & (objects.end < height) & (length >= 3)
     way_out = "set region (--region), objects (--objects) or threshold (--threshold)"
@@ -356,13 +350,7 @@ def find_bands(objects: ColumnObjects, height: int, level: float, bright: bool) 
 def placed(
     width: int, rod: tuple[int, int] | None, count: int, contact_column: float | None
 ) -> tuple[float, NDArray[np.intp], tuple[NDArray[np.intp], ...], bool]:
-    """Contact column, columns to measure the beam in, groups that see it alone, and whether there are none.
-
-    Raises
-    ------
-    InputError
-        If the contact column leaves too little of the picture on one side.
-    """
+    """Contact column, columns to measure the beam in, groups that see it alone, and whether there are none."""
     centre = (rod[0] + rod[1] - 1) / 2.0 if rod is not None else (width - 1) / 2.0
     centre = centre if contact_column is None else contact_column
     half = max(20.0, (rod[1] - rod[0]) / 2.0) if rod is not None else max(20.0, width / 8.0)
@@ -521,17 +509,9 @@ def pixel_noise(frames: NDArray[np.floating]) -> float:
 def saturation_level(frames: NDArray[np.integer], max_value: float, noise: float) -> float:
     """Grey level at which pixels are saturated, by what is seen as well as by what the file says.
 
-    A file of 16 bits may hold an image of 12, and its brightest pixels then pile up at 4095 though the file
-    could hold 65535.  The largest level of the file if none piles up.
-
-    Parameters
-    ----------
-    frames
-        Grey levels as recorded.
-    max_value
-        The largest level that the file can hold.
-    noise
-        Standard deviation of a pixel.
+    A file of 16 bits may hold an image of 12, and its brightest pixels then pile up at 4095 though the file could hold
+    65535.  It is *max_value*, the largest level of the file, if none piles up; *noise* is the standard deviation of a
+    pixel.
     """
     top = float(frames.max())
     here = np.count_nonzero(frames == top)
@@ -563,16 +543,11 @@ _CERTAIN_NOISE = 0.2  # correlation that is no chance, and more than a sensor's 
 
 
 def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
-    """Correlation of the noise with that of the next frame, and of the next pixel along the beam and across it.
+    """Correlation of the noise in successive turned frames with the next frame, and along and across the beam.
 
-    The difference of two frames holds the noise of both and no scene.  Neighbours in time differ by
-    2 sigma^2 (1 - r), frames further apart by 2 sigma^2, r the correlation.  Only pixels count about which the
-    picture is even, so that what moves does not; changes of the light are fitted and taken out.
-
-    Parameters
-    ----------
-    head
-        Turned frames that follow each other, (n, height, width).
+    The difference of two frames holds the noise of both and no scene.  Neighbours in time differ by 2 sigma^2 (1 - r),
+    frames further apart by 2 sigma^2, r the correlation.  Only pixels count about which the picture is even, so that
+    what moves does not; changes of the light are fitted and taken out.
     """
     none = NoiseShape(0.0, 0.0, 0.0, 0.0, 0.0)
     if head.shape[0] < _APART + 3:
@@ -654,20 +629,10 @@ def rod_middle(rod: tuple[int, int], share: float = 0.5) -> NDArray[np.intp]:
 def find_sticker(
     smooth: NDArray[np.floating], columns: NDArray[np.intp], begin: NDArray[np.intp], contrast: float, sign: float = 0.0
 ) -> Sticker | None:
-    """Look for a band in the middle columns of the shaker; None if there is none.
+    """Look for a band in *columns* in the middle of the shaker, in smoothed frames; None if there is none.
 
-    Parameters
-    ----------
-    smooth
-        Smoothed frames of the sample (n, height, width).
-    columns
-        Columns in the middle of the shaker.
-    begin
-        Row of each frame from which to look, -1 for frames to leave out.
-    contrast
-        Of the beam.
-    sign
-        Sign of the band's upper step, where it is known.
+    *begin* is the row of each frame from which to look, -1 for frames to leave out; *sign* that of the band's upper
+    step.
     """
     profiles = smooth[:, :, columns].mean(-1)
     steps = np.zeros_like(profiles)
@@ -836,13 +801,7 @@ def shaker_view(
     rod: tuple[int, int],
     wanted: Wanted,
 ) -> tuple[ShakerView, float]:
-    """The shaker, and the column at which its tip comes nearest to the beam.
-
-    Raises
-    ------
-    InputError
-        If neither tip nor sticker can be followed, with the way out.
-    """
+    """The shaker, and the column at which its tip comes nearest to the beam."""
     beam = measure_beam(view, frames)
     near = beam.row + view.thickness
     middle = rod_middle(rod)
@@ -1044,24 +1003,7 @@ def _offset_at_rest(beam: BeamRows, near: Floats, reference: Floats, head: int) 
 def survey(
     frames: NDArray[np.floating], settings: TrackingSettings, *, saturated: float, pixel_size: float, head: int
 ) -> Scene:
-    """Find everything in a sample of frames.
-
-    Parameters
-    ----------
-    frames
-        Turned frames (n, height, width), the first *head* of them neighbours.
-    settings
-        What is known of the recording.
-    saturated
-        Grey level of saturated pixels, infinite if there are none.
-    pixel_size
-        Metres per pixel.
-
-    Raises
-    ------
-    InputError
-        If no beam, or no shaker where one is wanted, can be found.
-    """
+    """Find everything in turned frames, the first *head* of them neighbours; *saturated* is infinite if no level is."""
     height, width = frames.shape[1:]
     smooth = ndimage.uniform_filter(frames, size=(0, 3, 3))
     level = otsu(smooth) if settings.threshold is None else settings.threshold

@@ -33,21 +33,12 @@ def _defect(e: float, d: float, t: float) -> float:
 
 
 def loss_number(restitution: float) -> float:
-    """The loss number D = chi v for which a free mass leaves with *restitution* times the speed v it came with.
+    """The loss number D = chi v for which a free mass leaves with *restitution* e in [1e-300, 1] times its speed v.
 
-    Under a force F(d) (1 + chi d'), whatever F is, the approach and the departure are quadratures of
-    v dv/(1 + chi v), which gives
+    Under a force F(d) (1 + chi d'), whatever F is, the approach and the departure are quadratures of v dv/(1 + chi v),
+    which gives
 
         (1 + e) D = ln[(1 + D)/(1 - e D)].
-
-    Parameters
-    ----------
-    restitution : float
-        e, in [1e-300, 1].
-
-    Raises
-    ------
-    InputError
     """
     from scipy.optimize import brentq
 
@@ -70,13 +61,7 @@ def _expanded(e: float, d: float) -> float:
 
 
 def restitution_of_loss(loss: float) -> float:
-    """Coefficient of restitution of a free mass with loss number D = chi v, exact.
-
-    Parameters
-    ----------
-    loss : float
-        D, 0 or greater.
-    """
+    """Coefficient of restitution of a free mass with loss number D = chi v, 0 or greater, exact."""
     from scipy.optimize import brentq
 
     d = within("loss", loss, 0.0, math.inf, closed="left")

@@ -50,13 +50,7 @@ _UNITS = (("Hz", 1.0), ("m^2/s^3", GRAVITY**-2))
 
 
 def break_points(name: str, value: Any) -> _Points:
-    """Break points as pairs of Hz and g^2/Hz: from such pairs, with or without units, or from the name of a spectrum.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, fewer than two points, frequencies that do not increase and values that are not positive.
-    """
+    """Pairs of Hz and g^2/Hz: from such pairs, with or without units, or from the name of a spectrum."""
     if isinstance(value, str):
         if value not in SPECTRA:
             raise InputError(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import DRIVES, SUMS, Drive, Scale, Timed
 from snapbeam.model.drive.components import Component, Tone
-from snapbeam.util.validation import InputError, InputTypeError, shown
+from snapbeam.util.validation import InputError, instance
 
 _Array = NDArray[np.float64]
 _SEPARATOR = "__"
@@ -62,8 +62,7 @@ class SumDrive(Timed):
         """
         flat: list[Drive] = []
         for drive in drives:
-            if not isinstance(drive, Drive):
-                raise InputTypeError(f"drive = {shown(drive)}: must be a drive, such as Sine(...)")
+            instance("drive", drive, Drive, "a drive, such as Sine(...)")
             if drive.recorded:
                 raise InputError(
                     f"drive = {drive.name!r} in a sum: a recording has its own time axis; add the records instead"
@@ -175,13 +174,7 @@ def _names(kind: type[Drive]) -> list[str]:
 
 
 def mixture(kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
-    """The class of the sums of such kinds of drives.
-
-    Raises
-    ------
-    InputError
-        For kinds that cannot be summed.
-    """
+    """The class of the sums of such kinds of drives."""
     words = " + ".join(kind.name for kind in kinds)
     if not 2 <= len(kinds) <= MOST_TERMS:
         raise InputError(f"{words or 'no drive'}: a sum has 2 to {MOST_TERMS} terms")

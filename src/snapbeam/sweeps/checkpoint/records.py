@@ -132,12 +132,7 @@ def _link(path: Path, folder: Path) -> InputError:
 
 
 def open_own(path: Path, flags: int) -> int:
-    """Open a file of a checkpoint for writing in place; refuse a link and a file with a second name.
-
-    Raises
-    ------
-    InputError
-    """
+    """Open a file of a checkpoint for writing in place; refuse a link and a file with a second name."""
     try:
         handle = os.open(path, flags | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
     except OSError as error:

@@ -103,15 +103,7 @@ def refuse_foreign(folder: Path) -> None:
 
 
 def read_description(file: Path) -> dict[str, Any]:
-    """Return the contents of map.json.
-
-    Raises
-    ------
-    CheckpointError
-        If the file is damaged.
-    InputError
-        If the file has another format, or is no regular file.
-    """
+    """Return the contents of map.json."""
     data = input_bytes("checkpoint", file)
     try:
         held = json.loads(data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,18 +32,9 @@ def _relative(results: Results, ratio: float) -> tuple[Quantity, Quantity]:
 
 
 def _efficient(results: Results, ratio: float) -> ClaimResult:
+    """Check that near a clamp and at the centre little velocity is needed."""
     end, centre = _relative(results, ratio)
     return found(below(end, 0.6) & below(centre, 0.6), below(end, 0.9) & below(centre, 0.9), end=end, centre=centre)
-
-
-def efficient_middle(results: Results) -> ClaimResult:
-    """33a: near a clamp and at the centre little velocity is needed, Omega = 0.625."""
-    return _efficient(results, 0.625)
-
-
-def efficient_fast(results: Results) -> ClaimResult:
-    """33b: and Omega = 1.625."""
-    return _efficient(results, 1.625)
 
 
 def more_so_when_fast(results: Results) -> ClaimResult:
@@ -72,6 +64,7 @@ def _means(x: _Array, values: _Array, error: float) -> tuple[Quantity, Quantity]
 
 
 def _wide(results: Results, ratio: float) -> ClaimResult:
+    """Widths of the amplitudes that give a transient response, near a clamp and near the centre."""
     ds = _window(results, ratio)
     drives, x = ds.velocity_amplitude.values, ds.location.values
     step = float(drives[1] - drives[0])
@@ -85,17 +78,8 @@ def _wide(results: Results, ratio: float) -> ClaimResult:
     )  # fmt: skip
 
 
-def wide_middle(results: Results) -> ClaimResult:
-    """15a: amplitudes that give a transient response, near a clamp and near the centre, Omega = 0.625."""
-    return _wide(results, 0.625)
-
-
-def wide_fast(results: Results) -> ClaimResult:
-    """15b: and Omega = 1.625."""
-    return _wide(results, 1.625)
-
-
 def _fine(results: Results, ratio: float) -> ClaimResult:
+    """Shares of itself to which the amplitude has to be set, near a clamp and near the centre."""
     ds = _window(results, ratio)
     step = float(ds.velocity_amplitude[1] - ds.velocity_amplitude[0])
     low, high = longest_window(ds)
@@ -110,22 +94,12 @@ def _fine(results: Results, ratio: float) -> ClaimResult:
     )
 
 
-def fine_middle(results: Results) -> ClaimResult:
-    """15c: how finely the amplitude has to be set, as a share of itself, Omega = 0.625."""
-    return _fine(results, 0.625)
-
-
-def fine_fast(results: Results) -> ClaimResult:
-    """15d: and Omega = 1.625."""
-    return _fine(results, 1.625)
-
-
 ROWS = {
-    "15a": wide_middle,
-    "15b": wide_fast,
-    "15c": fine_middle,
-    "15d": fine_fast,
-    "33a": efficient_middle,
-    "33b": efficient_fast,
+    "15a": partial(_wide, ratio=0.625),
+    "15b": partial(_wide, ratio=1.625),
+    "15c": partial(_fine, ratio=0.625),
+    "15d": partial(_fine, ratio=1.625),
+    "33a": partial(_efficient, ratio=0.625),
+    "33b": partial(_efficient, ratio=1.625),
     "33c": more_so_when_fast,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,26 +72,6 @@ def _follows(results: Results, ratio: float, which: int, printed: float, narrow:
     )  # fmt: skip
 
 
-def one_mode_slow(results: Results) -> ClaimResult:
-    """6a."""
-    return _follows(results, _SLOW, 0, 1.0, 0.3)
-
-
-def one_mode_middle(results: Results) -> ClaimResult:
-    """6b."""
-    return _follows(results, _MIDDLE, 0, 0.2, 0.3)
-
-
-def one_mode_fast(results: Results) -> ClaimResult:
-    """6c."""
-    return _follows(results, _FAST, 0, 0.05, 0.3)
-
-
-def many_modes_slow(results: Results) -> ClaimResult:
-    """7a."""
-    return _follows(results, _SLOW, 1, 1.0, 0.15)
-
-
 def _peak(results: Results, ratio: float, place: float) -> ClaimResult:
     """Location and width of the maximum of the threshold with many modes."""
     x, curve, step = along(results, ratio, 1)
@@ -104,16 +85,6 @@ def _peak(results: Results, ratio: float, place: float) -> ClaimResult:
         near(at, place, 0.05 + spacing) & inside, inside, at=at, height=Quantity(float(curve[top]), step),
         low=float(wide.min()), high=float(wide.max()),
     )  # fmt: skip
-
-
-def peak_middle(results: Results) -> ClaimResult:
-    """7b."""
-    return _peak(results, _MIDDLE, 0.4)
-
-
-def peak_fast(results: Results) -> ClaimResult:
-    """7c."""
-    return _peak(results, _FAST, 0.3)
 
 
 def _over_one_mode(results: Results, ratio: float) -> tuple[_Array, _Array]:
@@ -216,12 +187,12 @@ def rises_with_frequency(results: Results) -> ClaimResult:
 
 
 ROWS = {
-    "6a": one_mode_slow,
-    "6b": one_mode_middle,
-    "6c": one_mode_fast,
-    "7a": many_modes_slow,
-    "7b": peak_middle,
-    "7c": peak_fast,
+    "6a": partial(_follows, ratio=_SLOW, which=0, printed=1.0, narrow=0.3),
+    "6b": partial(_follows, ratio=_MIDDLE, which=0, printed=0.2, narrow=0.3),
+    "6c": partial(_follows, ratio=_FAST, which=0, printed=0.05, narrow=0.3),
+    "7a": partial(_follows, ratio=_SLOW, which=1, printed=1.0, narrow=0.15),
+    "7b": partial(_peak, ratio=_MIDDLE, place=0.4),
+    "7c": partial(_peak, ratio=_FAST, place=0.3),
     "7d": higher_everywhere,
     "7e": most_beside_centre,
     "7f": more_apparent,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -147,16 +148,6 @@ def _linked(results: Results, which: int) -> ClaimResult:
     )  # fmt: skip
 
 
-def notch_is_resonance_one(results: Results) -> ClaimResult:
-    """31a."""
-    return _linked(results, 0)
-
-
-def notch_is_resonance_many(results: Results) -> ClaimResult:
-    """31b."""
-    return _linked(results, 1)
-
-
 ROWS = {
     "9a": low_drive,
     "9b": shifts_left,
@@ -164,6 +155,6 @@ ROWS = {
     "9d": one_mode_is_adequate,
     "9e": another_maximum,
     "9f": softening,
-    "31a": notch_is_resonance_one,
-    "31b": notch_is_resonance_many,
+    "31a": partial(_linked, which=0),
+    "31b": partial(_linked, which=1),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,16 +58,6 @@ def _near_printed(results: Results, which: int, printed: float) -> ClaimResult:
         near(position, printed, 0.05 + half_step), meets, position=position, height=Quantity(lowest.height, step),
         low=wide.low, high=wide.high,
     )  # fmt: skip
-
-
-def notch_of_one_mode(results: Results) -> ClaimResult:
-    """2a."""
-    return _near_printed(results, 0, 1.4)
-
-
-def notch_of_many_modes(results: Results) -> ClaimResult:
-    """2b."""
-    return _near_printed(results, 1, 1.2)
 
 
 def notch_shifts(results: Results) -> ClaimResult:
@@ -167,31 +158,11 @@ def _converges(results: Results, which: int) -> ClaimResult:
     )  # fmt: skip
 
 
-def slow_one_mode(results: Results) -> ClaimResult:
-    """5a."""
-    return _converges(results, 0)
-
-
-def slow_many_modes(results: Results) -> ClaimResult:
-    """5b."""
-    return _converges(results, 1)
-
-
 def _far_below(results: Results, which: int) -> ClaimResult:
     ratio, curve, step = _slow(results, which)
     fast = curve[ratio >= 1.0]
     most = Quantity(float(np.nanmax(fast)), step)
     return found(below(most, 0.5), below(most, 1.0), most=most, least=float(np.nanmin(fast)), last=float(ratio[-1]))
-
-
-def fast_one_mode(results: Results) -> ClaimResult:
-    """5c."""
-    return _far_below(results, 0)
-
-
-def fast_many_modes(results: Results) -> ClaimResult:
-    """5d."""
-    return _far_below(results, 1)
 
 
 def _dips(ratio: _Array, curve: _Array, step: float) -> _Array:
@@ -226,15 +197,15 @@ def sharper(results: Results) -> ClaimResult:
 
 
 ROWS = {
-    "2a": notch_of_one_mode,
-    "2b": notch_of_many_modes,
+    "2a": partial(_near_printed, which=0, printed=1.4),
+    "2b": partial(_near_printed, which=1, printed=1.2),
     "2c": notch_shifts,
     "3a": universally_higher,
     "3b": high_frequency,
     "3c": crucial,
-    "5a": slow_one_mode,
-    "5b": slow_many_modes,
-    "5c": fast_one_mode,
-    "5d": fast_many_modes,
+    "5a": partial(_converges, which=0),
+    "5b": partial(_converges, which=1),
+    "5c": partial(_far_below, which=0),
+    "5d": partial(_far_below, which=1),
     "30": sharper,
 }
