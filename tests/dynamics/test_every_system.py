@@ -114,7 +114,7 @@ def test_coordinates_hold_the_whole_state() -> None:
     assert np.abs(x[4:]).min() > 1e-6
     assert flow.coordinates(flow.state(x)) == pytest.approx(x[None], abs=1e-15)
     run = sb.simulate(flow.starting(x), PRECISE.replace(cycles=1, early_termination=False))
-    ended = flow._coordinates_of(run.final_state.flat())[0]
+    ended = flow.space.of(run.final_state.flat())[0]
     assert flow.advance(x[None]).states[0] == pytest.approx(ended, abs=1e-8)
     once, twice = flow.advance(x[None]), flow.advance(x[None], 2)
     assert flow.advance(once.states).states == pytest.approx(twice.states, abs=1e-11)

@@ -97,7 +97,7 @@ def test_a_map_at_a_phase_of_the_base():
     beside = Stroboscope(
         sb.System(MODEL, contacts=[sb.Contact(default_values.CONTACT, stop)], base_excitation=BASE), phase=1.0
     )
-    assert float(beside.starting(beside.state(x[0])).initial_state.phase) == 1.0
+    assert float(beside.starting(x[0]).initial_state.phase) == 1.0
 
 
 def test_a_start_with_a_tip_of_its_own_keeps_all_parts():
