@@ -90,7 +90,7 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     verified = CliRunner().invoke(app, ["map", "--checkpoint", "store", "--check-checkpoint"])
     assert verified.exit_code == 0 and "16 resumed, 0 computed, 0 damaged" in verified.stdout
     refused = CliRunner().invoke(app, ["map", "--checkpoint", "store", "--cycles", "61"])
-    assert refused.exit_code == 2 and "cycles: 60 in the checkpoint, 61 requested" in refused.stderr
+    assert refused.exit_code == 2 and "its parameters are not those of this command" in refused.stderr
 
 
 @pytest.mark.slow
@@ -155,7 +155,8 @@ def test_task_size():
 
 
 MEMORY = """
-import resource, sys
+import sys
+from pathlib import Path
 import numpy as np
 import snapbeam as sb
 side, folder = int(sys.argv[1]), sys.argv[2]
@@ -165,11 +166,14 @@ model = sb.ReducedModel.from_beam(beam, modes=1)
 system = sb.System(model, contacts=[sb.Contact(sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0))])
 axes = {"frequency_ratio": np.linspace(2.0, 4.0, side), "velocity_amplitude": np.linspace(0.01, 0.6, 1000)}
 sb.sweep(system, axes, sb.Integration(cycles=1, step=7e-4), checkpoint=folder + "/store", output=folder + "/map.nc")
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+lines = Path("/proc/self/status").read_text().splitlines()
+print(int(next(line for line in lines if line.startswith("VmHWM")).split()[1]) / 1024)
 """
+"""Peak of this process alone: ru_maxrss is at least what the process had that began it."""
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the peak of memory is in /proc")
 def test_memory_does_not_grow_with_the_map(tmp_path):
     """A million points: below 1 GiB, and at most 64 bytes for each of those beyond a hundred thousand."""
     peak = {}
