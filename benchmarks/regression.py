@@ -1,7 +1,7 @@
 """The present tree against a commit, in alternating processes: ``python -m benchmarks.regression COMMIT``.
 
-The tree of the commit is installed into a folder of its own, which compiles its core; of the present tree, the core that is there is
-taken (``make core``).  Each case of ``systems`` is integrated by both, each with its own definition of the case and with one thread.  A process
+The tree of the commit is installed into a folder of its own, which compiles its core, if it has one; its earlier solver needs Numba.  Of the
+present tree, the core that is there is taken (``make core``).  Each case of ``systems`` is integrated by both, each with its own definition of the case and with one thread.  A process
 counts with the least processor time of its repeats, a tree with the least of its processes.
 """
 
@@ -32,13 +32,19 @@ _WORKER = """
 import json, sys, time
 sys.path.insert(0, sys.argv[1])
 from benchmarks import systems
-from snapbeam.solver.engines import engine_of
 name, runs, cycles, repeats = sys.argv[2], *map(int, sys.argv[3:])
 parts = {} if name.startswith("the paper's") else systems.MODELS[name]
 systems._MODES = int(name.split()[-2]) if name.startswith("the paper's") else 8
 ensemble = systems._ensemble(parts, runs, cycles)
-engine = engine_of(ensemble)
-steps = float(engine.run_ensemble(ensemble, 1)["steps"].sum())
+enough = 1
+try:
+    from snapbeam.solver.engines import engine_of
+    engine = engine_of(ensemble)
+except ImportError:  # before the native core: compiled in stages, after a number of steps
+    from snapbeam.solver.cpu import driver as engine
+    enough += int(engine.FEWEST_STEPS / ensemble.work.sum())
+for _ in range(enough):
+    steps = float(engine.run_ensemble(ensemble, 1)["steps"].sum())
 times = []
 for _ in range(repeats):
     begun = time.process_time()
@@ -58,6 +64,9 @@ def _checked_out(commit: str) -> Iterator[Path]:
             ["git", "-C", str(_ROOT), "worktree", "add", "--quiet", "--detach", str(tree), commit], check=True
         )
         try:
+            if not (tree / "CMakeLists.txt").exists():  # before the native core: nothing to compile here
+                yield tree
+                return
             pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
             subprocess.run([*pip, "--target", str(tree / _SITE), str(tree)], check=True)
             yield tree
