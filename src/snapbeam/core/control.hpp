@@ -65,7 +65,9 @@ template <class L> struct Group {
     Held<Cell, 0, false> spare;          // rows and channels that a record puts aside
     Held<Channel<L>, 0, false> spare_channel;
     Real jump, turned;            // next jump of a signal, ticks; steps since tones were taken from the time
-    Real step, contact_step, end, limit, output_interval, halvings, most_steps, stretch, stretch_at_rest, calm, energy, lowest;
+    Held<Real, LEVELS> lengths;   // of steps, ticks
+    bool circuits;
+    Real step, contact_step, end, limit, output_interval, next_output, halvings, most_steps, stretch, stretch_at_rest, calm, energy, lowest;
     int run[L::runs], output[L::runs], next_jump[L::runs];
 
     SNAPBEAM_SELDOM void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
@@ -76,7 +78,7 @@ template <class L> struct Group {
         for (auto *row : rows) row->take(arena, n);
         scratch.take(arena, long(n) * Inside<L>::ROWS), amplitude.take(arena, n);
         const long flow = long(s->composition.distinct) * n * 4;
-        tables.take(arena, flow * problem->levels), own.take(arena, flow);
+        tables.take(arena, flow * problem->levels), lengths.take(arena, problem->levels), own.take(arena, flow);
         channel.take(arena, channels), signal.take(arena, signals), block.take(arena, long(channels) * BLOCK_ARRAYS), late.take(arena, channels);
         z.channel = channel, z.signal = signal, z.block = block, z.late = late;
         events.take(arena, channels);
@@ -114,8 +116,9 @@ template <class L> struct Group {
             for (int i = 0; i < n; ++i) (*row)[i] = Cell(0.0);
         for (long i = 0; i < long(s->composition.distinct) * n * 4; ++i) own[i] = Plain(0.0);
         for (long i = 0; i < long(s->composition.distinct) * n * 4 * problem->levels; ++i) tables[i] = Plain(0.0);
-        alive = again = landing = z.jumping = FromBits<Marks>::of(0);
-        Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &contact_step, &halvings,
+        for (int i = 0; i < problem->levels; ++i) lengths[i] = Real(0.0);
+        alive = again = landing = z.jumping = FromBits<Marks>::of(0), circuits = false;
+        Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &next_output, &contact_step, &halvings,
                          &most_steps, &stretch, &stretch_at_rest, &calm, &energy, &lowest, &jump, &turned, &z.t, &z.ticks};
         for (Real *x : zeros) *x = Real(0.0);
         z.tick = z.sign = z.parts = Real(1.0), z.h = z.drift = z.gq = z.qr = z.along_g = z.along_r = Number(0.0), z.next_gq = Cell(0.0);
@@ -133,7 +136,7 @@ template <class L> struct Group {
             Channel<L> &c = z.channel[j];
             c.law = problem->laws[j];
             with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state(batch->numbers + long(j) * problem->law_numbers), c.memory = law.memory, c.impulsive = law.impulsive; });
-            c.circuit = c.law == CIRCUIT, c.harvests = c.circuit || c.law == LINEAR_DAMPING;
+            c.circuit = c.law == CIRCUIT, circuits |= c.circuit, c.harvests = c.circuit || c.law == LINEAR_DAMPING;
             c.uses = 0;
             for (int i = 0; i < z.signals; ++i)
                 if (problem->uses[j * z.signals + i] != 0.0) c.signal[c.uses] = i, c.factor[c.uses++] = problem->uses[j * z.signals + i];
@@ -193,10 +196,10 @@ template <class L> struct Group {
             for (int k = 0; k < problem->law_numbers && of_user(z.channel[j].law); ++k) set_lane(z.channel[j].P[k], l, 0.0);
         if (!there) return false;
         const int i = batch->order[taken], modes = problem->modes;
-        run[l] = i, output[l] = 0, next_jump[l] = -1;
+        run[l] = i, next_jump[l] = -1;
         using namespace snapbeam;
         set_lane(z.tick, l, of_run(i, TICK)), set_lane(step, l, of_run(i, STEP)), set_lane(end, l, of_run(i, END));
-        set_lane(output_interval, l, of_run(i, OUTPUT_INTERVAL)), set_lane(z.sign, l, of_run(i, WELL_SIGN));
+        set_lane(output_interval, l, of_run(i, OUTPUT_INTERVAL)), count_outputs(l, 0), set_lane(z.sign, l, of_run(i, WELL_SIGN));
         set_lane(contact_step, l, of_run(i, CONTACT_STEP)), set_lane(halvings, l, of_run(i, HALVINGS)), set_lane(most_steps, l, of_run(i, MAX_STEPS));
         set_lane(stretch_at_rest, l, of_run(i, STRETCH)), set_lane(calm, l, of_run(i, CALM_ENERGY)), set_lane(lowest, l, of_run(i, LOWEST)), set_lane(z.t, l, 0.0), set_lane(stretch, l, 0.0);
         set_lane(z.parts, l, s->parts(of_run(i, STEP) * of_run(i, TICK)));
@@ -235,15 +238,18 @@ template <class L> struct Group {
         advance_jump(l);
         // flows of the steps of every length
         const int n = s->cells, distinct = s->composition.distinct;
-        double length = of_run(i, STEP), next = shorter_than_flight(length, of_run(i, CONTACT_STEP));
+        // lengths of steps: halves of the flight step down to the contact step (of order 6 none between them), then halves of that
+        const double contact = of_run(i, CONTACT_STEP);
+        double length = of_run(i, STEP);
         for (int level = 0; level < problem->levels; ++level) {
             Plain *to = tables + long(level) * distinct * n * 4;
             flows_over(length * of_run(i, TICK), [&](long item, int x, typename L::Coef a) {
                 if constexpr (L::runs > 1) set_lane(to[item * 4 + x], l, a);
                 else to[item * 4 + x] = a;
             });
-            const double after = shorter(next, of_run(i, CONTACT_STEP));
-            length = next, next = after;
+            const double half = 0.5 * length;
+            set_lane(lengths[level], l, length);
+            length = length > contact || !level ? (problem->composition && !level ? contact : max(half, contact)) : half;
         }
         return true;
     }
@@ -378,12 +384,6 @@ template <class L> struct Group {
     }
 
     // --- propose --------------------------------------------------------------------------------------------------------
-    // Lengths of steps: halves of the flight step down to the contact step (of order 6 none between them), then halves of that.
-    template <class T> SNAPBEAM_FN T shorter_than_flight(T flight, T contact) const { return problem->composition ? contact : max(T(0.5) * flight, contact); }
-    template <class T> SNAPBEAM_FN static T shorter(T length, T contact) {
-        const T half = T(0.5) * length;
-        return select(length > contact, max(half, contact), half);
-    }
     SNAPBEAM_FN void propose() {
         const Marks fresh = alive & (!again);
         const int n = s->size();
@@ -434,15 +434,17 @@ template <class L> struct Group {
             own = select(r < Real(0.0), min(own, Real(-RELEASE) * max(d, Real(0.0)) / (r * z.tick)), own);
             want = select(c.closed, min(want, own), want);
         }
-        Real level = Real(0.0), length = step, next = shorter_than_flight(step, contact_step);
+        Real level = Real(0.0), length = step;
+        Marks more = alive;
         SNAPBEAM_LOOP
         for (int i = 0; i < problem->levels - 1; ++i) {
-            const Marks more = ((length > want) | half_resolved(length)) & (level <= halvings);
-            if (!any(more)) break;
-            const Real after = shorter(next, contact_step);
-            length = select(more, next, length), next = select(more, after, next), level += select(more, Real(1.0), Real(0.0));
+            Marks too_long = length > want;
+            if (circuits) too_long = too_long | half_resolved(length);
+            more = more & too_long & (Real(double(i)) <= halvings);
+            if (L::runs == 1 && !any(more)) break;
+            length = select(more, lengths[i + 1], length), level += select(more, Real(1.0), Real(0.0));
         }
-        limit = min(limit_of_outputs(), end);
+        limit = min(next_output, end);
         landing = fresh & (z.t + length >= min(limit, jump));
         length = select(landing, min(limit, jump) - z.t, length);
         ticks = z.ticks = select(alive, select(again, wanted, length), Real(0.0));
@@ -462,10 +464,8 @@ template <class L> struct Group {
         }
         return found;
     }
-    SNAPBEAM_FN Real limit_of_outputs() {
-        Real found = Real(0.0);
-        for (int l = 0; l < L::runs; ++l) set_lane(found, l, (output[l] + 1) * lane(output_interval, l));
-        return found;
+    SNAPBEAM_FN void count_outputs(int l, int now) {
+        output[l] = now, set_lane(next_output, l, (now + 1) * lane(output_interval, l));
     }
 
     SNAPBEAM_FN void new_flows(Marks changed, Real level, Marks odd) {
@@ -574,7 +574,7 @@ template <class L> struct Group {
                 const Marks may = within & (crest(gap, r0, r1) > noise);
                 if (any(may)) {
                     const Real high = select(d1 > noise, Real(1.0), gap.summit());
-                    found = select(may, (inside.share - Real(1.0) + root(gap, high)) / inside.parts, found);
+                    found = select(may, (inside.share - Real(1.0) + root(gap, high, may)) / inside.parts, found);
                 }
                 d0 = min(d1, Real(0.0)), r0 = r1;
             }
@@ -724,7 +724,7 @@ template <class L> struct Group {
             if (any(leaving)) {
                 const Cubic<Real> gap(-max(d0, Real(0.0)), -r0, -d1, -r1, value(z.h));
                 const Marks cut = leaving & (d0 > Real(0.0)) & (d1 < Real(0.0));
-                const Real when = max(nearest(ticks * root(gap, Real(1.0))), Real(1.0));
+                const Real when = max(nearest(ticks * root(gap, Real(1.0), cut)), Real(1.0));
                 const Marks shorter = cut & (when < min(ticks, at));
                 at = select(shorter, when, at);
                 e.at_force = select(shorter, Real(0.0), e.at_force);
@@ -742,7 +742,7 @@ template <class L> struct Group {
                     Real found = closing(c, near, noise);
                     // a step that ends closed although nothing was seen inside it: at the zero of the cubic
                     const Marks unseen = near & (found > Real(1.0)) & (d1 > noise);
-                    if (any(unseen)) found = select(unseen, root(Cubic<Real>(min(d0, Real(0.0)), r0, d1, r1, value(z.h)), Real(1.0)), found);
+                    if (any(unseen)) found = select(unseen, root(Cubic<Real>(min(d0, Real(0.0)), r0, d1, r1, value(z.h)), Real(1.0), unseen), found);
                     const Real when = max(nearest(ticks * found), Real(1.0));
                     const Marks hit = near & (found <= Real(1.0)), shorter = hit & (when < ticks);
                     at = select(shorter, when, at);
@@ -919,7 +919,8 @@ template <class L> struct Group {
 
     SNAPBEAM_SELDOM void write_output(int l) {
         const int modes = problem->modes, width = 2 * modes + 1 + 2 * z.channels;
-        double *to = batch->states + (long(run[l]) * batch->outputs + output[l]++) * width;
+        double *to = batch->states + (long(run[l]) * batch->outputs + output[l]) * width;
+        count_outputs(l, output[l] + 1);
         for (int m = 0; m < modes; ++m) to[m] = element<L>(z.q, s->place[m], l), to[modes + m] = element<L>(z.p, s->place[m], l);
         to[2 * modes] = lane(z.sign, l);
         for (int j = 0; j < z.channels; ++j) {
@@ -991,7 +992,7 @@ template <class L> struct Group {
         for (int l = 0; l < L::runs; ++l)
             if (lane(alive, l)) write_statistics(l, snapbeam::RUNNING);
         if (!recorder()) return;
-        write_output(0), --output[0];
+        write_output(0), count_outputs(0, output[0] - 1);
         double *to = batch->recorder->saved;
         visit([&](auto &x) { __builtin_memcpy(to, &x, sizeof(x)), to += sizeof(x) / sizeof(double); });
         batch->recorder->marks[4] = 1;

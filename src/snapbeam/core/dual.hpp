@@ -70,10 +70,10 @@ template <class T, class X> SNAPBEAM_FN T as(const X &x) {
     else return T(value(x));
 }
 // The root of a cubic moves with it.
-template <int K> SNAPBEAM_FN Dual<K> root(const Cubic<Dual<K>> &u, const Dual<K> &high) {
+template <int K> SNAPBEAM_FN Dual<K> root(const Cubic<Dual<K>> &u, const Dual<K> &high, bool wanted) {
     Cubic<double> plain(0.0, 0.0, 0.0, 0.0, 0.0);
     plain.c0 = u.c0.v, plain.c1 = u.c1.v, plain.c2 = u.c2.v, plain.c3 = u.c3.v;
-    const double x = root(plain, high.v);
+    const double x = root(plain, high.v, wanted);
     return {x, Pack<K>(-1.0 / plain.slope(x)) * u.at(Dual<K>(x)).d};
 }
 

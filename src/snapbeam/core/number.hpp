@@ -257,10 +257,14 @@ template <class T> struct Turn { T sine, cosine, cosine_less_one; };
 
 // Sine, cosine and cosine - 1 by argument reduction in three steps and Taylor polynomials; within 3e-16 for |x| < 1e5.
 template <class T> SNAPBEAM_CALLED Turn<T> turn(T x) {
+    const bool small = !any(abs(x) > T(0.75));  // as of most tones in a step
     const T k = nearest(x * T(0.6366197723675814));
-    T r = fma(k, T(-1.5707963267341256), x);
-    r = fma(k, T(-6.077100506303966e-11), r);
-    r = fma(k, T(-2.0222662487959506e-21), r);
+    T r = x;
+    if (!small) {
+        r = fma(k, T(-1.5707963267341256), r);
+        r = fma(k, T(-6.077100506303966e-11), r);
+        r = fma(k, T(-2.0222662487959506e-21), r);
+    }
     const T z = r * r;
     T s = fma(z, T(2.811457254345521e-15), T(-7.647163731819816e-13));
     s = fma(z, s, T(1.605904383682161e-10));
@@ -279,6 +283,7 @@ template <class T> SNAPBEAM_CALLED Turn<T> turn(T x) {
     c = fma(z, c, T(-0.5));
     const T less = z * c;
     c = less + T(1.0);
+    if (small) return {s, c, less};
     const T quadrant = k - T(4.0) * nearest(fma(k, T(0.25), T(-0.374)));
     const auto odd = (abs(quadrant - T(2.0)) < T(1.5)) & (abs(quadrant - T(2.0)) > T(0.5));
     T sine = select(odd, c, s), cosine = select(odd, s, c);
@@ -329,17 +334,18 @@ template <class T> SNAPBEAM_CALLED T crest(const Cubic<T> &u, T v0, T v1) {
     return max(ends, select(turns, u.at(u.summit()), ends));
 }
 
-// First fraction in (0, high] at which a cubic that is not positive at 0 and positive at high becomes positive: Newton's method
-// between bounds.  Events are corrected on the true motion afterwards.
-template <class T> SNAPBEAM_CALLED T root(const Cubic<T> &u, T high) {
+// First fraction in (0, high] at which a cubic that is not positive at 0 and positive at high becomes positive, where it is *wanted*:
+// Newton's method between bounds.  Events are corrected on the true motion afterwards.
+template <class T, class M> SNAPBEAM_CALLED T root(const Cubic<T> &u, T high, M wanted) {
     T low = T(0.0), x = T(0.5) * high;
     SNAPBEAM_LOOP
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < 8 && any(wanted); ++i) {
         const T y = u.at(x);
         const auto above = y > T(0.0);
         high = select(above, x, high), low = select(above, low, x);
-        const T next = x - y / u.slope(x);
-        x = select((next >= low) & (next <= high), next, T(0.5) * (low + high));  // at the root it is one of the bounds
+        const T newton = x - y / u.slope(x), next = select((newton >= low) & (newton <= high), newton, T(0.5) * (low + high));  // at the root it is one of the bounds
+        const T moved = abs(next - x);
+        x = select(wanted, next, x), wanted = wanted & (moved > T(1e-13));
     }
     return x;
 }

@@ -218,16 +218,26 @@ template <class L> struct Totals {
     }
 
     SNAPBEAM_FN void widen(Marks ok, snapbeam::Statistic low, snapbeam::Statistic high, Number u0, Number v0, Number u1, Number v1, Number h) {
+        // on [0, 1] a cubic exceeds its ends by at most 4/27 of their slopes
+        const Number high_end = max(u0, u1), low_end = min(u0, u1), zero = Number(0.0), reach = Number(0.1482) * h;
+        const Marks may = ok & ((fma(reach, max(v0, zero) - min(v1, zero), high_end) > sum[high]) | (fma(reach, min(v0, zero) - max(v1, zero), low_end) < sum[low]));
+        if (!any(may)) return;
         const Cubic<Number> up(u0, v0, u1, v1, h), down(-u0, -v0, -u1, -v1, h);
         assign(ok, sum[high], max(sum[high], crest(up, v0, v1)));
         assign(ok, sum[low], min(sum[low], -crest(down, -v0, -v1)));
     }
-    // Largest speed on a cubic: at the ends, or where its slope has an extreme inside.
-    SNAPBEAM_FN Number fastest(Number u0, Number v0, Number u1, Number v1, Number h) {
-        const Cubic<Number> path(u0, v0, u1, v1, h);
-        const Number at = -path.c2 / (Number(3.0) * path.c3), inside = abs(path.slope(at)) / h;
-        return max(max(abs(v0), abs(v1)), select((at > Number(0.0)) & (at < Number(1.0)) & (h > Number(0.0)), inside, Number(0.0)));
-    }
+    // The rate of a cubic, a parabola with the mean m: v_0 + 2 a s - 6 b s (1 - s), a = (v_1 - v_0)/2, b = (v_0 + v_1)/2 - m.
+    struct Rate {
+        Number mean, a, b, most;  // most: the largest speed, at the ends or at the extreme inside, (v_0 + v_1)/2 - 3 b/2 - a^2/(6 b)
+        SNAPBEAM_FN Rate(Number u0, Number v0, Number u1, Number v1, Number per) : mean((u1 - u0) * per), a(Number(0.5) * (v1 - v0)) {
+            const Number middle = Number(0.5) * (v0 + v1);
+            b = middle - mean, most = max(abs(v0), abs(v1));
+            const auto inside = abs(a) < Number(3.0) * abs(b);
+            const Number extreme = middle - fma(Number(1.5), b, a * a / (Number(6.0) * select(inside, b, Number(1.0))));
+            most = select(inside, max(most, abs(extreme)), most);
+        }
+        SNAPBEAM_FN Number square(Number h) const { return h * fma(mean, mean, fma(Number(1.0 / 3.0) * a, a, Number(0.6) * b * b)); }
+    };
 
     // Zero crossings of the centre, from values relative to the height that divides the wells.
     SNAPBEAM_FN void count_crossings(const Runs<L> &z, Marks ok, Number c0, Number v0, Number c1, Number v1) {
@@ -240,14 +250,17 @@ template <class L> struct Totals {
         const Marks twice = dips & (crest(away, -side * v0, -side * v1) > zero);
         const Marks found = once | twice;
         if (!any(found)) return;
-        const Cubic<Number> back(-side * c1, side * v1, -side * c0, side * v0, h);  // from the end: its last crossing is the first
-        const Number share = select(once, root(away, one), one - root(back, min(back.summit(), one)));
+        Number share = root(away, one, once);
+        if (any(twice)) {
+            const Cubic<Number> back(-side * c1, side * v1, -side * c0, side * v0, h);  // from the end: its last crossing is the first
+            assign(twice, share, one - root(back, min(back.summit(), one), twice));
+        }
         const Number count = select(once, one, Number(2.0)), when = fma(share, h, Number(z.t * z.tick));
         sum[CROSSINGS] += select(found, count, zero);
         sum[LATE_CROSSINGS] += select(found & (value(when) > late * z.tick), count, zero);
         assign(found, sum[LAST_CROSSING], when);
         if (s->problem->high && s->problem->shift)
-            change_well(z, found, once, select(once, share, root(away, min(away.summit(), one))), select(once, one, share));
+            change_well(z, found, once, select(once, share, root(away, min(away.summit(), one), twice)), select(once, one, share));
         assign(once, sum[SIDE], -side);
     }
 
@@ -321,7 +334,9 @@ template <class L> struct Totals {
         if (s->problem->high && any(changed)) correct(z, changed, h, false);
         count_crossings(z, ok, c0 - level, cv0, c1 - level, cv1);
         widen(ok, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u0, v0, u1, v1, h), widen(ok, MIN_CENTER, MAX_CENTER, c0, cv0, c1, cv1, h);
-        Number speed = fastest(u0, v0, u1, v1, h), center_speed = fastest(c0, cv0, c1, cv1, h);
+        const Number per = select(h > zero, Number(1.0) / h, zero);
+        const Rate rate(u0, v0, u1, v1, per), center_rate(c0, cv0, c1, cv1, per);
+        Number speed = rate.most, center_speed = center_rate.most;
         const Real slack = Real(1e-5), wider = Real(1.05), bound_u = sqrt(most_u), bound_v = sqrt(most_v);
         const Real high = value(max(u0, u1)), low = value(min(u0, u1)), center_high = value(max(c0, c1)), center_low = value(min(c0, c1));
         Marks near = ok & ((fma(wider, value(speed), bound_v) > so_far(PEAK_VELOCITY)) | (fma(wider, value(center_speed), bound_v) > so_far(PEAK_CENTER_VELOCITY)) |
@@ -351,18 +366,13 @@ template <class L> struct Totals {
             assign(near, sum[PEAK_CENTER_VELOCITY], max(sum[PEAK_CENTER_VELOCITY], abs(cv1)));
         }
         sum[SQUARE_DISPLACEMENT] += select(ok, square(u0, v0, u1, v1, h), zero), sum[SQUARE_CENTER] += select(ok, square(c0, cv0, c1, cv1, h), zero);
-        sum[SQUARE_VELOCITY] += select(ok, square_of_rate(u0, v0, u1, v1, h), zero);
-        sum[SQUARE_CENTER_VELOCITY] += select(ok, square_of_rate(c0, cv0, c1, cv1, h), zero);
+        sum[SQUARE_VELOCITY] += select(ok, rate.square(h), zero), sum[SQUARE_CENTER_VELOCITY] += select(ok, center_rate.square(h), zero);
         if (z.account) sum[DISSIPATED] += select(ok, z.dissipated, zero);
         for (int j = 0; j < z.channels; ++j) add_channel(z, z.channel[j], ok);
         assign(ok, point.u, end_u), assign(ok, point.v, end_v), assign(ok, center.u, end_c), assign(ok, center.v, end_cv);
     }
     SNAPBEAM_FN static Number square(Number u0, Number v0, Number u1, Number v1, Number h) {
         return fma(Number(0.5) * h, fma(u0, u0, u1 * u1), h * h * Number(1.0 / 6.0) * (u0 * v0 - u1 * v1));
-    }
-    SNAPBEAM_FN static Number square_of_rate(Number u0, Number v0, Number u1, Number v1, Number h) {
-        const Number mean = select(h > Number(0.0), (u1 - u0) / h, Number(0.0)), a = Number(0.5) * (v1 - v0), b = Number(0.5) * (v0 + v1) - mean;
-        return h * fma(mean, mean, fma(Number(1.0 / 3.0) * a, a, Number(0.6) * b * b));
     }
     // Errors of the cubics over a step of h, by the amplitude of a mode.
     template <class T> static SNAPBEAM_FN void doubts_of_mode(T h, T omega, T &of_u, T &of_v) {
@@ -488,7 +498,7 @@ template <class L> struct Totals {
         const Cubic<Number> depth(c.d0, c.r0, c.d1, c.r1, z.h);
         assign(acts, c.deepest, max(c.deepest, max(max(c.d0, c.d1), zero)));
         const auto turns = acts & (c.r0 > zero) & (c.r1 < zero);
-        if (any(turns)) assign(turns, c.deepest, max(c.deepest, summit(z, c)));
+        if (any(turns)) assign(turns, c.deepest, max(c.deepest, summit(z, c, turns)));
         if (!c.lossy || !any(acts)) return;
         // the parabola through the force at both ends and in the middle
         const Number half = Number(0.5), d = max(depth.at(half), zero), rate = depth.slope(half) / max(z.h, Number(1e-300));
@@ -500,12 +510,12 @@ template <class L> struct Totals {
     }
 
     // Largest penetration in a step in which it turns: where the rate, a cubic by its values and slopes, is zero.
-    SNAPBEAM_SELDOM Number summit(const Runs<L> &z, const Channel<L> &c) {
+    SNAPBEAM_SELDOM Number summit(const Runs<L> &z, const Channel<L> &c, Marks which) {
         Number a0 = -bend_at(z, c.row, false), a1 = signal_bend(z, c) - bend_at(z, c.row, true);
         SNAPBEAM_LOOP
         for (int i = 0; i < c.uses; ++i) a0 = fma(Number(c.factor[i]), z.signal[c.signal[i]].acceleration_at_begin(), a0);
         const Cubic<Number> fall(-c.r0, -a0, -c.r1, -a1, z.h);
-        const Number at = root(fall, Number(1.0));
+        const Number at = root(fall, Number(1.0), which);
         const Number mean = fma(at, fma(at, fma(at, Number(0.25) * fall.c3, Number(1.0 / 3.0) * fall.c2), Number(0.5) * fall.c1), fall.c0);
         return max(c.d0, Number(0.0)) - z.h * at * mean;
     }
