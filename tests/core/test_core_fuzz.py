@@ -60,8 +60,8 @@ def spoiled(rng, value):
         return [None, "text", -1, flat.tolist(), none, np.zeros((), flat.dtype), memoryview(b"ab"), {}][rng.integers(8)]
     if kind == 7:
         return beside(flat, 1, flat.dtype.alignment - 1 or 1)[1]
-    if kind == 8:
-        return np.broadcast_to(flat.reshape(-1)[:1], flat.shape) if flat.size else flat
+    if kind == 8 and flat.ndim and flat.size:
+        return np.broadcast_to(flat.reshape(-1)[:1], flat.shape)
     for at in rng.integers(flat.size, size=rng.integers(1, 4)) if flat.size else ():
         if flat.dtype == np.float64:
             numbers = [np.nan, np.inf, -np.inf, -1.0, 0.0, 0.5, 1.0, 1e300, -1e300, 1e-300, 5e-324, 2.0**53]

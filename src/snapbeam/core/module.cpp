@@ -24,6 +24,7 @@
 
 #include "api.hpp"
 #include "laws.hpp"
+#include "sets.hpp"  // of the build
 #include "structure.hpp"
 
 namespace nb = nanobind;
@@ -192,8 +193,7 @@ static Problem problem_of(Arguments &a) {
 }
 
 struct Shared {  // what threads share
-    int next = 0, done = 0;
-    volatile int stop = 0;
+    int next = 0, done = 0, stop = 0, lacking = 0;
 };
 
 static void check_user(Arguments &a, int law, const double *P, size_t numbers) {
@@ -270,7 +270,7 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
             const double *run = b.run + i * RUN_NUMBERS;
             if (std::ceil(run[END] / run[OUTPUT_INTERVAL]) > b.outputs) a.refuse("states", "has no room for every output");
         }
-    b.stop = &shared.stop, b.next = &shared.next, b.done = &shared.done;
+    b.stop = &shared.stop, b.next = &shared.next, b.done = &shared.done, b.lacking = &shared.lacking;
     return b;
 }
 
@@ -301,7 +301,7 @@ template <class Work> static void in_threads(int threads, Shared &shared, int ru
                 --left;
                 ended.notify_one();
             });
-    } catch (const std::system_error &) {  // no thread can start: those that did do the work, or this one
+    } catch (const std::exception &) {  // no thread can start: those that did do the work, or this one
         const std::lock_guard<std::mutex> lock(mutex);
         left -= threads - int(pool.size());
         if (pool.empty()) work();
@@ -322,13 +322,14 @@ template <class Work> static void in_threads(int threads, Shared &shared, int ru
                     raised = result == nullptr;
                     Py_XDECREF(result);
                 }
-                if (raised) shared.stop = 1;
+                if (raised) __atomic_store_n(&shared.stop, 1, __ATOMIC_RELAXED);
             }
             lock.lock();
         }
     }
     for (std::thread &each : pool) each.join();
     if (raised) throw nb::python_error();
+    if (shared.lacking) throw std::bad_alloc();
 }
 
 // Laws and statistics of a user may call Python: a thread that is known to it calls ten times faster.
@@ -395,7 +396,6 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
     r.rows = of_recorder.array<double, true>("rows", {samples, 2 * size_t(p.modes)}, false);
     r.values = of_recorder.array<double, true>("values", {samples, size_t(OF_SAMPLE + CHANNEL_SAMPLE * p.channels)}, false);
     r.impact_rows = of_recorder.array<double, true>("impacts", {impacts, OF_IMPACT}, false);
-    static_assert(sizeof(long) == 8 || sizeof(long) == 4);
     r.marks = of_recorder.array<long, true>("marks", {5});
     const long most[] = {r.instants, r.samples, r.impacts, 1000000, 1};  // instants passed, samples, impacts, steps of a contact, begun
     for (int i = 0; i < 5; ++i)
