@@ -58,7 +58,7 @@ def spoiled(rng, value):
     if kind == 6:
         none = np.zeros((0,) * max(flat.ndim, 1), flat.dtype)
         return [None, "text", -1, flat.tolist(), none, np.zeros((), flat.dtype), memoryview(b"ab"), {}][rng.integers(8)]
-    if kind == 7:
+    if kind == 7 and flat.dtype != object:
         return beside(flat, 1, flat.dtype.alignment - 1 or 1)[1]
     if kind == 8 and flat.ndim and flat.size:
         return np.broadcast_to(flat.reshape(-1)[:1], flat.shape)

@@ -74,7 +74,7 @@ _STEEP = 7
 """Further halvings of the shortest step where a force grows without bound."""
 _GRADED = 6
 """The same where derivatives are wanted: at both ends of a contact that of the force is a root, whose integral errs by h^1.5."""
-_SAMPLES, _NUMBERS, _IMPACTS, _BUDGET = 50_000, 4_000_000, 4096, 200_000
+_SAMPLES, _NUMBERS, _IMPACTS, _BUDGET = 50_000, 4_000_000, 4096, 50_000
 """Room for samples, their numbers and impacts, and steps, of one piece of a recorded run."""
 
 
