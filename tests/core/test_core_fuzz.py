@@ -97,7 +97,7 @@ def changed(rng, *mappings):
         if kind < 0.05:
             del chosen[name]
             continue
-        if kind < 0.15 and isinstance(value, np.ndarray):
+        if kind < 0.15 and isinstance(value, np.ndarray) and value.dtype != object:
             long = [each for each in other.values() if isinstance(each, np.ndarray) and each.nbytes >= value.nbytes]
             long = [each for each in long if each.flags.c_contiguous and each.dtype.kind in "fiu" and each.ndim]
             if long:
