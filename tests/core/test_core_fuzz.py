@@ -38,7 +38,22 @@ POINTS = {"drive.frequency_ratio": [1.0, 1.1, 1.2]}
 def spoiled(rng, value):
     """A value of another shape, type, order, alignment or size, not finite, negative, read-only, or none."""
     if not isinstance(value, np.ndarray):
-        others = ["text", None, -1, -(2**40), 2**70, 2**31, 0, 1.5, float("nan"), float("inf"), np.zeros(2), [], {}, b""]
+        others = [
+            "text",
+            None,
+            -1,
+            -(2**40),
+            2**70,
+            2**31,
+            0,
+            1.5,
+            float("nan"),
+            float("inf"),
+            np.zeros(2),
+            [],
+            {},
+            b"",
+        ]
         return others[rng.integers(len(others))]
     kind, flat = rng.integers(13), value.astype(value.dtype.newbyteorder("="), order="C")
     if kind == 0:
@@ -149,7 +164,11 @@ def others_of(rng, entry):
             ("columns", "", 1), ("runs", "mmx", 1), ("runs", "", -1), ("runs", "", 10**12), (None, "", 1), ("runs", None, 1),
             ("runs", "", 1.5), ("\ud800", "", 1), ("runs", "", 0),
         ][rng.integers(9)]  # fmt: skip
-    return {"integrate": (layout, which, threads, None), "integrate_tangents": (which, threads, None), "record": (layout, which)}[entry]
+    return {
+        "integrate": (layout, which, threads, None),
+        "integrate_tangents": (which, threads, None),
+        "record": (layout, which),
+    }[entry]
 
 
 def _stopped(*_):

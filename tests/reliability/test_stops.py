@@ -23,7 +23,8 @@ def begin(kind, folder, cycles):
     modes = 1 if kind == "ensemble" else 8
     shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2)
     system = sb.System(
-        sb.ReducedModel.from_beam(default_values.BEAM, modes=modes), contacts=[sb.Contact(default_values.CONTACT, shaker)]
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=modes),
+        contacts=[sb.Contact(default_values.CONTACT, shaker)],
     )
     how = sb.Integration(cycles=cycles)
     if kind == "ensemble":
@@ -63,4 +64,6 @@ def test_stopped_at_random_instants(kind, stops, tmp_path, tried):
         assert list(tmp_path.iterdir()) == [] and threading.active_count() == threads
     tried(f"stops of {kind} runs, the slowest after {1e3 * max(late):.0f} ms", stops)
     after = values(begin(kind, tmp_path, 2))
-    assert before.keys() == after.keys() and all(np.array_equal(before[name], after[name], equal_nan=True) for name in before)
+    assert before.keys() == after.keys() and all(
+        np.array_equal(before[name], after[name], equal_nan=True) for name in before
+    )
