@@ -1,4 +1,4 @@
-"""The core under AddressSanitizer and UBSan, and with packs as arrays, as for compilers without vector types."""
+"""The core under AddressSanitizer, UBSan and ThreadSanitizer, and with packs as arrays, as for compilers without vector types."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def built(folder: Path, compiler: str, option: str) -> Path:
     cmake = command("cmake")
     if importlib.util.find_spec("nanobind") is None:
         pytest.skip("nanobind is not installed")
-    settings = [f"-D{option}=ON", "-DSNAPBEAM_SETS=baseline", f"-DPython_EXECUTABLE={sys.executable}"]
+    settings = [f"-D{option}", "-DSNAPBEAM_SETS=baseline", f"-DPython_EXECUTABLE={sys.executable}"]
     for words in (
         [cmake, "-S", str(ROOT), "-B", str(folder), f"-DCMAKE_CXX_COMPILER={compiler}", *settings],
         [cmake, "--build", str(folder), "--parallel", "2"],
@@ -64,15 +64,15 @@ def built(folder: Path, compiler: str, option: str) -> Path:
     return module_file
 
 
-def tried(module: Path, **variables: str) -> None:
+def tried(module: Path, *tests: str, before: tuple[str, ...] = (), **variables: str) -> None:
     """Run tests of the core in a process that has loaded a *module* in place of the installed one."""
     done = subprocess.run(
-        [sys.executable, "-c", RUN, str(module), *TESTS], cwd=ROOT, capture_output=True, text=True, timeout=3000,
+        [*before, sys.executable, "-c", RUN, str(module), *(tests or TESTS)], cwd=ROOT, capture_output=True, text=True, timeout=3000,
         env={**os.environ, "PYTHONPATH": str(ROOT / "src"), "PYTHONMALLOC": "malloc", **variables},
     )  # fmt: skip
     said = done.stdout[-6000:] + done.stderr[-6000:]
     assert done.returncode == 0 and " passed" in done.stdout, said
-    for finding in ("AddressSanitizer", "runtime error:"):
+    for finding in ("AddressSanitizer", "ThreadSanitizer", "runtime error:"):
         assert finding not in done.stdout + done.stderr, said
 
 
@@ -80,10 +80,20 @@ def tried(module: Path, **variables: str) -> None:
 def test_the_sanitizers_find_nothing(tmp_path: Path) -> None:
     compiler = command("g++")
     asan, standard = library(compiler, "libasan.so"), library(compiler, "libstdc++.so")
-    module = built(tmp_path, compiler, "SNAPBEAM_CHECKS")
+    module = built(tmp_path, compiler, "SNAPBEAM_CHECKS=address,undefined")
     tried(module, LD_PRELOAD=f"{asan} {standard}", ASAN_OPTIONS="detect_leaks=0", UBSAN_OPTIONS="print_stacktrace=1")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="libraries are preloaded as on Linux")
+def test_threads_race_for_nothing(tmp_path: Path) -> None:
+    compiler = command("g++")
+    both = f"{library(compiler, 'libtsan.so')} {library(compiler, 'libstdc++.so')}"
+    module = built(tmp_path, compiler, "SNAPBEAM_CHECKS=thread")
+    # addresses at random are not those that the sanitizer expects
+    fixed = (command("setarch"), "-R")
+    tried(module, "tests/core/test_core_threads.py", before=fixed, LD_PRELOAD=both, OPENBLAS_NUM_THREADS="1")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="options of the compilers of Linux and macOS")
 def test_packs_as_arrays(tmp_path: Path) -> None:
-    tried(built(tmp_path, command("c++"), "SNAPBEAM_ARRAYS"))
+    tried(built(tmp_path, command("c++"), "SNAPBEAM_ARRAYS=ON"))

@@ -146,6 +146,7 @@ def test_wheel_is_reproducible(archives, tmp_path):
 @pytest.mark.slow
 def test_archives_hold_what_they_must(archives):
     source, wheel = archives
+    assert max(source.stat().st_size, wheel.stat().st_size) < 8_000_000
     names = zipfile.ZipFile(wheel).namelist()
     for needed in ("snapbeam/py.typed", "snapbeam/paper/claims/topics/beam.toml"):
         assert needed in names

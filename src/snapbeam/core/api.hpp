@@ -123,9 +123,10 @@ struct Batch {
     double *of_channels;          // (runs, channels, OF_CHANNEL)
     double *held;                 // (runs, updates): at first their values at the start
     bool account;                 // account for the dissipation of the modes
-    const volatile int *stop;
+    const int *stop;
     int *next;                    // the next run, shared by threads
     int *done;                    // runs that ended
+    int *lacking;                 // 1: a thread found no memory, and took no run
     Recorder *recorder;           // null: nothing is recorded
     const Tangent *tangent;       // null: no derivatives
 };

@@ -1014,7 +1014,8 @@ template <class L> void integrate(const Problem &problem, const Batch &batch) {
     structure.build(problem, measured);
     for (Group<L> &group : groups) group.lay_out(structure, batch, measured);
     char *memory = static_cast<char *>(__builtin_malloc(measured.used + 64));
-    Arena arena{memory + (64 - reinterpret_cast<unsigned long>(memory) % 64), 0};
+    if (!memory) return void(__atomic_store_n(batch.lacking, 1, __ATOMIC_RELAXED));
+    Arena arena{memory + (64 - reinterpret_cast<unsigned long long>(memory) % 64), 0};
     structure.build(problem, arena);
     for (Group<L> &group : groups) group.lay_out(structure, batch, arena);
     for (Group<L> &group : groups) group.begin();
@@ -1025,7 +1026,7 @@ template <class L> void integrate(const Problem &problem, const Batch &batch) {
         for (Group<L> &group : groups)
             if (any(group.alive)) live[count++] = &group;
         if (!count) break;
-        if (*batch.stop || (batch.recorder && (budget-- <= 0 || !has_room(*live[0])))) {
+        if (__atomic_load_n(batch.stop, __ATOMIC_RELAXED) || (batch.recorder && (budget-- <= 0 || !has_room(*live[0])))) {
             for (int i = 0; i < count; ++i) live[i]->interrupt();
             break;
         }

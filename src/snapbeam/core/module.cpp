@@ -24,6 +24,7 @@
 
 #include "api.hpp"
 #include "laws.hpp"
+#include "sets.hpp"  // of the build
 #include "structure.hpp"
 
 namespace nb = nanobind;
@@ -84,14 +85,14 @@ static std::string shape_words(const std::vector<size_t> &shape) {
 
 class Arguments {  // the arrays and numbers of one mapping
   public:
-    Arguments(nb::dict given, const char *name) : given_(given), name_(name) {}
+    Arguments(nb::dict given, const char *name, const Arguments *before = nullptr) : given_(given), name_(name), before_(before) {}
 
     template <class T, bool WRITABLE = false> T *array(const char *key, const std::vector<size_t> &shape, bool finite = true) {
         typedef nb::ndarray<std::conditional_t<WRITABLE, T, const T>, nb::c_contig, nb::device::cpu> Array;
         if (!given_.contains(key)) throw nb::value_error((where(key) + "is missing").c_str());
         Array found;
-        if (!nb::try_cast<Array>(given_[key], found, false))
-            throw nb::type_error((where(key) + "must be a contiguous array of " + (sizeof(T) == 8 ? "8" : "4") + "-byte numbers of the right kind").c_str());
+        if (!nb::try_cast<Array>(given_[key], found, false) || reinterpret_cast<size_t>(found.data()) % alignof(T))
+            throw nb::type_error((where(key) + "must be a contiguous, aligned " + (WRITABLE ? "and writable " : "") + "array of " + (sizeof(T) == 8 ? "8" : "4") + "-byte numbers of the right kind").c_str());
         std::vector<size_t> own;
         for (size_t i = 0; i < found.ndim(); ++i) own.push_back(found.shape(i));
         if (own != shape) throw nb::value_error((where(key) + "has shape " + shape_words(own) + "; must have shape " + shape_words(shape)).c_str());
@@ -99,7 +100,11 @@ class Arguments {  // the arrays and numbers of one mapping
             if (finite)
                 for (size_t i = 0; i < found.size(); ++i)
                     if (!std::isfinite(found.data()[i])) throw nb::value_error((where(key) + "must be finite").c_str());
-        arrays_.push_back(nb::borrow(given_[key]));
+        const char *first = reinterpret_cast<const char *>(found.data()), *last = first + found.nbytes();
+        for (const Arguments *each = this; each; each = each->before_)
+            for (const Held &held : each->arrays_)
+                if ((WRITABLE || held.written) && first < last && first < held.last && held.first < last) refuse(key, "must not share memory with another array");
+        arrays_.push_back({nb::borrow(given_[key]), first, last, WRITABLE});
         return const_cast<T *>(found.data());
     }
     template <class T> T *optional(const char *key, const std::vector<size_t> &shape) {
@@ -121,8 +126,9 @@ class Arguments {  // the arrays and numbers of one mapping
     size_t length(const char *key) {
         if (!given_.contains(key)) throw nb::value_error((where(key) + "is missing").c_str());
         const Py_ssize_t found = PyObject_Size(nb::object(given_[key]).ptr());
-        if (found < 0) throw nb::python_error();
-        return size_t(found);
+        if (found >= 0) return size_t(found);
+        PyErr_Clear();
+        throw nb::type_error((where(key) + "must be an array").c_str());
     }
     std::string where(const char *key) const { return std::string(name_) + "['" + key + "'] "; }
     [[noreturn]] void refuse(const char *key, const char *words) const { throw nb::value_error((where(key) + words).c_str()); }
@@ -130,7 +136,9 @@ class Arguments {  // the arrays and numbers of one mapping
   private:
     nb::dict given_;
     const char *name_;
-    std::vector<nb::object> arrays_;
+    const Arguments *before_;
+    struct Held { nb::object array; const char *first, *last; bool written; };  // of an array of the arguments
+    std::vector<Held> arrays_;
 };
 
 static Problem problem_of(Arguments &a) {
@@ -185,8 +193,7 @@ static Problem problem_of(Arguments &a) {
 }
 
 struct Shared {  // what threads share
-    int next = 0, done = 0;
-    volatile int stop = 0;
+    int next = 0, done = 0, stop = 0, lacking = 0;
 };
 
 static void check_user(Arguments &a, int law, const double *P, size_t numbers) {
@@ -263,7 +270,7 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
             const double *run = b.run + i * RUN_NUMBERS;
             if (std::ceil(run[END] / run[OUTPUT_INTERVAL]) > b.outputs) a.refuse("states", "has no room for every output");
         }
-    b.stop = &shared.stop, b.next = &shared.next, b.done = &shared.done;
+    b.stop = &shared.stop, b.next = &shared.next, b.done = &shared.done, b.lacking = &shared.lacking;
     return b;
 }
 
@@ -294,7 +301,7 @@ template <class Work> static void in_threads(int threads, Shared &shared, int ru
                 --left;
                 ended.notify_one();
             });
-    } catch (const std::system_error &) {  // no thread can start: those that did do the work, or this one
+    } catch (const std::exception &) {  // no thread can start: those that did do the work, or this one
         const std::lock_guard<std::mutex> lock(mutex);
         left -= threads - int(pool.size());
         if (pool.empty()) work();
@@ -315,13 +322,14 @@ template <class Work> static void in_threads(int threads, Shared &shared, int ru
                     raised = result == nullptr;
                     Py_XDECREF(result);
                 }
-                if (raised) shared.stop = 1;
+                if (raised) __atomic_store_n(&shared.stop, 1, __ATOMIC_RELAXED);
             }
             lock.lock();
         }
     }
     for (std::thread &each : pool) each.join();
     if (raised) throw nb::python_error();
+    if (shared.lacking) throw std::bad_alloc();
 }
 
 // Laws and statistics of a user may call Python: a thread that is known to it calls ten times faster.
@@ -335,7 +343,7 @@ template <class Work> static void with_python(const Problem &p, Work work) {
 }
 
 static void integrate(nb::dict problem, nb::dict batch, const std::string &layout, const std::string &set, int threads, nb::object progress) {
-    Arguments of_problem(problem, "problem"), of_batch(batch, "batch");
+    Arguments of_problem(problem, "problem"), of_batch(batch, "batch", &of_problem);
     Shared shared;
     const Problem p = problem_of(of_problem);
     const Batch b = batch_of(of_batch, p, shared);
@@ -347,7 +355,7 @@ static void integrate(nb::dict problem, nb::dict batch, const std::string &layou
 
 static void integrate_tangents(nb::dict problem, nb::dict batch, nb::dict tangent, const std::string &set, int threads, nb::object progress) {
     using namespace snapbeam;
-    Arguments of_problem(problem, "problem"), of_batch(batch, "batch"), a(tangent, "tangent");
+    Arguments of_problem(problem, "problem"), of_batch(batch, "batch", &of_problem), a(tangent, "tangent", &of_batch);
     Shared shared;
     const Problem p = problem_of(of_problem);
     Batch b = batch_of(of_batch, p, shared);
@@ -372,7 +380,7 @@ static void integrate_tangents(nb::dict problem, nb::dict batch, nb::dict tangen
 
 static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const std::string &layout, const std::string &set) {
     using namespace snapbeam;
-    Arguments of_problem(problem, "problem"), of_batch(batch, "batch"), of_recorder(recorder, "recorder");
+    Arguments of_problem(problem, "problem"), of_batch(batch, "batch", &of_problem), of_recorder(recorder, "recorder", &of_batch);
     Shared shared;
     const Problem p = problem_of(of_problem);
     Batch b = batch_of(of_batch, p, shared);
@@ -388,7 +396,6 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
     r.rows = of_recorder.array<double, true>("rows", {samples, 2 * size_t(p.modes)}, false);
     r.values = of_recorder.array<double, true>("values", {samples, size_t(OF_SAMPLE + CHANNEL_SAMPLE * p.channels)}, false);
     r.impact_rows = of_recorder.array<double, true>("impacts", {impacts, OF_IMPACT}, false);
-    static_assert(sizeof(long) == 8 || sizeof(long) == 4);
     r.marks = of_recorder.array<long, true>("marks", {5});
     const long most[] = {r.instants, r.samples, r.impacts, 1000000, 1};  // instants passed, samples, impacts, steps of a contact, begun
     for (int i = 0; i < 5; ++i)
@@ -408,7 +415,7 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
 
 // For a GPU: a problem and a batch as bytes, whose arrays lie where *moved* says (addresses there by addresses here).
 static nb::tuple moved_arguments(nb::dict problem, nb::dict batch, nb::dict moved) {
-    Arguments of_problem(problem, "problem"), of_batch(batch, "batch");
+    Arguments of_problem(problem, "problem"), of_batch(batch, "batch", &of_problem);
     Shared shared;
     Problem p = problem_of(of_problem);
     Batch b = batch_of(of_batch, p, shared);

@@ -25,7 +25,7 @@
 #define SNAPBEAM_SELDOM __noinline__
 #define SNAPBEAM_CALLED __noinline__
 #define SNAPBEAM_LOOP _Pragma("unroll 1")
-#elif defined(__GNUC__)
+#elif defined(__GNUC__) || defined(__clang__)
 #define SNAPBEAM_FN inline __attribute__((always_inline))
 #define SNAPBEAM_RARE __attribute__((noinline))
 #define SNAPBEAM_SELDOM
@@ -38,7 +38,7 @@
 #define SNAPBEAM_CALLED SNAPBEAM_FN
 #define SNAPBEAM_LOOP
 #endif
-#if defined(__GNUC__) && !defined(__CUDACC_RTC__) && !defined(SNAPBEAM_ARRAYS)
+#if (defined(__GNUC__) || defined(__clang__)) && !defined(__CUDACC_RTC__) && !defined(SNAPBEAM_ARRAYS)
 #define SNAPBEAM_VECTORS 1  // vector types of GCC and Clang; elsewhere packs are arrays
 #endif
 #if defined(SNAPBEAM_VECTORS) && (defined(__AVX512F__) || defined(__AVX2__))

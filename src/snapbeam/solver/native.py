@@ -31,7 +31,7 @@ from snapbeam.solver.statistics import (
 )
 from snapbeam.solver.step_size import CALM, PARTS, barrier_of, composition_of
 from snapbeam.solver.user_laws import updates_of
-from snapbeam.util.cores import usable_cores
+from snapbeam.util.cores import instruction_set, usable_cores
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ _STEEP = 7
 """Further halvings of the shortest step where a force grows without bound."""
 _GRADED = 6
 """The same where derivatives are wanted: at both ends of a contact that of the force is a root, whose integral errs by h^1.5."""
-_SAMPLES, _NUMBERS, _IMPACTS, _BUDGET = 50_000, 4_000_000, 4096, 200_000
+_SAMPLES, _NUMBERS, _IMPACTS, _BUDGET = 50_000, 4_000_000, 4096, 50_000
 """Room for samples, their numbers and impacts, and steps, of one piece of a recorded run."""
 
 
@@ -318,7 +318,7 @@ def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) 
     else:
         layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
         cores = 1 if arrays.calls_python else threads or usable_cores()
-        _core.integrate(arrays.problem, arrays.batch, layout, os.environ.get("SNAPBEAM_SET", ""), cores, progress)
+        _core.integrate(arrays.problem, arrays.batch, layout, instruction_set(), cores, progress)
     arrays.check()
     if progress is not None:
         progress(arrays.ensemble.size, arrays.ensemble.size)
@@ -416,7 +416,7 @@ def _differentiated(ensemble: Ensemble) -> _Arrays:
 
 def _integrate_tangents(arrays: _Arrays, seeds: dict[str, _Array], threads: int | None) -> None:
     _core.integrate_tangents(
-        arrays.problem, arrays.batch, seeds, os.environ.get("SNAPBEAM_SET", ""),
+        arrays.problem, arrays.batch, seeds, instruction_set(),
         1 if arrays.calls_python else threads or usable_cores(), None,
     )  # fmt: skip
     arrays.check()
@@ -506,7 +506,7 @@ def record(
     layout = "modes" if n > FEW_MODES else "thread"
     layout = os.environ.get("SNAPBEAM_LAYOUT") or layout
     while True:
-        _core.record(arrays.problem, arrays.batch, recorder, layout, os.environ.get("SNAPBEAM_SET", ""))
+        _core.record(arrays.problem, arrays.batch, recorder, layout, instruction_set())
         arrays.check()
         marks = recorder["marks"]
         accumulators = arrays.accumulators()

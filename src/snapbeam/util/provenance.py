@@ -11,7 +11,6 @@ import enum
 import hashlib
 import json
 import math
-import os
 import platform
 import sys
 from collections.abc import Mapping, Sequence
@@ -23,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from snapbeam._version import __version__
+from snapbeam.util.cores import instruction_set
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
 __all__ = [
@@ -48,9 +48,7 @@ def platform_name() -> str:
 
 def processor_name() -> str:
     """Return the family of the processor and the instruction set of the native core; one type rounds in one way."""
-    from snapbeam import _core  # ``snapbeam --version`` loads it not
-
-    return f"{platform.machine()} {os.environ.get('SNAPBEAM_SET') or _core.instruction_sets()[0]}"
+    return f"{platform.machine()} {instruction_set()}"
 
 
 @cache
