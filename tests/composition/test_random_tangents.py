@@ -59,7 +59,7 @@ def errors_of(seed: int) -> list[tuple[str, float, float, float]]:
     name = str(rng.choice([name for name, values in run_columns(system, {}).items() if values[0] != 0.0] or [""]))
 
     def batch(moved: Array, points: dict[str, Array] | None = None, accuracy: str = "reference") -> Ensemble:
-        many = begun.flat()[np.zeros(len(moved), int)]
+        many = begun.flat[np.zeros(len(moved), int)]
         modal = many.modal._replace(q=many.modal.q + moved[:, 0], p=many.modal.p + moved[:, 1])
         level = sb.Integration(accuracy=accuracy)
         return make_ensemble(system, level, points, start=dataclasses.replace(many, modal=modal), periods=1)

@@ -163,7 +163,7 @@ def advance(system: sb.System, rng: np.random.Generator) -> None:
         assert found == pytest.approx(-lost * flow.period, abs=1e-6)
     ended = sb.advance(flow.starting(start), periods=flow.clock.cycles_per_period, integration=HOW)
     np.testing.assert_allclose(
-        flow.space.of(ended.flat())[0], once.states[0], rtol=0.0, atol=1e-7 * np.abs(once.tangents).max()
+        flow.space.of(ended.flat)[0], once.states[0], rtol=0.0, atol=1e-7 * np.abs(once.tangents).max()
     )
 
 

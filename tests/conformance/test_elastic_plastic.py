@@ -294,7 +294,7 @@ def test_equal_stiffness_is_elastic_and_refusals() -> None:
     system = thrown(LAW, 0.1)
     assert sb.System.from_mapping(system.to_mapping()) == system
     state = sb.State(amplitude=np.zeros((3, 2)), indentation=[1.0, 2.0, 3.0])
-    assert state[1].indentation == 2.0 and state.flat().indentation.shape == (3,)
+    assert state[1].indentation == 2.0 and state.flat.indentation.shape == (3,)
 
 
 def test_force_and_energy() -> None:

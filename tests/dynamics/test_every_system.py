@@ -114,7 +114,7 @@ def test_coordinates_hold_the_whole_state() -> None:
     assert np.abs(x[4:]).min() > 1e-6
     assert flow.coordinates(flow.state(x)) == pytest.approx(x[None], abs=1e-15)
     run = sb.simulate(flow.starting(x), PRECISE.replace(cycles=1, early_termination=False))
-    ended = flow.space.of(run.final_state.flat())[0]
+    ended = flow.space.of(run.final_state.flat)[0]
     assert flow.advance(x[None]).states[0] == pytest.approx(ended, abs=1e-8)
     once, twice = flow.advance(x[None]), flow.advance(x[None], 2)
     assert flow.advance(once.states).states == pytest.approx(twice.states, abs=1e-11)
@@ -227,7 +227,7 @@ def test_linear_modes_are_those_of_the_well_where_the_beam_rests(side: str) -> N
     flow = Stroboscope(system, PRECISE)
     begun = system.start_state
     came = sb.advance(system, begun, 2, integration=PRECISE)
-    assert flow.advance(flow.coordinates(), 2).states[0] == pytest.approx(flow.space.of(came.flat())[0], abs=1e-12)
+    assert flow.advance(flow.coordinates(), 2).states[0] == pytest.approx(flow.space.of(came.flat)[0], abs=1e-12)
     change = np.random.default_rng(3).normal(size=(2, 3)) * flow.space.scales[[0, 3]][:, None]
     moved = sb.advance(system, begun, 2, [change], integration=PRECISE).tangent
     ends = [
@@ -241,7 +241,7 @@ def test_linear_modes_are_those_of_the_well_where_the_beam_rests(side: str) -> N
         )
         for h in (1e-6, -1e-6)
     ]  # fmt: skip
-    expected = (flow.space.of(ends[0].flat()) - flow.space.of(ends[1].flat()))[0] / 2e-6
+    expected = (flow.space.of(ends[0].flat) - flow.space.of(ends[1].flat))[0] / 2e-6
     assert moved is not None
     assert moved[0].ravel() / flow.space.scales == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
 

@@ -37,11 +37,11 @@ def test_a_batch_and_its_states() -> None:
     np.testing.assert_array_equal(one.amplitude, amplitude[1, 2])
     assert (float(one.phase), float(one.striker_position)) == (2.0, 1e-4)
     assert batch[0].batch == (4,)
-    flat = batch.flat()
+    flat = batch.flat
     assert flat.batch == (8,)
     np.testing.assert_array_equal(flat.amplitude, amplitude.reshape(8, 3))
     np.testing.assert_array_equal(flat.phase, [0.0, 1.0, 2.0, 3.0] * 2)
-    assert one.flat().batch == (1,)
+    assert one.flat.batch == (1,)
     with pytest.raises(InputError, match=r"state\[0\]: this is one state, not a batch"):
         one[0]
 
@@ -92,7 +92,7 @@ def test_contact_times_of_several_strikers() -> None:
     one = sb.State(amplitude=np.zeros((4, 2)), contact_time=0.1)
     np.testing.assert_array_equal(one.contact_time, np.full((4, 1), 0.1))
     two = sb.State(amplitude=np.zeros((4, 2)), contact_time=[[0.1, -1.0]])
-    assert two.contact_time.shape == (4, 2) and two.flat().contact_time.shape == (4, 2)
+    assert two.contact_time.shape == (4, 2) and two.flat.contact_time.shape == (4, 2)
     np.testing.assert_array_equal(two[2].contact_time, [0.1, -1.0])
     np.testing.assert_array_equal(two.contact_times(2), two.contact_time)
     np.testing.assert_array_equal(two.with_modes(3).contact_time, two.contact_time)

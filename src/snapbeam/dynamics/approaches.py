@@ -141,7 +141,7 @@ def carried(flow: Stroboscope, coordinates: _Array, phase: float) -> _Array:
         return coordinates
     if not flow.space.of_beam_alone:  # to a tick of the clock
         moved = advance(flow.system, flow.state(coordinates), part, integration=flow.integration)
-        found: _Array = flow.space.of(moved.flat())[0]
+        found: _Array = flow.space.of(moved.flat)[0]
         return found
     integration = flow.integration.replace(cycles=1, early_termination=False)
     times = [0.0, part * flow.clock.cycle]

@@ -119,7 +119,7 @@ class Stroboscope:
             self.clock.require_phase(state)
         if state.modes != self.space.modes:
             raise InputError(f"state of {state.modes} modes: must have the {self.space.modes} modes of the model")
-        return self.space.of(state.flat())
+        return self.space.of(state.flat)
 
     def state(self, coordinates: ArrayLike) -> State:
         """States of coordinates of shape (..., d), at the phase at which the system is seen."""
@@ -199,7 +199,7 @@ class Stroboscope:
         if own:
             self.clock.require_period(own)
         how = self.during(periods)
-        return make_ensemble(self.system, how, own, start=begun.flat(), periods=how.cycles)
+        return make_ensemble(self.system, how, own, start=begun.flat, periods=how.cycles)
 
     def slope(self, x: _Array, periods: int, values: Mapping[str, float], name: str, step: float) -> _Array:
         """Derivative by one of the parameters of the runs of where the map brings one state, shape (d,).

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -169,6 +170,7 @@ class State:
             **{name: getattr(self, name)[index] for name in FIELDS}, tangent=tangent, statistics=passed, modal=modal
         )
 
+    @cached_property
     def flat(self) -> State:
         """The batch as one dimension; a single state as a batch of one."""
         count = int(np.prod(self.batch, dtype=np.int64))

@@ -110,7 +110,7 @@ def advance(
         raise InputError("tangent with engine = 'python': must be left out; engine = 'native' has derivatives")
     if save_every_period and not float(span).is_integer():
         raise InputError(f"periods = {span:g} with save_every_period = True: must be an integer")
-    flat = state.flat()
+    flat = state.flat
     if integration.tolerance is not None:
         raise InputError(
             f"tolerance = {integration.tolerance:g}: applies to simulate; give step, or accuracy = 'reference'"

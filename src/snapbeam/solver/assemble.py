@@ -278,7 +278,7 @@ def make_ensemble(
     clock = clock_of(system, columns, runs)
     table = np.zeros(runs, dtype=RUN)
     places = _places(structure, table, columns.get("contact.location", np.full(runs, 0.5)))
-    since = state.flat().contact_times(max(1, len(system.contacts)))
+    since = state.flat.contact_times(max(1, len(system.contacts)))
     units = np.array([each.unit for each in system.harvesters] or [1.0])
     starts = _starts(structure, table, state, since, units)
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
@@ -540,7 +540,7 @@ def _side(system: System, state: State, goes_on: bool) -> str:
         # the same from call to call, whichever well it comes to
         return "below"
     # measured from the well the beam starts in, so that mirror images are mirrored to the bit
-    first = state.flat()[0]
+    first = state.flat[0]
     return "above" if float(first.amplitude @ system.model.midspan_shape) > 0.0 else "below"
 
 
@@ -560,7 +560,7 @@ def _places(structure: Structure, table: Records, location: _Array) -> _Places:
 
 def _starts(structure: Structure, table: Records, state: State, since: _Array, units: _Array) -> _Array:
     """q and p of every start; which start, well and contact time *since* each run has is entered in the table."""
-    flat, modal = state.flat(), state.flat().modal
+    flat, modal = state.flat, state.flat.modal
     count = flat.batch[0]
     table["start_row"] = np.arange(table.size) if count > 1 else 0
     table["well_sign"], table["contact_time"] = 1.0, since[:, 0]
@@ -590,7 +590,7 @@ def _offsets(
     """Penetration of the tip at mid-stroke into the beam at rest in the first well."""
     if system.striker is None:
         return np.full(table.size, FAR_AWAY)
-    flat, modal = state.flat(), state.flat().modal
+    flat, modal = state.flat, state.flat.modal
     position = structure.sign * flat.striker_position - table["rest_contact"]
     if modal is not None and modal.structure == structure.hash:
         # to the bit, unless the striker now strikes at another place
