@@ -23,7 +23,7 @@ from snapbeam._version import __version__
 # Figures of the paper are drawn from full-size data that were computed once.
 DATA = Path(__file__).parent / "data"
 os.environ["SNAPBEAM_PAPER_DATA"] = str(DATA)  # read by the examples
-sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+sys.path[:0] = [str(Path(__file__).parent / "_ext"), str(Path(__file__).parents[1])]
 os.environ.setdefault("MPLBACKEND", "Agg")
 logging.getLogger("fontTools").setLevel(logging.WARNING)
 
@@ -201,6 +201,7 @@ def with_dashes(app: Any, doctree: Any) -> None:
 def draw_paper(app: Any) -> None:
     """Draw every figure of the paper for the page on its reproduction."""
     import matplotlib.pyplot as plt
+    import studies  # noqa: F401  so that they are drawn too
 
     from snapbeam import paper
     from snapbeam.plot.style import save_figure

@@ -110,7 +110,7 @@ def without(part: str, folder: Path) -> Path:
     for file in ROOT.iterdir():
         if file.is_file() and not file.name.startswith("."):
             shutil.copy(file, copy)
-    for name in ("docs", "examples", "benchmarks", "impact20"):
+    for name in ("docs", "examples", "benchmarks", "impact20", "studies"):
         (copy / name).symlink_to(ROOT / name, target_is_directory=True)
     shutil.rmtree(copy / "src" / "snapbeam" / part)
     shutil.rmtree(copy / "tests" / part)

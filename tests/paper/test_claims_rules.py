@@ -17,7 +17,7 @@ from snapbeam.paper.claims.topics import (
     transients,
     waveforms,
 )
-from snapbeam.paper.studies.waveforms import BIN_EDGES
+from snapbeam.paper.recipes.waveforms import BIN_EDGES
 from snapbeam.util.status_codes import ResponseClass
 
 STEP = DRIVE[1] - DRIVE[0]

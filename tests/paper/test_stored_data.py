@@ -8,6 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import studies  # noqa: F401  their data are kept too
 
 from snapbeam import paper
 from snapbeam.paper.store import load_results

@@ -9,16 +9,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
+from studies import notch, switch
+from studies.harvesting import PIEZO, power_above
 
 import snapbeam as sb
 from snapbeam import paper
+from snapbeam.paper.recipes import disturbances
+from snapbeam.paper.recipes.resonance import ridge
+from snapbeam.paper.recipes.sensitivity import buckling_mode_damping
+from snapbeam.paper.recipes.waveforms import passages
+from snapbeam.paper.recipes.windows import longest_window
 from snapbeam.paper.store import load_results
-from snapbeam.paper.studies import disturbances, notch, switch
-from snapbeam.paper.studies.harvesting import PIEZO, power_above
-from snapbeam.paper.studies.resonance import ridge
-from snapbeam.paper.studies.sensitivity import buckling_mode_damping
-from snapbeam.paper.studies.waveforms import passages
-from snapbeam.paper.studies.windows import longest_window
 from snapbeam.util.status_codes import ResponseClass
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from studies import two_tips
+from studies.two_tips import push
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.paper.studies import two_tips
-from snapbeam.paper.studies.two_tips import push
 
 PAIR = np.array([0.373, 0.513])
 

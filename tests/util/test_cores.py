@@ -3,7 +3,8 @@
 import pytest
 
 import snapbeam as sb
-from snapbeam import _core, paper
+from snapbeam import _core
+from snapbeam.model import default_values
 from snapbeam.util.cores import instruction_set
 from snapbeam.util.provenance import processor_name
 
@@ -21,4 +22,4 @@ def test_the_set_that_is_named(named, monkeypatch):
 def test_another_is_refused(monkeypatch):
     monkeypatch.setenv("SNAPBEAM_SET", "mmx")
     with pytest.raises(sb.InputError, match=r"SNAPBEAM_SET = 'mmx': must be one of '"):
-        sb.simulate(paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18), sb.Integration(cycles=1))
+        sb.simulate(sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1)), sb.Integration(cycles=1))

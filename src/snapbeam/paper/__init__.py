@@ -48,18 +48,13 @@ __all__ = [
     "fig8",
     "figA9",
     "figB10",
-    "harvesting",
-    "lifetimes",
     "low_frequency",
-    "notch",
     "resonance",
     "sensitivity",
     "shared_results",
     "si5",
     "struck_beam",
-    "switch",
     "transients",
-    "two_tips",
     "waveforms",
     "windows",
 ]
@@ -76,27 +71,19 @@ figA9 = Recipe("figA9", "error of the natural frequencies over the number of mod
 figB10 = Recipe("figB10", "maximum displacement over frequency at two drives, 1 and 32 modes")
 si5 = Recipe("si5", "response over location and amplitude as modes are added (animation)")
 
-low_frequency = Recipe("low_frequency", "threshold over the quasi-static one at low frequency", "studies")
-resonance = Recipe("resonance", "the resonance of the intrawell response and the notch of fig6", "studies")
-waveforms = Recipe("waveforms", "snap-throughs, impacts and modes of runs at random points of fig6", "studies")
-lifetimes = Recipe("lifetimes", "how long snapping lasts over the plane of fig6 and fig7", "studies")
-transients = Recipe("transients", "what still changes after the cycles of fig7", "studies")
-windows = Recipe("windows", "amplitudes of transient responses near a clamp and near the centre", "studies")
-disturbances = Recipe(
-    "disturbances", "start-up transients, starts off the well, impacts without higher modes", "studies"
-)
-harvesting = Recipe("harvesting", "power of a harvester by impact, and its share at high frequencies", "studies")
-two_tips = Recipe("two_tips", "how high a slow pusher with one tip or two is when the beam snaps", "studies")
-switch = Recipe("switch", "the cheapest burst that switches a beam with a bias", "studies")
-notch = Recipe("notch", "how far each thing left out of the model moves the notch of fig6", "studies")
-sensitivity = Recipe("sensitivity", "how the map changes with what the paper leaves open", "studies")
+low_frequency = Recipe("low_frequency", "threshold over the quasi-static one at low frequency")
+resonance = Recipe("resonance", "the resonance of the intrawell response and the notch of fig6")
+waveforms = Recipe("waveforms", "snap-throughs, impacts and modes of runs at random points of fig6")
+transients = Recipe("transients", "what still changes after the cycles of fig7")
+windows = Recipe("windows", "amplitudes of transient responses near a clamp and near the centre")
+disturbances = Recipe("disturbances", "start-up transients, starts off the well, impacts without higher modes")
+sensitivity = Recipe("sensitivity", "how the map changes with what the paper leaves open")
 
 FIGURES: dict[str, Recipe] = {
     recipe.name: recipe
     for recipe in (
         fig2, fig3, fig4, fig5, fig6, fig7, fig8, figA9, figB10, si5,
-        low_frequency, resonance, waveforms, transients, lifetimes, windows, disturbances, sensitivity,
-        notch, two_tips, switch, harvesting,
+        low_frequency, resonance, waveforms, transients, windows, disturbances, sensitivity,
     )
 }  # fmt: skip
 """Every recipe by name: the figures of the paper, its fifth video, and further runs of its claims."""

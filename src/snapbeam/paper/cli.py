@@ -21,7 +21,7 @@ def reproduce(
         str,
         typer.Argument(
             help="fig2 to fig8, figA9, figB10, si5 (an animation); low_frequency, resonance, waveforms, transients, "
-            "lifetimes, windows, disturbances, sensitivity, notch, two_tips, switch, harvesting (further studies); "
+            "windows, disturbances, sensitivity (further runs of the claims); "
             "claims (table of the paper's statements and their verdicts); or all.",
             metavar="FIGURE",
         ),

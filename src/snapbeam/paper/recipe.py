@@ -121,7 +121,7 @@ def shared_results() -> Results:
 
 @dataclass(frozen=True)
 class Recipe:
-    """Recipe of a figure of the paper or of a further study: computation and drawing of its data.
+    """Recipe of a figure of the paper or of a study: computation and drawing of its data.
 
     ``recipe()`` draws it, ``recipe.compute()`` gives the data, ``recipe.write(folder)`` writes the figure as
     PDF and PNG (and the video, for ``si5``) with the data.
@@ -129,8 +129,8 @@ class Recipe:
 
     name: str
     about: str
-    folder: str = "recipes"
-    """Subpackage of its module: ``recipes`` for figures of the paper, ``studies`` for further runs of the claims."""
+    package: str = "snapbeam.paper.recipes"
+    """Package of its module."""
 
     def __call__(
         self,
@@ -204,4 +204,4 @@ def _module(name: str) -> Any:
     from snapbeam.paper import FIGURES
 
     choice("figure", name, tuple(FIGURES))
-    return import_module(f"snapbeam.paper.{FIGURES[name].folder}.{name}")
+    return import_module(f"{FIGURES[name].package}.{name}")

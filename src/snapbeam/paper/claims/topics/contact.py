@@ -10,7 +10,7 @@ import numpy as np
 from snapbeam.model.default_values import BEAM, CONTACT, LOCATION
 from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.uncertainty import part, resampled
-from snapbeam.paper.studies.sensitivity import tip_contact
+from snapbeam.paper.recipes.sensitivity import tip_contact
 from snapbeam.paper.system import paper_model, paper_run
 from snapbeam.util.singular_values import polyfit
 

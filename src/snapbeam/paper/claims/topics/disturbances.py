@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, found
 from snapbeam.paper.claims.uncertainty import combined, median_of, part, share
-from snapbeam.paper.studies.disturbances import EXCESS, OFFSET
+from snapbeam.paper.recipes.disturbances import EXCESS, OFFSET
 from snapbeam.sweeps.threshold import is_interwell
 from snapbeam.util.status_codes import ResponseClass
 

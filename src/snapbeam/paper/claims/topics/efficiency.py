@@ -12,7 +12,7 @@ from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, bel
 from snapbeam.paper.claims.topics.classes import transient
 from snapbeam.paper.claims.topics.locations import along
 from snapbeam.paper.claims.uncertainty import combined, mean_of, part
-from snapbeam.paper.studies.windows import CENTRE, END, longest_window
+from snapbeam.paper.recipes.windows import CENTRE, END, longest_window
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ from snapbeam.model.default_values import CONTACT
 from snapbeam.paper.claims.claim_result import Check, ClaimResult, Number, Quantity, above, measured
 from snapbeam.paper.claims.topics.classes import transient
 from snapbeam.paper.claims.uncertainty import chaos, combined, part, resampled, share
-from snapbeam.paper.studies.sensitivity import buckling_mode_damping
+from snapbeam.paper.recipes.sensitivity import buckling_mode_damping
 from snapbeam.paper.system import paper_model
 from snapbeam.sweeps.threshold import compare_maps, interwell_threshold, is_interwell
 

@@ -12,7 +12,7 @@ from snapbeam.paper.claims.claim_result import ClaimResult, Quantity, above, bel
 from snapbeam.paper.claims.topics.thresholds import notch_of
 from snapbeam.paper.claims.uncertainty import combined
 from snapbeam.paper.recipes.figB10 import maxima
-from snapbeam.paper.studies.resonance import ridge
+from snapbeam.paper.recipes.resonance import ridge
 from snapbeam.paper.system import paper_model
 from snapbeam.sweeps.threshold import interwell_threshold
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, CONTACT, LOCATION
-from snapbeam.paper.studies.sensitivity import tip_contact
+from snapbeam.paper.recipes.sensitivity import tip_contact
 from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, fix_ticks, new_figure, panel_letters
 from snapbeam.sweeps.threshold import Notch
 

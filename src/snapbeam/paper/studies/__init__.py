@@ -1,1 +1,0 @@
-"""Computations beyond the figures that the claims need."""
