@@ -20,6 +20,9 @@ def test_the_set_that_is_named(named, monkeypatch):
 
 
 def test_another_is_refused(monkeypatch):
+    shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
     monkeypatch.setenv("SNAPBEAM_SET", "mmx")
     with pytest.raises(sb.InputError, match=r"SNAPBEAM_SET = 'mmx': must be one of '"):
-        sb.simulate(sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1)), sb.Integration(cycles=1))
+        sb.simulate(system, sb.Integration(cycles=1))
