@@ -75,16 +75,18 @@ def measure(module: Any, problem: Problem, case: Case, setting: dict[str, Any]) 
             row["energy_error"] = abs(energy(case, result.state) / begin - 1)
         return row
 
-    def one(each: Case) -> Any:
-        return module.prepare(each, setting)().values
+    def many(cases: Any) -> Any:
+        if hasattr(module, "solve_many"):
+            return module.solve_many(cases, setting)
+        return [module.prepare(each, setting)().values for each in cases]
 
-    one(case)
+    many([case])
     begin = time.process_time()
     if problem.kind == "threshold":
-        found = studies.threshold(case, problem.study, one)
+        found = studies.threshold(case, problem.study, many, ahead=3 if hasattr(module, "solve_many") else 1)
         row["error"] = abs(found / reference["threshold"] - 1)
     else:
-        runs = studies.snapped([one(each) for each in studies.replicas_of(case, problem.study)])
+        runs = studies.snapped(many(studies.replicas_of(case, problem.study)))
         row["error"] = float(np.mean(runs != np.array(reference["snapped"], dtype=bool)))
         row["coverage"] = studies.coverage(runs, problem.study["blocks"])
     row["seconds"] = time.process_time() - begin

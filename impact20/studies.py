@@ -1,6 +1,6 @@
 """Problems that consist of many runs: a threshold by bisection and the statistics of replicas.
 
-`solve_one(case)` gives the output at the output times; whoever can run many cases at once passes `solve_many`.
+`solve_many(cases)` gives the outputs at the output times; who cannot run many cases at once runs one after the other.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ import numpy as np
 
 from impact20 import Array, Case
 
-Solve = Callable[[Case], Array]
+SolveMany = Callable[[Sequence[Case]], Sequence[Array]]
 SNAPPED = 1.0
 """Output above which the beam has snapped through: the height of the well."""
 
@@ -28,15 +28,21 @@ def velocity_of(case: Case) -> float:
     return case.tips[0].amplitude * case.tips[0].frequency
 
 
-def threshold(case: Case, study: dict[str, Any], solve_one: Solve) -> float:
-    """Middle of the last bracket of the bisection."""
-    low, high = study["low"], study["high"]
-    for _ in range(study["halvings"]):
-        middle = (low + high) / 2
-        if np.max(solve_one(with_amplitude(case, middle))) > SNAPPED:
-            high = middle
-        else:
-            low = middle
+def threshold(case: Case, study: dict[str, Any], solve_many: SolveMany, ahead: int = 1) -> float:
+    """Middle of the last bracket of the bisection; *ahead* halvings at a time, with every middle that they may need."""
+    low, high, left = study["low"], study["high"], study["halvings"]
+    while left:
+        depth = min(ahead, left)
+        brackets, middles = [(low, high)], []
+        for _ in range(depth):
+            middles += [(a + b) / 2 for a, b in brackets]
+            brackets = [half for a, b in brackets for half in ((a, (a + b) / 2), ((a + b) / 2, b))]
+        outputs = solve_many([with_amplitude(case, middle) for middle in middles])
+        over = dict(zip(middles, snapped(outputs), strict=True))
+        for _ in range(depth):
+            middle = (low + high) / 2
+            low, high = (low, middle) if over[middle] else (middle, high)
+        left -= depth
     return float((low + high) / 2)
 
 

@@ -6,6 +6,7 @@ A runner is a module with
     def settings(case) -> list[dict]            # what is searched, from loose to tight within each method
     def prepare(case, setting) -> solve         # compiles what the solver compiles; raises CannotRun
     solve() -> Result                           # is timed when it runs the second time
+    def solve_many(cases, setting) -> outputs   # if it can: cases that differ in the amplitude of the first tip
 
 `REGISTER` lists them.  The README has a complete runner of 30 lines.
 """

@@ -1,13 +1,15 @@
-"""snapbeam: the case as a model given by matrices, through `simulate`.
+"""snapbeam: the case as a model given by matrices.
 
-The library has no switch for a plain run without its statistics and its dataset; both are in the cost.
+The model is assembled before the clock starts, as the equations of the other solvers are; what is timed is the integration with its
+statistics, the records at the output times and what is made of them.  Many runs are one ensemble.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,11 @@ import numpy as np
 import snapbeam as sb
 from impact20 import Array, Case, Tip
 from impact20.runners import CannotRun, Result
+from snapbeam.simulation.dataset import joined
 from snapbeam.simulation.request import cycle_of
+from snapbeam.simulation.simulate import prepared
+from snapbeam.solver.assemble import make_ensemble, run_columns
+from snapbeam.solver.native import integrate_with_output_states, record
 
 PACKAGE = "snapbeam"
 
@@ -25,6 +31,25 @@ def settings(case: Case) -> list[dict[str, Any]]:
     del case
     found: list[dict[str, Any]] = [{"method": "standard", "step": 1.0 / 2**i} for i in range(0, 8)]
     return [*found, {"method": "reference", "step": 1.0}]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Truss(sb.LocalForce):
+    """Two bars of rest length l and half span 1: -k u (1 - l/sqrt(1 + u^2))."""
+
+    bar_stiffness: float = sb.quantity("N/m", "stiffness of the bars")
+    rest_length: float = sb.quantity("m", "rest length of a bar")
+    name = "truss"
+
+    @staticmethod
+    def force(law: Any, displacement: Any) -> Any:
+        """Force of the bars."""
+        return -law.bar_stiffness * displacement * (1.0 - law.rest_length / math.sqrt(1.0 + displacement**2))
+
+    @staticmethod
+    def energy(law: Any, displacement: Any) -> Any:
+        """Energy of the bars."""
+        return law.bar_stiffness * (0.5 * displacement**2 - law.rest_length * math.sqrt(1.0 + displacement**2))
 
 
 def _law(tip: Tip) -> Any:
@@ -63,79 +88,105 @@ def _model(case: Case) -> tuple[Any, Array]:
             hessian[0, 0] = -2 * case.stiffness[0]
     if well is not None:
         more["well_amplitude"] = well
-    squares = np.diag(hessian)
-    omega = np.sqrt(np.maximum(squares, 0.0))
-    order = np.argsort(omega, kind="stable")
+    omega = np.sqrt(np.maximum(np.diag(hessian), 0.0))
     if np.any((omega == 0) & (case.damping > 0)):
-        raise CannotRun("a damped free mass is left out")
-    ratio = np.where(omega > 0, case.damping / (2 * np.where(omega > 0, omega, 1.0)), 0.0)[order]
+        more["damping"] = np.diag(case.damping)
+    else:
+        ratio = np.where(omega > 0, case.damping / (2 * np.where(omega > 0, omega, 1.0)), 0.0)
+        more["damping_ratio"] = ratio[np.argsort(omega, kind="stable")]
     if case.circuit is not None:
         more["patch_shape"] = np.ones(1)
+    row = case.tips[0].row
+    # the well of a model is the lower one: a tip that it moves up to is a tip from above
+    row = -row if well is not None and row @ well > 0.0 else row
     model = sb.ReducedModel.from_matrices(
-        np.eye(n), stiffness, contact_shape=case.tips[0].row, damping_ratio=ratio, length_scale=1.0,
-        reference_frequency=1 / (2 * math.pi), **more,
-    )  # fmt: skip
+        np.eye(n), stiffness, contact_shape=row, length_scale=1.0, reference_frequency=1 / (2 * math.pi), **more
+    )
     return model, origin
 
 
 def _system(case: Case) -> tuple[Any, Array]:
-    if case.truss is not None:
-        raise CannotRun("the force of the truss's bars is no built-in law")
-    if case.pulse is not None:
-        raise CannotRun("a half-sine force is no built-in history; a record would interpolate it")
     model, origin = _model(case)
-    row = case.tips[0].row
-    contacts = []
+    row = model.contact_shape
+    strikers = []
     for tip in case.tips:
         side = "below" if np.allclose(tip.row, row) else "above"
         if side == "above" and not np.allclose(tip.row, -row):
             raise CannotRun("contacts at several places of a model given by matrices")
         move = sb.DisplacementSine(frequency_ratio=tip.frequency, displacement_amplitude=tip.amplitude, phase=tip.phase) if tip.amplitude else sb.FixedStop()  # fmt: skip
-        rest = model.well_amplitude
-        # The gap is counted from the beam at rest in the well of the start.
-        sign = 1.0 if side == "below" else -1.0
-        gap = tip.gap + sign * float(row @ (rest - origin))
-        contacts.append(sb.Contact(_law(tip), sb.Striker(drive=move, side=side, gap=gap)))
+        strikers.append((_law(tip), sb.Striker(drive=move, side=side), tip))
     forces = []
     if case.load is not None:
         forces.append(sb.ExternalForce(history=sb.ConstantForce(force=1.0), shape=case.load))
     if case.harmonic is not None:
         history = sb.HarmonicForce(frequency_ratio=case.frequency, amplitude=1.0, phase=case.phase)
         forces.append(sb.ExternalForce(history=history, shape=case.harmonic))
+    if case.pulse is not None:
+        history = sb.HalfSineForce(peak=1.0, duration=case.pulse_duration / (2 * math.pi))
+        forces.append(sb.ExternalForce(history=history, shape=case.pulse))
+    if case.truss is not None:
+        forces.append(Truss(bar_stiffness=case.truss[0], rest_length=case.truss[1]))
     circuits = []
     if case.circuit is not None:
         circuits.append(sb.PiezoelectricHarvester(moment_per_volt=case.circuit[0], capacitance=1.0, resistance=1 / case.circuit[1], patch_start=0.0, patch_end=0.5))  # fmt: skip
     start = sb.State(amplitude=origin + case.start, velocity=case.speed)
-    return sb.System(model, contacts=contacts, forces=forces, harvesters=circuits, initial_state=start), origin  # fmt: skip
+
+    def at_rest(rest: Array) -> sb.System:
+        contacts = [
+            sb.Contact(law, replace(striker, gap=tip.gap + float(tip.row @ (rest - origin))))
+            for law, striker, tip in strikers
+        ]
+        return sb.System(model, contacts=contacts, forces=forces, harvesters=circuits, initial_state=start)
+
+    # gaps are counted from the beam at rest
+    return at_rest(at_rest(origin).rest_state.amplitude), origin
 
 
-def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
-    """A solve of the case."""
+def _prepared(case: Case, setting: dict[str, Any]) -> Any:
+    """The run of a case, assembled, and the origin of its coordinates."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             system, origin = _system(case)
             cycle = cycle_of(system)
             cycles = max(1, math.ceil(case.horizon / cycle + 1e-9))
-            integration = sb.Integration(cycles=cycles, threads=1, accuracy="reference" if setting["method"] == "reference" else "standard")  # fmt: skip
+            accuracy = "reference" if setting["method"] == "reference" else "standard"
+            integration = sb.Integration(cycles=cycles, threads=1, accuracy=accuracy)
+            run = prepared(system, integration, np.minimum(case.times, cycles * cycle))
             if setting["step"] != 1.0:
-                plain = sb.simulate(system, sb.Integration(cycles=1, threads=1), sample_times=[0.0])
-                integration = integration.replace(step=float(plain.dataset.attrs["step"]) * setting["step"])
-            sb.simulate(system, integration, sample_times=[0.0])
+                run = prepared(system, integration.replace(step=run.plan.step * setting["step"]), run.times)
+            return run, origin
         except sb.InputError as refusal:
             raise CannotRun(str(refusal).splitlines()[0]) from None
-    times = np.minimum(case.times, cycles * cycle)
+
+
+def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
+    """A solve of the case."""
+    run, origin = _prepared(case, setting)
 
     def solve() -> Result:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            run = sb.simulate(system, integration, sample_times=times)
-        if not run.summary.status.name == "OK":
-            raise CannotRun(f"status {run.summary.status.name}")
-        alpha = run.dataset["modal_amplitude"].values
-        values = (alpha - origin) @ case.output
-        # The run goes on to a whole cycle: only impacts up to the horizon count.
-        onsets = run.impacts["onset"].values
+        found = joined(list(record(run.ensemble, run.times, False)))
+        status = int(found.accumulators_of_runs["status"][0])
+        if status:
+            raise CannotRun(f"status {status}")
+        # the run goes on to a whole cycle: only impacts up to the horizon count
+        onsets = found.impacts[:, 0]
+        values = (run.ensemble.structure.amplitudes(found.q) - origin) @ case.output
         return Result(values, int(np.count_nonzero(onsets <= case.horizon)), None, None)
 
     return solve
+
+
+def solve_many(cases: Sequence[Case], setting: dict[str, Any]) -> list[Array]:
+    """Outputs of cases that differ in the amplitude of the first tip, as one ensemble."""
+    case = cases[0]
+    run, origin = _prepared(case, setting)
+    columns = {"drive.displacement_amplitude": np.array([each.tips[0].amplitude for each in cases])}
+    ensemble = make_ensemble(run.system, run.integration, run_columns(run.system, columns), plan=run.plan)
+    table = ensemble.runs
+    table["output_interval"] = np.rint(case.horizon / case.samples / table["tick"])
+    table["end"] = case.samples * table["output_interval"]
+    found = integrate_with_output_states(ensemble, 1)
+    far = (found.well_sign < 0.0)[..., None]
+    first = np.where(far, found.q + ensemble.structure.shift, found.q)
+    return list((ensemble.structure.amplitudes(first) - origin) @ case.output)

@@ -43,6 +43,7 @@ QUICK = (
         circuits=("piezo",),
     ),
     Features(3, external=("harmonic_force",), uneven=True),
+    Features(3, (("hertz", "fixed", False),), external=("half_sine_force",), started=True),
 )
 """Parts whose numbers are drawn in the quick tests."""
 LIMIT = {"standard": 1e-3, "reference": 5e-7}

@@ -320,3 +320,19 @@ def test_equilibria_next_to_several_magnets(modes, magnets, directions):
         rounding = 1e-15 * np.abs(potential.tangent(each.amplitude)) @ np.abs(each.amplitude)
         terms = np.abs(potential.terms(each.amplitude)).sum(axis=0)
         assert (np.abs(potential.gradient(each.amplitude)) <= 1e-10 * terms.max() + 10.0 * rounding).all()
+
+
+def test_a_start_that_is_a_saddle_now_comes_to_a_well() -> None:
+    """A structure between two magnets, x + 50 x^3 = a/(1 - x)^2 - a/(1 + x)^2, begins on the side of its striker."""
+    model = sb.ReducedModel.from_matrices(
+        [[1.0]], [1.0], contact_shape=[1.0], nonlinear_stiffness=50.0, reference_frequency=0.2
+    )
+    magnets = [sb.MagneticForce(strength=0.4, gap=gap) for gap in (1.0, -1.0)]
+    well = brentq(lambda x: x + 50.0 * x**3 - 0.4 / (1.0 - x) ** 2 + 0.4 / (1.0 + x) ** 2, 0.05, 0.5)
+    for side, sign in (("below", -1.0), ("above", 1.0)):
+        striker = sb.Striker(drive=sb.FixedStop(), side=side, gap=0.1)
+        system = sb.System(model, contacts=[sb.Contact(sb.HertzContact(stiffness=1e3), striker)], forces=magnets)
+        assert len(system.potential.wells) == 2
+        height = float(system.rest_state.amplitude[0])
+        assert height == pytest.approx(sign * well, rel=1e-6)
+        assert sb.simulate(system, sb.Integration(cycles=2)).summary.status.name == "OK"

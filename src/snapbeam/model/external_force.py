@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale, Timed
-from snapbeam.model.drive.components import Component, Tone, hermite, sampled
+from snapbeam.model.drive.components import Component, Tone, hermite, in_pieces, sampled
 from snapbeam.model.drive.sampled import FileKeys, Sampled, require_unit
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, keep_shape, quantity
 from snapbeam.model.reduced_model import ReducedModel, row_of_matrices
@@ -160,6 +160,56 @@ class ConstantForce(ForceHistory, Timed):
         return np.abs(columns["force"])
 
 
+@dataclass(frozen=True, kw_only=True)
+class HalfSineForce(ForceHistory, Timed):
+    """A blow, as of an impact hammer: F(t) = F_p sin(pi t/T) for t < T, and 0 after it.
+
+    A cycle is a period of the first mode.
+
+    Parameters
+    ----------
+    peak : float
+        F_p, N, of either sign.
+    duration : float
+        T over the period of the first mode.
+
+    See Also
+    --------
+    snapbeam.ExternalForce, snapbeam.RecordedForce, snapbeam.HalfSine
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> blow = sb.ExternalForce(history=sb.HalfSineForce(peak=2.0, duration=0.05), location=0.3)
+    """
+
+    peak: float = quantity("N", "peak force of the blow", scope=RUN, short="blow_peak", symbol="F_p")
+    duration: float = quantity(
+        "1", "duration of the blow over the period of the first mode", low=0.0, scope=RUN, short="blow_duration"
+    )
+    name = "half_sine_force"
+    discontinuities = ("duration",)
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A period of the first mode."""
+        return np.full(columns["duration"].size, 2.0 * math.pi / scale.omega)
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The peak in N, the duration in s."""
+        duration = columns["duration"] * self.cycle(columns, scale)
+        return {"fastest": math.pi / duration, "amplitude": columns["peak"], "duration": duration}
+
+    def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
+        """Half a tone."""
+        found = self.shape_numbers(columns, scale)
+        window = in_pieces((np.zeros(1), {0: np.ones(1)}), (found["duration"], {}))
+        return [Tone(found["amplitude"], found["fastest"], window=window)]
+
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Peak force, N."""
+        return np.abs(columns["peak"])
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedForce(FileKeys, ForceHistory, Sampled):
     """A sampled force: any history.  Between samples it is the cubic spline through all of them.
@@ -220,8 +270,8 @@ class ExternalForce:
     Parameters
     ----------
     history : ForceHistory
-        F(t): a :class:`~snapbeam.HarmonicForce`, a :class:`~snapbeam.ConstantForce` or, for any other history, a
-        :class:`~snapbeam.RecordedForce`.
+        F(t): a :class:`~snapbeam.HarmonicForce`, a :class:`~snapbeam.ConstantForce`, a :class:`~snapbeam.HalfSineForce` or, for
+        any other history, a :class:`~snapbeam.RecordedForce`.
     location : float, optional
         Location of the force on a beam, over the length.
     shape : array_like of shape (N,), optional
@@ -232,7 +282,7 @@ class ExternalForce:
 
     See Also
     --------
-    snapbeam.ConstantForce, snapbeam.HarmonicForce, snapbeam.RecordedForce
+    snapbeam.ConstantForce, snapbeam.HarmonicForce, snapbeam.HalfSineForce, snapbeam.RecordedForce
 
     Examples
     --------
@@ -264,8 +314,8 @@ class ExternalForce:
     def __post_init__(self) -> None:
         if not isinstance(self.history, ForceHistory):
             raise InputTypeError(
-                f"history = {shown(self.history)}: must be a force in newtons; use a HarmonicForce, a ConstantForce or a "
-                "RecordedForce"
+                f"history = {shown(self.history)}: must be a force in newtons; use a HarmonicForce, a ConstantForce, "
+                "a HalfSineForce or a RecordedForce"
             )
         check_fields(self)
         check_label(self.label)

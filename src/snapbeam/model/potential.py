@@ -603,15 +603,21 @@ class Potential:
 
     def _sides(self, saddle: Equilibrium) -> tuple[int | None, int | None]:
         """Wells that the descents from a saddle along its unstable direction, downwards and upwards, end in."""
-        _, axes = np.linalg.eigh(self._in_modes(self._tangent(saddle.amplitude)))
-        away = self.model.linear_modes @ axes[:, 0]
-        away *= 1e-3 * np.abs(self.size).max() / np.abs(away).max()
-        return self.descent(saddle.amplitude - away), self.descent(saddle.amplitude + away)
+        return self.descent(saddle.amplitude, "below"), self.descent(saddle.amplitude, "above")
 
-    def descent(self, alpha: _Array) -> int | None:
-        """Number of the well that a motion without inertia, M alpha' = -dU/dalpha, comes to; None if it leaves a range."""
-        size = np.abs(self.size).max()
-        for there, _ in self._falling(self._start_of_descent(alpha)):
+    def descent(self, alpha: _Array, side: str = "below") -> int | None:
+        """Number of the well that a motion without inertia, M alpha' = -dU/dalpha, comes to; None if it leaves a range.
+
+        From an unstable equilibrium the centre leaves downwards (*side* "below") or upwards.
+        """
+        size, start = np.abs(self.size).max(), self._start_of_descent(alpha)
+        bend, modes = self._in_modes(self._tangent(start)), self.model.linear_modes
+        rates, axes = np.linalg.eigh(bend) if np.isfinite(bend).all() else (np.ones(1), np.eye(1))
+        if rates[0] < 0.0 and np.abs(modes @ np.linalg.lstsq(bend, modes.T @ self._gradient(start))[0]).max() <= _SAME * size:
+            away = modes @ axes[:, 0]
+            away *= 1e-3 * size / np.abs(away).max() * math.copysign(1.0, float(self.model.midspan_shape @ away))
+            start = start + away if side == "above" else start - away
+        for there, _ in self._falling(start):
             for number, well in enumerate(self.wells):
                 if np.abs(there - well.amplitude).max() <= _NEAR * size:
                     return number

@@ -304,7 +304,7 @@ class System:
         """State at rest in the well that the first striker pushes away from, touched by it.
 
         Without a striker it is the well of the start.  With local forces it is the well of the system that a beam comes
-        to, without inertia, from that well of the structure.  An external force begins with the run, its constant part
+        to, without inertia, from that well of the structure; where that is a saddle now, on the side of the striker.  An external force begins with the run, its constant part
         too.
 
         Raises
@@ -315,7 +315,8 @@ class System:
         state, local = rest_state(self.model, self.striker), self.unloaded_potential
         if local.is_of_the_structure_alone:
             return state
-        well = local.descent(state.amplitude) if local.holds(state.amplitude) else None
+        side = self.striker.side if self.striker is not None else "below"
+        well = local.descent(state.amplitude, side) if local.holds(state.amplitude) else None
         if well is None:
             limits = [law.displacement_range(law.numbers) for law in self.local_forces]
             valid = [
