@@ -489,7 +489,7 @@ def record(
     span = 2.0 * float(ensemble.step_times[0])
     most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
     width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
-    samples = max(min(_SAMPLES, _NUMBERS // width), most + 8)
+    samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // width), most + 8)
     saved = np.zeros(
         (3 * (n + 64) + count * (11 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
     )
