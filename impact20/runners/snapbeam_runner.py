@@ -122,7 +122,7 @@ def _system(case: Case) -> tuple[Any, Array]:
         history = sb.HarmonicForce(frequency_ratio=case.frequency, amplitude=1.0, phase=case.phase)
         forces.append(sb.ExternalForce(history=history, shape=case.harmonic))
     if case.pulse is not None:
-        history = sb.HalfSineForce(peak=1.0, duration=case.pulse_duration / (2 * math.pi))
+        history = sb.model.HalfSineForce(peak=1.0, duration=case.pulse_duration / (2 * math.pi))
         forces.append(sb.ExternalForce(history=history, shape=case.pulse))
     if case.truss is not None:
         forces.append(Truss(bar_stiffness=case.truss[0], rest_length=case.truss[1]))

@@ -35,7 +35,6 @@ from .model.drive.sine import Sine as Sine
 from .model.drive.sum import SumDrive as SumDrive
 from .model.external_force import ConstantForce as ConstantForce
 from .model.external_force import ExternalForce as ExternalForce
-from .model.external_force import HalfSineForce as HalfSineForce
 from .model.external_force import HarmonicForce as HarmonicForce
 from .model.external_force import RecordedForce as RecordedForce
 from .model.force_displacement import force_displacement as force_displacement

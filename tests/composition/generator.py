@@ -466,7 +466,7 @@ def external(kind: str, number: Numbers) -> tuple[sb.ForceHistory, Callable[[flo
         return sb.ConstantForce(force=number.flip * mean), lambda t: mean
     if kind == "half_sine_force":
         lasts = 0.3 * ratio * 2.0 * math.pi / number.first
-        blow = sb.HalfSineForce(peak=number.flip * size, duration=0.3 * ratio)
+        blow = sb.model.HalfSineForce(peak=number.flip * size, duration=0.3 * ratio)
         return blow, lambda t: size * math.sin(math.pi * t / lasts) if t < lasts else 0.0
     count = 480
     times = np.arange(count) * (8.0 * 2.0 * math.pi / number.first / (count - 1))

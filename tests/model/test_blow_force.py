@@ -13,7 +13,9 @@ def struck(amplitude: float, duration: float) -> sb.System:
     model = sb.ReducedModel.from_matrices(
         [[2.0]], [2.0 * 9.0], contact_shape=[1.0], reference_frequency=3.0 / (2.0 * np.pi)
     )
-    return sb.System(model, forces=[sb.ExternalForce(history=sb.HalfSineForce(peak=amplitude, duration=duration))])
+    return sb.System(
+        model, forces=[sb.ExternalForce(history=sb.model.HalfSineForce(peak=amplitude, duration=duration))]
+    )
 
 
 @pytest.mark.parametrize(("amplitude", "duration"), [(0.7, 0.3), (-2.0, 0.02), (1.0, 3.3)])
@@ -39,9 +41,9 @@ def test_of_a_file(tmp_path) -> None:
     blow = 'type = "half_sine_force"\npeak = "5 mN"\nduration = 0.1\nlocation = 0.4\n'
     file.write_text('extends = "paper"\n[[force]]\n' + blow)
     (force,) = load_config(file).system.forces
-    assert force.history == sb.HalfSineForce(peak=5e-3, duration=0.1)
+    assert force.history == sb.model.HalfSineForce(peak=5e-3, duration=0.1)
 
 
 def test_without_duration_it_is_refused() -> None:
     with pytest.raises(sb.InputError, match=r"duration = 0"):
-        sb.HalfSineForce(peak=1.0, duration=0.0)
+        sb.model.HalfSineForce(peak=1.0, duration=0.0)

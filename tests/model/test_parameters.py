@@ -204,7 +204,7 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
     forces = {
         "harmonic_force": sb.HarmonicForce(frequency_ratio=2.0, amplitude=1.0),
         "constant_force": sb.ConstantForce(force=1.0),
-        "half_sine_force": sb.HalfSineForce(peak=1.0, duration=0.1),
+        "half_sine_force": sb.model.HalfSineForce(peak=1.0, duration=0.1),
     }
     around = {
         "base_excitation": lambda kind: sb.BaseExcitation(motion=drives.get(kind, sb.Sine(**pair))),

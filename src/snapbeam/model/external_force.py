@@ -180,7 +180,7 @@ class HalfSineForce(ForceHistory, Timed):
     Examples
     --------
     >>> import snapbeam as sb
-    >>> blow = sb.ExternalForce(history=sb.HalfSineForce(peak=2.0, duration=0.05), location=0.3)
+    >>> blow = sb.ExternalForce(history=sb.model.HalfSineForce(peak=2.0, duration=0.05), location=0.3)
     """
 
     peak: float = quantity("N", "peak force of the blow", scope=RUN, short="blow_peak", symbol="F_p")
@@ -270,7 +270,7 @@ class ExternalForce:
     Parameters
     ----------
     history : ForceHistory
-        F(t): a :class:`~snapbeam.HarmonicForce`, a :class:`~snapbeam.ConstantForce`, a :class:`~snapbeam.HalfSineForce` or, for
+        F(t): a :class:`~snapbeam.HarmonicForce`, a :class:`~snapbeam.ConstantForce`, a :class:`~snapbeam.model.HalfSineForce` or, for
         any other history, a :class:`~snapbeam.RecordedForce`.
     location : float, optional
         Location of the force on a beam, over the length.
@@ -282,7 +282,7 @@ class ExternalForce:
 
     See Also
     --------
-    snapbeam.ConstantForce, snapbeam.HarmonicForce, snapbeam.HalfSineForce, snapbeam.RecordedForce
+    snapbeam.ConstantForce, snapbeam.HarmonicForce, snapbeam.model.HalfSineForce, snapbeam.RecordedForce
 
     Examples
     --------
