@@ -428,7 +428,8 @@ class System:
             if each.inertia > 0.0:
                 theta = self.model.linear_modes.T @ each.row(self.model)
                 little, much = (float(each.loss(np.array([ohms]))[0]) for ohms in (1e-9, 1e9))
-                found[int(little < much)] += np.outer(theta, theta) / each.inertia
+                for at in (0, 1) if little == much == 0.0 else (int(little < much),):
+                    found[at] += np.outer(theta, theta) / each.inertia
         opened, short = (np.sqrt(np.maximum(np.linalg.eigvalsh(each), 0.0)) / (2.0 * np.pi) for each in found)
         return opened, short
 
