@@ -352,7 +352,7 @@ class PiezoelectricPatches(_Layers):
     """
 
     patches: Any = quantity("1", "ends over the length and moment per volt of every patch", kind=object)
-    capacitance: float = quantity("F", "capacitance of the patches", low=0.0, symbol="C")
+    capacitance: float = quantity("F", "capacitance of the piezoelectric layers", low=0.0, symbol="C")
     resistance: float = quantity("ohm", "load resistance", low=0.0, scope=RUN, symbol="R")
     name = "patches"
 
