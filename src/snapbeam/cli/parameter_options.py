@@ -477,6 +477,15 @@ Plot = Annotated[
     Path | None,
     typer.Option("--plot", help="Figure file to write: .png, .pdf or .svg.", rich_help_panel=_OUTPUT, metavar="FILE"),
 ]
+CurvesOver = Annotated[
+    str | None,
+    typer.Option(
+        "--over",
+        help="Axis of a map to draw a statistic over, as a curve for each value of the other axis.",
+        rich_help_panel=_OUTPUT,
+        metavar="NAME",
+    ),
+]
 Output = Annotated[
     Path, typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel=_OUTPUT, metavar="FILE")
 ]

@@ -16,9 +16,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from snapbeam.model.parameters import lookup, named_in, ratio_of
+from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.agreement import draw_agreement
-from snapbeam.plot.axes import axis_label, dress, edges_of, positions
+from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of, tick_text
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
@@ -313,7 +315,9 @@ _DECADES = 300.0
 
 
 @checked
-def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None) -> Axes:
+def plot_statistic(
+    dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None, over: str | None = None
+) -> Axes:
     """Draw a statistic of a map: colours over two axes, a curve over one, coloured dots of a list of points.
 
     Cells of runs that failed, or that have none of it, are grey.
@@ -329,6 +333,8 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
         Where to draw; a new figure one column wide by default.
     log : bool, optional
         Whether colours, or the axis, go by powers of ten; by default where the values span more than two of them.
+    over : str, optional
+        One of two axes, such as ``"harvester.resistance"``: over it a curve is drawn for each value of the other one.
 
     Examples
     --------
@@ -358,8 +364,14 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
     data = values.copy(data=scaled.reshape(values.shape))
     if log is None:
         log = wants_powers(scaled)
+    along = None if over is None else _axis_named(dataset, dims, over)
     with frame(ax, height=74.0) as ax:
-        if dims[:1] == ["sweep"] or len(dims) == 1:
+        if along is not None and len(dims) == 2:
+            _curves(ax, dataset, data, along)
+            dress(ax.xaxis, dataset, along)
+            ax.set_ylabel(label)
+            ax.set_yscale("log" if log else "linear")
+        elif dims[:1] == ["sweep"] or len(dims) == 1:
             if len(dims) > 1:
                 _swept(ax, dataset, data, dims[1])
             else:
@@ -389,6 +401,39 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
     return ax
 
 
+def _axis_named(dataset: xr.Dataset, dims: list[str], over: str) -> str:
+    """The axis that a parameter names, as a ratio or in its physical unit."""
+    full = {each: str(dataset[each].attrs.get("parameter", each)) for each in dims}
+    row = None if over in dims else lookup(named_in(over, {split_name(each)[0]: {} for each in full.values()}))
+    for each, name in full.items():
+        if over == each or (row is not None and ratio_of(row.name) == ratio_of(lookup(name).name)):
+            return each
+    raise InputError(f"over = {over!r}: is not an axis of the figure; its axes: {', '.join(dims)}")
+
+
+def _curves(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, along: str) -> None:
+    """Draw a statistic over one axis as a curve for each value of the other, with the interval of its mean."""
+    (other,) = (str(each) for each in data.dims if each != along)
+    points, _ = positions(dataset, along)
+    _, words = positions(dataset, other)
+    name, colors = str(data.name), crameri.batlow(np.linspace(0.0, 0.85, data.sizes[other]))
+    factor, _ = _label(dataset, name, dataset[name].values)
+    for at, (color, mark) in enumerate(zip(colors, itertools.cycle("os^Dv<>"), strict=False)):
+        value = tick_text(dataset, other, float(dataset[other][at]), 4) if words is None else words[at]
+        text = value if words is None else f"{symbol_of(dataset, other) or other} = {value}"
+        values = data.isel({other: at}).values
+        ax.plot(points, values, f"{mark}-", color=color, markersize=1.2 * marker_size(points.size), label=text)
+        if f"{name}_low" in dataset:
+            low, high = (
+                dataset[f"{name}{end}"].isel({other: at}).squeeze().values / factor for end in ("_low", "_high")
+            )
+            ax.fill_between(points, low, high, where=np.isfinite(high - low), color=color, alpha=0.2, linewidth=0.0)
+    handles = ax.get_legend_handles_labels()[0]
+    if f"{name}_low" in dataset:
+        handles.append(Patch(color="0.75", label=_interval_words(dataset)))
+    legend_below(ax, handles)
+
+
 def _of_any_seed(dataset: xr.Dataset, name: str) -> xr.Dataset:
     """The means over seeds of a map that has other axes too; otherwise the map itself."""
     seeds = seed_axes(dataset)
@@ -401,13 +446,17 @@ def _band(ax: Axes, dataset: xr.Dataset, name: str, points: _Array) -> None:
     factor, _ = _label(dataset, name, dataset[name].values)
     low, high = (dataset[f"{name}{end}"].values / factor for end in ("_low", "_high"))
     known = np.isfinite(low) & np.isfinite(high)
-    share = f"{100.0 * float(dataset.attrs.get('confidence', 0.95)):g} % interval of the mean"
-    ax.fill_between(points, low, high, where=known, color=BEAM_COLOR, alpha=0.25, linewidth=0.0, label=share)
+    words = _interval_words(dataset)
+    ax.fill_between(points, low, high, where=known, color=BEAM_COLOR, alpha=0.25, linewidth=0.0, label=words)
     if f"{name}_quantile" in dataset:
         for level, dashes in zip(dataset["quantile"].values, itertools.cycle(("--", "-.", ":"))):
             values = dataset[f"{name}_quantile"].sel(quantile=level).values / factor
             ax.plot(points, values, dashes, color=SHAKER_COLOR, label=f"{level:g} quantile")
     legend_below(ax)
+
+
+def _interval_words(dataset: xr.Dataset) -> str:
+    return f"{100.0 * float(dataset.attrs.get('confidence', 0.95)):g} % interval of the mean"
 
 
 def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None:
