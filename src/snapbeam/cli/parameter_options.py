@@ -89,7 +89,7 @@ _OPTIONS = {
 }
 _WORDS = {
     "initial_state.initial_well": "well that runs begin in, by name or by its index; by default the one that the first striker or stop "
-    "pushes away from",
+    "pushes away from; unforced: that of the beam without local forces, which begin with the run",
     "contact.radius": "radius of the sphere, m; with the next two options, instead of --contact-stiffness",
     "contact.young_modulus": "Young's moduli of sphere and beam, Pa: E1,E2",
     "contact.poisson_ratio": "Poisson ratios of sphere and beam: nu1,nu2",
@@ -260,7 +260,7 @@ def _option(name: str, is_axis: bool) -> Any:
     if row is not None and row.quantity.kind is str:
         return Annotated[str | None, typer.Option(flag, metavar="|".join(row.quantity.choices), **options)]
     if name == "initial_state.initial_well":
-        return Annotated[str | None, typer.Option(flag, metavar="lower|upper|INDEX", **options)]
+        return Annotated[str | None, typer.Option(flag, metavar="lower|upper|unforced|INDEX", **options)]
     if name == "model.modes":
         return Annotated[str | None, typer.Option(flag, metavar="COUNT|auto", **options)]
     if row is not None and row.quantity.kind is int:

@@ -360,9 +360,11 @@ def status_lines(dataset: xr.Dataset) -> list[str]:
     if "status" not in dataset:
         return []
     codes = np.asarray(dataset["status"].values)
-    lines = []
+    pulled_in = int(dataset.attrs.get("pull_in_runs", 0))
+    lines = [f"{pulled_in} of {codes.size} runs left the displacements of a force: pull-in, counted as snap-through."]
+    lines = lines if pulled_in else []
     for status in RunStatus:
-        count = int((codes == status).sum())
+        count = int((codes == status).sum()) - (pulled_in if status is RunStatus.DIVERGED else 0)
         if count and status not in (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.FILLED):
             lines.append(f"[bold red]{count} failed[/] ({status.name}): {status.advice}")
     decided = int((codes == RunStatus.EARLY_STOP).sum())

@@ -31,7 +31,7 @@ from snapbeam.model.parameters import PHYSICAL, SECTIONS, Parameter, lookup, nam
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import section_of
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.model.state import State, checked_well, rest_state, started
+from snapbeam.model.state import UNFORCED, State, checked_initial_well, checked_well, rest_state, started
 from snapbeam.model.striker import Contact, Striker
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
@@ -78,8 +78,9 @@ class System:
         Circuits that turn motion into power in a resistor.
     initial_state : State, optional
         State in which runs begin, one and not a batch; at rest in *initial_well* by default.
-    initial_well : {"lower", "upper"} or int, optional
-        Well in which runs begin at rest, by name or by its index in ``unloaded_potential.wells``.  By default the one that the
+    initial_well : {"lower", "upper", "unforced"} or int, optional
+        Well in which runs begin at rest, by name or by its index in ``unloaded_potential.wells``; "unforced" is the well
+        without the local forces, which then begin with the run, as a voltage that is switched on.  By default the one that the
         first striker or stop pushes away from, touched by it; :attr:`initial_well_text` names it.
 
     See Also
@@ -136,7 +137,7 @@ class System:
         if self.initial_well is not None:
             if start is not None:
                 raise InputError("initial_well, initial_state: give one of the two")
-            object.__setattr__(self, "initial_well", checked_well("initial_well", self.initial_well))
+            object.__setattr__(self, "initial_well", checked_initial_well("initial_well", self.initial_well))
         if self.axial_load is not None and model.beam is None:
             raise InputError(
                 "axial_load: changes the axial load of a beam; a structure given by matrices has its load in its stiffness"
@@ -437,13 +438,17 @@ class System:
         """Amplitudes of an equilibrium, by default of the well that runs begin in."""
         if equilibrium is not None and not isinstance(equilibrium, Equilibrium):
             equilibrium = self.potential.well(checked_well("equilibrium", equilibrium))
-        return self._start_at_rest.amplitude if equilibrium is None else equilibrium.amplitude
+        if equilibrium is not None:
+            return equilibrium.amplitude
+        return (self.rest_state if self.initial_well == UNFORCED else self._start_at_rest).amplitude
 
     @property
     def _start_at_rest(self) -> State:
         """State at rest in the initial well."""
         if self.initial_well is None:
             return self.rest_state
+        if self.initial_well == UNFORCED:
+            return rest_state(self.model, self.striker)
         try:
             return State(amplitude=self.unloaded_potential.well(self.initial_well))  # type: ignore[arg-type]
         except InputError as error:
@@ -460,8 +465,8 @@ class System:
 
         Of an initial state it is the well on whose side of the dividing height the centre is.
         """
-        if self.initial_state is not None:
-            return self.model.side_of(self.initial_state.amplitude)
+        if self.initial_state is not None or self.initial_well == UNFORCED:
+            return self.model.side_of(self.start_state.amplitude)
         potential, alpha = self.unloaded_potential, self.start_state.amplitude
         distances = [float(np.abs(each.amplitude - alpha).max()) for each in potential.wells]
         if len(distances) < 2:

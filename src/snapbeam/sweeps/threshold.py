@@ -60,12 +60,16 @@ def threshold(
     therefore two curves: the lowest interwell value, and the value from which every run is interwell.  snapbeam runs
     every point of the grid, so both curves are exact on that grid.
 
+    A run that leaves the displacements of a local force, as in pull-in to an electrode (status ``DIVERGED``), counts as
+    interwell.  The dynamic pull-in voltage is thus a threshold over ``force.voltage`` with
+    ``initial_well="unforced"``, and the shock or vibration that a loaded electrode survives is one over its amplitude.
+
     Parameters
     ----------
     system : System
         Nominal system; parameters that are not in *axes* have its values.
     parameter : str
-        Parameter to raise, such as ``"velocity_amplitude"``: one that may differ between the runs of an ensemble.
+        Parameter to raise, any real number of the system, such as ``"velocity_amplitude"`` or ``"force.voltage"``.
     values : array_like
         Values of that parameter, strictly increasing, in its unit: the range and the resolution of the threshold.
     axes : mapping of str to array_like, optional
@@ -99,8 +103,7 @@ def threshold(
     Raises
     ------
     InputError
-        If the parameter belongs to the model and cannot differ between the runs of an ensemble, or there are fewer
-        than two values.
+        If the parameter is no real number, or there are fewer than two values.
 
     See Also
     --------
@@ -119,10 +122,8 @@ def threshold(
     ('frequency_ratio',)
     """
     row = system.parameter(parameter) if isinstance(system, System) else lookup(parameter)
-    if not row.is_run or row.quantity.kind is not float:
-        raise InputError(
-            f"parameter = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
-        )
+    if row.quantity.kind is not float:
+        raise InputError(f"parameter = {shown(parameter)}: must be a real number, such as velocity_amplitude")
     axes = {} if axes is None else axes
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map parameters to arrays of values")
@@ -147,10 +148,13 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     dims = tuple(lookup(name).short for name in setup.points.axes if name != along)
     whole = (*dims, row.short)
     response = computed["response_class"].transpose(*whole).values
-    rows = _thresholds(response)
+    pulled_in = np.zeros_like(response, dtype=bool)
+    if any(law.is_limited() for law in setup.system.local_forces):
+        pulled_in = computed["status"].transpose(*whole).values == RunStatus.DIVERGED
+    rows = _thresholds(np.where(pulled_in, ResponseClass.TRANSIENT_2, response))
     attrs = setup.attributes("threshold of the interwell response of a struck bistable beam")
     attrs.pop("early_termination")
-    attrs |= {"parameter": row.short, "runs": int(response.size)}
+    attrs |= {"parameter": row.short, "runs": int(response.size), "pull_in_runs": int(pulled_in.sum())}
     dataset = xr.Dataset(coords=setup.coordinates(), attrs=attrs)
     words = row.quantity.long_name
     symbol = f" {row.quantity.symbol}" if row.quantity.symbol else ""
