@@ -81,7 +81,7 @@ _FORCE = Annotated[
 _STYLE = Annotated[
     str | None,
     typer.Option(
-        "--style", help="Widths and letters of figures: elsevier, ieee or talk, as of snapbeam.plot.plot_style.",
+        "--style", help="Widths and letters of figures: elsevier, ieee, nature or slides, as of snapbeam.plot.plot_style.",
         rich_help_panel="Output", metavar="NAME",
     ),
 ]  # fmt: skip

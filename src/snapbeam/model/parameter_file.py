@@ -306,6 +306,11 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
             )
         return "", float(value)
     pair = list(value) if isinstance(value, (list, tuple)) else None
+    for at, each in enumerate(pair or ()):
+        message, number = _from_text(name, each, MATERIALS[name][0])
+        if message:
+            return message, None
+        pair[at] = number  # type: ignore[index]
     if pair is None or len(pair) != 2 or not all(isinstance(each, (int, float)) for each in pair):
         return f"{name} = {shown(value)}: must be a list of two numbers, of sphere and beam", None
     if name == "young_modulus" and any(0.0 < each < 1e3 for each in pair):
@@ -710,18 +715,14 @@ class Config:
 
     @property
     def free_system(self) -> System:
-        """The model with its forces and harvesters, for questions about free motion.
+        """The model with its forces and harvesters, for questions about free motion."""
+        return System(**self._parts(*(name for name in self._around if numbered(name)[0] in ("force", "harvester"))))
 
-        Raises
-        ------
-        InputError
-            If an excitation or a striker is given.
-        """
-        kept = [name for name in self._around if numbered(name)[0] in ("force", "harvester")]
-        acting = [name for name in (*self._around, *_STRIKING) if name not in kept and self.section(name)]
-        if acting:
-            raise InputError(f"{', '.join(acting)}: free motion is computed; leave out {acting[0]}")
-        return System(**self._parts(*kept))
+    @property
+    def exciting(self) -> list[str]:
+        """Sections of what a free motion is without: excitations and strikers."""
+        kept = ("force", "harvester")
+        return [name for name in (*self._around, *_STRIKING) if numbered(name)[0] not in kept and self.section(name)]
 
     def _parts(self, *forces: str) -> dict[str, Any]:
         self._require("beam")

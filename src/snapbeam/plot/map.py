@@ -138,7 +138,11 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         _draw_line(ax, dataset, name)
         set_title(ax, caption(dataset, 2, (name,)))
         if legend:
-            legend_below(ax, class_handles(dataset["response_class"].values, wells_of(dataset.attrs)))
+            kinds = dataset["response_class"].values
+            handles = class_handles(kinds, wells_of(dataset.attrs))
+            if 0 < dataset.attrs.get("pull_in_runs", 0) == (kinds == ResponseClass.UNKNOWN).sum():
+                handles[-1].set_label(str(handles[-1].get_label()).replace("unknown", "pull-in"))
+            legend_below(ax, handles)
     return ax
 
 

@@ -23,6 +23,7 @@ from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_
 from snapbeam.util.diagnostics import Diagnostic, counting, tell
 from snapbeam.util.proportions import mean_interval, proportion
 from snapbeam.util.provenance import canonical_json
+from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -230,8 +231,8 @@ class Constraint:
     ----------
     quantity : str
         Name of the quantity, as in :class:`Objective`.
-    lower, upper : float, optional
-        One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
+    lower, upper : float or str, optional
+        One of them at least, a number in the unit of the quantity or text with a unit, as ``"5 N"``.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
         Required fraction of all systems that satisfy a constraint of a statistic of runs, in (0, 1).
 
@@ -257,8 +258,14 @@ class Constraint:
         if self.lower is None and self.upper is None:
             raise InputError(f"constraint of {self.quantity}: must have lower or upper")
         for name in ("lower", "upper"):
-            if getattr(self, name) is not None:
-                finite(name, getattr(self, name))
+            value = getattr(self, name)
+            if isinstance(value, str):
+                try:
+                    value = number_in_unit(value, self._quantity.unit)
+                except InputError as error:
+                    raise InputError(f"{name} = {getattr(self, name)!r}, of {self.quantity}: {error}") from None
+            if value is not None or getattr(self, name) is not None:
+                object.__setattr__(self, name, finite(name, value))
         within("probability", self.probability, 0.0, 1.0)
         if kind == "outcome":
             if self.upper is not None or self.lower is None:
