@@ -118,4 +118,4 @@ def test_a_style_sets_widths_and_text_and_can_be_taken_back(name, width):
     with figure_style():
         assert 25.4 * new_figure("double").get_figwidth() == pytest.approx(190.0)
     with pytest.raises(sb.InputError, match="name"):
-        sb.plot.plot_style("nature")
+        sb.plot.plot_style("poster")
