@@ -83,6 +83,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     free = next((name for name in known if name != objectives[0]), variables[0])
     across = over or (f"objective_{objectives[1]}" if len(objectives) > 1 else free)
     up = f"objective_{objectives[0]}"
+    dataset = _with_prefix(_with_prefix(dataset, up), across)
     with frame(ax, dataset, height=84.0) as ax:
         x, y = dataset[f"tried_{across}"].values, dataset[f"tried_{up}"].values
         kept = (dataset["violation"].values == 0.0) & np.isfinite(y)
@@ -103,6 +104,19 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
                 plain_decades(axis, values.min(), values.max())
         legend_below(ax)
     return ax
+
+
+def _with_prefix(dataset: xr.Dataset, name: str) -> xr.Dataset:
+    """The dataset with an objective in its unit with a prefix of the SI, such as µW."""
+    unit = str(dataset[name].attrs.get("units", "1"))
+    if not name.startswith("objective_") or not unit.isalpha():
+        return dataset
+    factor, scaled = scale_of(dataset[f"tried_{name}"].values, unit)
+    own = [f"{start}{name}{end}" for start, end in (("", ""), ("", "_low"), ("", "_high"), ("tried_", ""))]
+    return dataset.assign({
+        each: (dataset[each] / factor).assign_attrs(dataset[each].attrs | {"units": scaled})
+        for each in own if each in dataset
+    })  # fmt: skip
 
 
 def _errors(dataset: xr.Dataset, name: str, own: np.ndarray) -> np.ndarray | None:
