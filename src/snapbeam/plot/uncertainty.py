@@ -33,7 +33,7 @@ from snapbeam.plot.style import (
 )
 from snapbeam.plot.units import in_symbols, in_units, ratio_along, ratio_name, scale_text
 from snapbeam.solver.statistics import STATISTICS
-from snapbeam.util.si_prefixes import prefixed
+from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, checked, shown
 
