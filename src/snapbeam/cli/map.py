@@ -94,7 +94,9 @@ def compute_map(
     if plot is not None:
         overlays = {"measurements": overlay, "quasi_static_line": quasi_static_line}
         files.append(
-            draw_computed(dataset, plot, output, variable, **({} if over is None else {"over": over}))
+            draw_computed(
+                dataset, plot, output, variable, **({} if over is None else {"over": settings.full_name(over)})
+            )
             if variable not in (None, "response_class")
             else draw_computed(dataset, plot, output, "response_class", **overlays)
         )
