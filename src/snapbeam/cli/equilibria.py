@@ -135,7 +135,6 @@ def equilibria(
     settings = configured(given)
     settings_potential = potential = settings.potential
     model = potential.model
-    assert model.beam is not None
     if (lower_frequency is None) != (upper_frequency is None):
         raise InputError("lower_frequency, upper_frequency: give both, or neither")
     console = out()
@@ -144,6 +143,10 @@ def equilibria(
             raise InputError(
                 "lower_frequency, upper_frequency with a force: the imperfection is identified from a beam without forces; "
                 "leave the force out"
+            )
+        if model.beam is None:
+            raise InputError(
+                "lower_frequency, upper_frequency: the imperfection is that of a beam; this model has none"
             )
         model = identify_imperfection(
             model.beam, lower_frequency, upper_frequency, identify, model.modes, model.imperfection
@@ -156,8 +159,6 @@ def equilibria(
             f"buckling_level = {model.beam.buckling_level:.6g} m, imperfection {identify} = "
             f"{getattr(model.imperfection, identify):.6g} {unit}"
         )
-    beam = model.beam
-    assert beam is not None
     found = potential.equilibria
     heights = [potential.center(each) for each in found]
     metres, length_unit = scale_of(heights, "m")
@@ -190,7 +191,7 @@ def equilibria(
     add_json(
         modal_error=error,
         bistable=len(freq) > 1,
-        buckling_level=beam.buckling_level,
+        buckling_level=None if model.beam is None else model.beam.buckling_level,
         imperfection={} if model.imperfection is None else {
             name: value for name, value in vars(model.imperfection).items() if isinstance(value, (float, str))
         },

@@ -781,17 +781,17 @@ def config_of_file(path: Path, point: str | None) -> Config:
     sections: dict[str, dict[str, Any]] = parsed_json(text, f"from = {str(path)!r}")
     if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
         raise InputError(
-            f"from = {str(path)!r}: has a recorded drive, which the file does not contain; use it from Python"
+            f"from = {str(path)!r}: has a recorded drive or large matrices, which the file does not contain; use it from "
+            "Python, or --config with what System.save writes"
         )
-    if "mass" in sections.get("model", {}):
-        raise InputError(f"from = {str(path)!r}: is of a model given by matrices; use it from Python")
     run = {
         name: value
         for name, value in parsed_json(dataset.attrs.get("integration", "{}"), f"from = {str(path)!r}").items()
         if value is not None and name != "engine"
     }
-    if sections.get("initial_state", {}).keys() - {"initial_well"}:
-        raise InputError(f"from = {str(path)!r}: has its own initial state; use it from Python")
+    sections = {
+        part: {name: value for name, value in own.items() if value is not None} for part, own in sections.items()
+    }
     sections["integration"] = run
     for name, value in _at_point(dataset, point, path).items():
         section, field = split_name(name)

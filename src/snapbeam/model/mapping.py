@@ -27,17 +27,13 @@ _MATRICES = (
     "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude", "length_scale",
 )  # fmt: skip
 _OPTIONAL = ("base_shape", "elongation_matrix", "patch_shape", "damping")
-_START = (
-    "amplitude",
-    "velocity",
-    "phase",
-    "striker_position",
-    "contact_time",
-    "striker_shift",
-    "striker_rate",
-    "indentation",
+OF_MATRICES = (*_MATRICES, *_OPTIONAL, "transverse_force", "damping_ratio", "reference_frequency")
+"""Keys of the section of a model given by matrices."""
+START = (
+    "amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate", "indentation",
     "circuit",
-)
+)  # fmt: skip
+"""Keys of a whole initial state."""
 
 
 def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
@@ -84,7 +80,7 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         for number, each in enumerate(getattr(system, _TUPLES[kind]), 1):
             sections[section_of(kind, number)] = _described(each)
     if start is not None:
-        values = {name: getattr(start, name) for name in _START}
+        values = {name: getattr(start, name) for name in START}
         if start.contact_time.size == 1:
             values["contact_time"] = start.contact_time[..., 0]
         # of several strikers or circuits, those without a number of their own are at rest
@@ -140,7 +136,7 @@ def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
     )
     if "initial_state" in sections:
         values = dict(sections["initial_state"])
-        _only(values, "initial_state", ["initial_well", *_START])
+        _only(values, "initial_state", ["initial_well", *START])
         if "initial_well" in values:
             parts["initial_well"] = values.pop("initial_well")
         if values or "initial_well" not in parts:
@@ -234,7 +230,7 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
         raise InputError(
             "[imperfection]: belongs to a beam; give the transverse_force of a structure given by matrices"
         )
-    _only(own, "model", [*_MATRICES, *_OPTIONAL, "transverse_force", "damping_ratio", "reference_frequency"])
+    _only(own, "model", [*OF_MATRICES])
     for name in ("mass", "stiffness", "contact_shape"):
         if name not in own:
             raise InputError(f"[model] {name} is missing: give it, or a section [beam]")

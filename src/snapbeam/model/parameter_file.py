@@ -20,7 +20,7 @@ from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.external_force import FORCES
 from snapbeam.model.integration import CYCLES, Integration
-from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, read_file, resolved
+from snapbeam.model.mapping import OF_MATRICES, START, flattened, labels_of, parts_from_mapping, read_file, resolved
 from snapbeam.model.modal_convergence import converged_modes, error_of_auto
 from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physical, parse_axis, unit_of
 from snapbeam.model.parameters import (
@@ -40,6 +40,7 @@ from snapbeam.model.parameters import SECTIONS as SYSTEM_SECTIONS
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import check_label, numbered, quantities, split_name
 from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.state import State
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System, told_as
 from snapbeam.util.files import atomic_path, check_writable
@@ -176,6 +177,8 @@ def checked_sections(
 def _known(section: str, values: Mapping[str, Any]) -> list[str]:
     """Names that a section may hold, those of its type if that is given."""
     kind = numbered(section)[0]
+    if kind == "model" and "mass" in values:
+        return [*OF_MATRICES]
     rows = [row for row in parameters().values() if row.section == kind]
     rows = [row for row in rows if not _is_of_other_type(row, values)]
     names = [split_name(row.name)[1] for row in rows]
@@ -197,9 +200,11 @@ def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any
     own = found.setdefault(section, {})
     if section == "sweep":
         return _checked_axis(name, value, own, flat)
-    if section == "initial_state":
+    if section == "initial_state" and name in START and "amplitude" in flat[section]:
+        row: Parameter | None = None
+    elif section == "initial_state":
         try:
-            row: Parameter | None = lookup(f"initial_state.{name}")
+            row = lookup(f"initial_state.{name}")
         except InputError:
             return f"{name}: unknown key; must be initial_well, amplitude[i], velocity[i] or striker_position"
     else:
@@ -283,6 +288,8 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
         if kind_of(numbered(section)[0], value) is None:
             return f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}", None
         return "", value
+    if section in ("model", "initial_state"):
+        return _array(name, value)
     if name == "label":
         try:
             check_label(value)
@@ -356,6 +363,8 @@ def parsed_axis(name: str, value: Any) -> Any:
 
 def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Error messages for contradictions between values that are each valid."""
+    if "mass" in found.get("model", {}) and "beam" in found:
+        return ["[beam]: leave it out of a file with the matrices of [model]"]
     contact = found.get("contact", {})
     given = [name for name in MATERIALS if name in contact]
     if given and "stiffness" in contact:
@@ -445,6 +454,11 @@ class Config:
         """The line ``extends = "paper"`` of a file, if the paper's values complete these."""
         return {"extends": "paper"} if self.extends_paper else {}
 
+    @property
+    def is_of_matrices(self) -> bool:
+        """True if the model is given by matrices, without a beam."""
+        return "mass" in self.section("model")
+
     def section(self, name: str) -> dict[str, Any]:
         """Values given in a section."""
         return dict(self.given.get(name, {}))
@@ -493,7 +507,7 @@ class Config:
     @cached_property
     def defaulted(self) -> tuple[str, ...]:
         """Names of values that were not given: those of the paper's beam for another beam, else the default drive."""
-        if not self.section("beam"):
+        if not self.section("beam") and not self.is_of_matrices:
             return ()
         found, swept = self._defaults(), self.axes() if self.section("sweep") else {}
         driven = not (self._is_unstruck or self._stands_still)
@@ -501,7 +515,7 @@ class Config:
         return tuple(
             f"{section}.{name}"
             for section in sections
-            for name in found[section]
+            for name in found.get(section, ())
             if name not in {*self.section(section), "modes", "location"} and f"{section}.{name}" not in swept
         )
 
@@ -520,7 +534,7 @@ class Config:
             sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
         else:
             sections = {
-                name: {key: value for key, value in values.items() if f"{name}.{key}" not in swept}
+                name: {k: v for k, v in values.items() if v is not None and f"{name}.{k}" not in swept}
                 for name, values in self.system.to_mapping().items()
             }
             sections.pop("initial_state", None)
@@ -543,9 +557,12 @@ class Config:
     def _defaults(self) -> dict[str, dict[str, Any]]:
         """Values by section of what need not be given."""
         found = self._of_paper()
+        if self.is_of_matrices:
+            del found["beam"]
+            found["model"] = {}
         if self.extends_paper:
             return found
-        own = {"model": {"modes": MODES}, "drive": found["drive"]}
+        own = {"model": {"modes": MODES} if found["model"] else {}, "drive": found["drive"]}
         return {section: own.get(section, {}) for section in found}
 
     def _require(self, *sections: str) -> None:
@@ -555,6 +572,8 @@ class Config:
         lines, of_paper = [], self._of_paper()
         for section in sections:
             given = self._with_axes(section).keys()
+            if self.is_of_matrices and section in ("beam", "model"):
+                continue
             missing = [name for name in of_paper[section] if name not in given and name != "modes"]
             if missing:
                 lines.append(f"[{section}] {', '.join(missing)}: missing")
@@ -673,7 +692,7 @@ class Config:
     def is_static(self) -> bool:
         """True if the file describes only a beam and forces on it, without the damping that a motion needs."""
         kinds = {numbered(name)[0] for name in self.given}
-        damped = "damping_ratio" in self.section("model") and self._around
+        damped = {"damping_ratio", "damping"} & self.section("model").keys() and self._around
         return (
             not self.extends_paper and not damped and not kinds - {"beam", "model", "boundary", "imperfection", "force"}
         )
@@ -694,6 +713,8 @@ class Config:
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
         start = self.section("initial_state")
+        if "amplitude" in start:
+            return system.replace(initial_state=State(**start))
         return system.replace(**{f"initial_state.{name}": value for name, value in start.items()}) if start else system
 
     @property
@@ -726,11 +747,13 @@ class Config:
 
     def _parts(self, *forces: str) -> dict[str, Any]:
         self._require("beam")
-        own = {
-            name: self._with_axes(name) if self._may_be_axis(name) else self.section(name) for name in ("beam", "model")
+        sections = {
+            name: values | (self._with_axes(name) if self._may_be_axis(name) else self.section(name))
+            for name, values in self._defaults().items()
+            if name in ("beam", "model")
         }
-        sections = {name: self._defaults()[name] | own[name] for name in own}
-        sections["model"].setdefault("damping_ratio", DAMPING_RATIO)  # has no effect without motion
+        if "damping" not in sections["model"]:
+            sections["model"].setdefault("damping_ratio", DAMPING_RATIO)  # has no effect without motion
         sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
         sections |= {name: self._with_axes(name) for name in forces if self.section(name)}
         later = _without_units(sections)
