@@ -116,3 +116,56 @@ def test_patches_that_are_none_are_refused() -> None:
             sb.PiezoelectricPatches(patches=rows, capacitance=1e-9, resistance=1.0)
     with pytest.raises(InputError, match="one patch"):
         sb.PiezoelectricPatches.wired([], resistance=1.0)
+
+
+FILE = """
+[beam]
+length = "300 mm"
+thickness = "0.4 mm"
+width = "20 mm"
+density = 7850
+young_modulus = "200 GPa"
+buckling_level = "0.7 mm"
+[model]
+modes = 3
+damping_ratio = 0.02
+[base_excitation]
+type = "acceleration_sine"
+frequency_hz = 35
+amplitude_g = 1
+[[harvester]]
+type = "patches"
+wiring = {wiring}
+patches = [[0.0, 0.22, 1.5e-4], [0.4, 0.55, -1.1e-4], [0.8, 1.0, 0.7e-4]]
+capacitance = {capacitance}
+resistance = "20 kohm"
+[[harvester]]
+type = "coil"
+force_factor = 0.2
+resistance = 10
+"""
+
+
+@pytest.mark.parametrize("wiring", ["parallel", "series"])
+def test_a_file_wires_patches(tmp_path, wiring) -> None:
+    file = tmp_path / "wired.toml"
+    file.write_text(FILE.format(wiring=f'"{wiring}"', capacitance='["500 nF", 3e-7, "0.8 uF"]'))
+    system, expected = sb.System.load(file), sb.PiezoelectricPatches.wired(patches(), wiring, resistance=LOAD)
+    first, coil, *rest = system.harvesters
+    assert system == system.replace(harvesters=[expected[0], coil, *expected[1:]])
+    assert [type(each) for each in (first, *rest)] == [type(each) for each in expected]
+    assert system.get("harvester.2.force_factor") == 0.2
+    system.save(tmp_path / "saved.toml")
+    assert sb.System.load(tmp_path / "saved.toml") == system
+
+
+@pytest.mark.parametrize(
+    ("wiring", "capacitance", "message"),
+    [('"star"', "[1e-7, 1e-7, 1e-7]", "must be parallel or series"), ('"series"', "1e-7", "list of numbers"),
+     ('"series"', "[1e-7, 1e-7]", "one number for each row"), ('"series"', '["1 mm", 1e-7, 1e-7]', "in F")],
+)  # fmt: skip
+def test_a_file_that_wires_what_does_not_fit(tmp_path, wiring, capacitance, message) -> None:
+    file = tmp_path / "wired.toml"
+    file.write_text(FILE.format(wiring=wiring, capacitance=capacitance))
+    with pytest.raises(InputError, match=message):
+        sb.System.load(file)

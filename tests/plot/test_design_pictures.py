@@ -94,6 +94,10 @@ def test_tornado() -> None:
     assert [text.get_text().split("\n")[0] for text in ax.get_yticklabels()] == ["contact stiffness", "location"]
     widths = sorted(round(abs(patch.get_width()), 6) for patch in ax.patches)
     assert widths == [0.01, 0.01, 0.03, 0.03]
+    ax = plot_tornado(dataset.assign_attrs(quantity="peak contact force", quantity_units="N"))
+    assert ax.get_xlabel() == "Peak contact force (mN)" and max(
+        each.get_width() for each in ax.patches
+    ) == pytest.approx(30.0)
     with pytest.raises(InputError, match="no sensitivities"):
         plot_tornado(xr.Dataset())
 

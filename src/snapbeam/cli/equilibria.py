@@ -280,7 +280,7 @@ def _force_displacement(
     console = out()
     console.print(
         f"force at {location:g} of the length, from the {curve.attrs['well']} well ({curve.attrs['well_chosen_as']}); "
-        f"{curve.sizes['branch_number']} branches, {curve.sizes['critical_point']} critical points"
+        f"branches: {curve.sizes['branch_number']}, critical points: {curve.sizes['critical_point']}"
     )
     for name, words in (("snap_through", "snap-through"), ("snap_back", "snap-back")):
         force, place = float(curve[f"{name}_force"]), float(curve[f"{name}_displacement"])

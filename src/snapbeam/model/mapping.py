@@ -15,13 +15,14 @@ from snapbeam.model.base_excitation import BaseExcitation
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions
 from snapbeam.model.external_force import FORCES, ExternalForce
+from snapbeam.model.harvester import PiezoelectricHarvester, PiezoelectricPatches
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.parameters import SECTIONS, kind_of, kinds_of, row_of
 from snapbeam.model.quantity import NUMBERED, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.striker import Contact, Striker
-from snapbeam.util.validation import InputError, InputTypeError, mapping, shown
+from snapbeam.util.validation import InputError, InputTypeError, finite_array, mapping, shown
 
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude", "length_scale",
@@ -131,9 +132,9 @@ def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
         if name in sections:
             parts[name] = _moved(kind, "motion", sections[name], name)
     parts["forces"] = tuple(_force(section, values) for section, values in _numbered_sections(sections, "force"))
-    parts["harvesters"] = tuple(
-        _chosen(values, section) for section, values in _numbered_sections(sections, "harvester")
-    )
+    made = [_harvesters(values, section) for section, values in _numbered_sections(sections, "harvester")]
+    # what patches in series have beside the first follows all, whose numbers stay
+    parts["harvesters"] = (*(first for first, *_ in made), *(each for _, *rest in made for each in rest))
     if "initial_state" in sections:
         values = dict(sections["initial_state"])
         _only(values, "initial_state", ["initial_well", *START])
@@ -143,6 +144,25 @@ def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
             _needed(values, "initial_state", State)
             parts["initial_state"] = State(**values)
     return parts
+
+
+def _harvesters(values: Mapping[str, Any], section: str) -> list[Any]:
+    """The harvesters of a section: more than one of patches that it wires in series."""
+    if values.get("type") != PiezoelectricPatches.name or "wiring" not in values:
+        return [_chosen(values, section)]
+    own = dict(values)
+    rows, each = (np.atleast_1d(finite_array(f"[{section}] {name}", own.pop(name, ()))) for name in _OF_PATCHES)
+    if rows.ndim != 2 or rows.shape[1] != 3 or each.shape != rows.shape[:1]:
+        raise InputError(
+            f"[{section}] patches, capacitance: must be rows of three numbers, and one number for each row"
+        )
+    _only(own, section, ["type", "wiring", "resistance"])
+    _needed(own | dict.fromkeys(_OF_PATCHES), section, PiezoelectricPatches)
+    patches = [
+        PiezoelectricHarvester(patch_start=a, patch_end=b, moment_per_volt=m, capacitance=c, resistance=1.0)
+        for (a, b, m), c in zip(rows.tolist(), each.tolist(), strict=True)
+    ]
+    return list(PiezoelectricPatches.wired(patches, own["wiring"], resistance=own["resistance"]))
 
 
 def _force(section: str, values: Mapping[str, Any]) -> Any:
@@ -299,6 +319,7 @@ def _only(values: Mapping[str, Any], section: str, known: list[str]) -> None:
 _OF_MODEL = ("modes", "damping_ratio", "reference_frequency")
 
 
+_OF_PATCHES = ("patches", "capacitance")
 _MOVED = {"base_excitation": BaseExcitation, "axial_load": AxialLoadModulation}
 """Parts with a motion, by the section of a system."""
 _TUPLES = {"contact": "contacts", "force": "forces", "harvester": "harvesters"}

@@ -19,6 +19,7 @@ from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.external_force import FORCES
+from snapbeam.model.harvester import WIRINGS
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import OF_MATRICES, START, flattened, labels_of, parts_from_mapping, read_file, resolved
 from snapbeam.model.modal_convergence import converged_modes, error_of_auto
@@ -185,6 +186,7 @@ def _known(section: str, values: Mapping[str, Any]) -> list[str]:
     names += ["type"] if kinds_of(kind) else []
     names += ["label"] if kind in ("contact", "force") else []
     names += [*MATERIALS, *WANTED] if kind == "contact" else []
+    names += ["wiring"] if kind == "harvester" and values.get("type", "patches") == "patches" else []
     return names + [split_name(full)[1] for full in physical_names(f"{section}.{name}" for name in names)]
 
 
@@ -214,7 +216,9 @@ def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any
             what = "unknown key" if row is None else f"is not a key of type {flat[section]['type']!r}"
             return f"{name}: {what}{_nearest(name, known)}"
         row = row_of(f"{section}.{name}")
-    if row is None:
+    if name == "capacitance" and "wiring" in flat[section]:  # of each patch
+        message, checked = _each_with_unit(name, value, "F")
+    elif row is None:
         message, checked = _special(section, name, value)
     else:
         message, checked = _by_row(row, name, value)
@@ -290,6 +294,8 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
         return "", value
     if section in ("model", "initial_state"):
         return _array(name, value)
+    if name == "wiring":
+        return ("", value) if value in WIRINGS else (f"{name} = {shown(value)}: must be {' or '.join(WIRINGS)}", None)
     if name == "label":
         try:
             check_label(value)
@@ -312,17 +318,25 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
                 None,
             )
         return "", float(value)
-    pair = list(value) if isinstance(value, (list, tuple)) else None
-    for at, each in enumerate(pair or ()):
-        message, number = _from_text(name, each, MATERIALS[name][0])
-        if message:
-            return message, None
-        pair[at] = number  # type: ignore[index]
-    if pair is None or len(pair) != 2 or not all(isinstance(each, (int, float)) for each in pair):
+    message, pair = _each_with_unit(name, value, MATERIALS[name][0])
+    if message:
+        return message, None
+    if len(pair) != 2:
         return f"{name} = {shown(value)}: must be a list of two numbers, of sphere and beam", None
     if name == "young_modulus" and any(0.0 < each < 1e3 for each in pair):
         return f"young_modulus = {shown(value)}: must be in Pa; is it given in GPa?", None
     return "", [float(each) for each in pair]
+
+
+def _each_with_unit(name: str, value: Any, unit: str) -> tuple[str, Any]:
+    """A list of numbers, each of which may have a unit."""
+    found = [_from_text(name, each, unit) for each in value] if isinstance(value, (list, tuple)) else []
+    for message, number in found:
+        if message or not isinstance(number, (int, float)):
+            return message or f"{name} = {shown(value)}: must be a list of numbers", None
+    if not found:
+        return f"{name} = {shown(value)}: must be a list of numbers", None
+    return "", [float(number) for _, number in found]
 
 
 def _full_name(name: str, sections: Mapping[str, Any]) -> str:

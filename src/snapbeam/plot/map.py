@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import textwrap
 import warnings
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from snapbeam.model.mapping import labels_of, resolved
 from snapbeam.model.parameters import lookup, named_in, ratio_of
 from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
@@ -408,7 +410,12 @@ def plot_statistic(
 def _axis_named(dataset: xr.Dataset, dims: list[str], over: str) -> str:
     """The axis that a parameter names, as a ratio or in its physical unit."""
     full = {each: str(dataset[each].attrs.get("parameter", each)) for each in dims}
-    row = None if over in dims else lookup(named_in(over, {split_name(each)[0]: {} for each in full.values()}))
+    labels = labels_of(json.loads(dataset.attrs.get("system", "{}")))
+    row = (
+        None
+        if over in dims
+        else lookup(named_in(resolved(over, labels), {split_name(each)[0]: {} for each in full.values()}))
+    )
     for each, name in full.items():
         if over == each or (row is not None and ratio_of(row.name) == ratio_of(lookup(name).name)):
             return each

@@ -348,8 +348,10 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
-    middle = float(data.attrs["quantity_mean"])
-    half, low, high = (data[f"effect{end}"].values for end in ("", "_low", "_high"))
+    middle, unit = float(data.attrs["quantity_mean"]), str(data.attrs["quantity_units"])
+    found = [data[f"effect{end}"].values for end in ("", "_low", "_high")]
+    scale, unit = scale_of([abs(middle), *map(abs, found[0])], unit) if unit.isalpha() else (1.0, unit)
+    middle, (half, low, high) = middle / scale, (each / scale for each in found)
     for sign, color, label in (
         (-1.0, _BLUE, "one standard deviation lower"),
         (1.0, _RED, "one standard deviation higher"),
@@ -359,7 +361,6 @@ def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
         interval = f"{100.0 * float(data.attrs['confidence']):g} % interval" if sign > 0.0 else None
         ax.errorbar(middle + sign * half, place, xerr=error, fmt="none", label=interval, **_BARS)
     ax.axvline(middle, color="black", linewidth=0.6)
-    unit = str(data.attrs["quantity_units"])
     words = in_symbols(str(data.attrs["quantity"]))
     text = f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
     ax.set_xlabel(textwrap.fill(text, 40))
