@@ -67,7 +67,7 @@ def test_words_are_no_threshold_and_frequencies_are_about_an_equilibrium() -> No
 class BrokenStop(sb.ContactLaw):
     """A law of one's own whose force is no number beyond a penetration."""
 
-    stiffness: float = sb.quantity("N/m", "stiffness", low=0.0, scope=RUN)
+    softness: float = sb.quantity("N/m", "constant", low=0.0, scope=RUN)
     name = "broken_stop_of_a_test"
 
     def time_scale(self, mass, velocity):
@@ -75,14 +75,14 @@ class BrokenStop(sb.ContactLaw):
 
     @staticmethod
     def force(law, penetration):
-        return law.stiffness * penetration * (1.0 if penetration < 1e-8 else math.nan)
+        return law.softness * penetration * (1.0 if penetration < 1e-8 else math.nan)
 
 
 def test_a_run_that_fails_for_another_reason_is_no_pull_in() -> None:
     """A stop that breaks the runs before the plate reaches the electrode: they failed."""
     values = SWITCHED * np.array([0.3, 0.9, 1.05])
     stop = sb.Striker(drive=sb.FixedStop(), side="above", gap=0.1 * GAP)
-    for contacts, failed in (([], 0), ([sb.Contact(BrokenStop(stiffness=1.0), stop)], 2)):
+    for contacts, failed in (([], 0), ([sb.Contact(BrokenStop(softness=1.0), stop)], 2)):
         system = plate(initial_well="unforced", contacts=contacts)
         found = sb.threshold(system, "force.voltage", values, integration=sb.Integration(cycles=40))
         assert (found["status"] == sb.RunStatus.DIVERGED).values.tolist() == [False, failed > 0, True]

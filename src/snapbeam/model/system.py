@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar
@@ -36,6 +36,7 @@ from snapbeam.model.striker import Contact, Striker
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.provenance import canonical_json
+from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
 _A: dict[str, tuple[Any, str]] = {
@@ -493,7 +494,25 @@ class System:
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
         parts = [(section_of("harvester", number), each) for number, each in enumerate(self.harvesters, 1)]
-        return doubts_of(self.unloaded_potential, self.striker, [*parts, *self.moving])
+        found = doubts_of(self.unloaded_potential, self.striker, [*parts, *self.moving])
+        return (*found, *self._overlaps()) if self.initial_well not in (None, UNFORCED) else found
+
+    def _overlaps(self) -> Iterator[Diagnostic]:
+        """Contacts with a gap that a run in the chosen well begins inside of."""
+        for number, each in enumerate(self.contacts, 1):
+            gap, side = each.striker.gap, 1.0 if each.striker.side == "above" else -1.0
+            if gap is None or gap < 0.0:
+                continue
+            moved = self.start_state.amplitude - self.rest_state.amplitude
+            depth = side * float(self.model.shape_at(each.striker.location) @ moved) - gap
+            if depth > 1e-6 * (self.model.length_scale or 1.0):
+                section = section_of("contact", number)
+                yield Diagnostic(
+                    "begins-inside",
+                    f"{section}: its tip begins {prefixed(depth, 'm', 3)} inside the beam: the gap is that to the beam in the "
+                    f"well that the first striker pushes away from, but initial_well is {self.initial_well!r}",
+                    {"depth": depth},
+                )
 
     # ------------------------------------------------------------------ identity and files
 

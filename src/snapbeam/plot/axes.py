@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from typing import TYPE_CHECKING
 
@@ -39,6 +40,12 @@ _DECADES = 10.0
 """Ratio of the maximum to the minimum above which geometric points have a logarithmic axis."""
 
 
+def wrapped(text: str, width: int) -> str:
+    """Text in lines, the unit or scale in parentheses at its end beside the word before it."""
+    held = re.sub(r"\S+ \([^()]*\)$", lambda found: found[0].replace(" ", "\xa0"), text)
+    return textwrap.fill(held, width, break_long_words=False).replace("\xa0", " ")
+
+
 def axis_label(dataset: xr.Dataset, name: str) -> str:
     """Label of an axis: long name, symbol and unit of the parameter, wrapped to fit."""
     if name in AXIS_LABELS:
@@ -53,7 +60,7 @@ def axis_label(dataset: xr.Dataset, name: str) -> str:
     _, unit = _scaled(dataset, name)
     if unit:
         text = f"{text.rpartition(' (')[0] or text} ({unit})"
-    return textwrap.fill(text, _LONGEST, break_long_words=False)
+    return wrapped(text, _LONGEST)
 
 
 def _scaled(dataset: xr.Dataset, name: str) -> tuple[float, str]:

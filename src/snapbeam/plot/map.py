@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import textwrap
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,7 @@ from snapbeam.model.parameters import lookup, named_in, ratio_of
 from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.agreement import draw_agreement
-from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of, tick_text
+from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of, tick_text, wrapped
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
@@ -387,6 +386,8 @@ def plot_statistic(
                 )
                 if f"{name}_low" in dataset:
                     _band(ax, dataset.squeeze(), name, points)
+                if float(np.ptp(data.values)) < 1e-6 * abs(middle := float(np.mean(data.values))):
+                    ax.set_ylim(middle - 0.1 * abs(middle), middle + 0.1 * abs(middle))
             dress(ax.xaxis, dataset, dims[-1])
             ax.set_ylabel(label)
             ax.set_yscale("log" if log else "linear")
@@ -512,9 +513,9 @@ def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, s
     words = words[:1].upper() + words[1:]
     if unit == "1":
         words = scale_text(dataset.attrs, words) if "over $b" in words else words
-        return 1.0, textwrap.fill(words, _LONGEST)
+        return 1.0, wrapped(words, _LONGEST)
     factor, scaled = scale_of(values, unit)
-    return factor, textwrap.fill(f"{words} ({scaled})", _LONGEST)
+    return factor, wrapped(f"{words} ({scaled})", _LONGEST)
 
 
 # ----------------------------------------------------------------------------------------------------
