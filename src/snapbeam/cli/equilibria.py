@@ -243,9 +243,11 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None, 
         console.print(f"no critical points over {name}")
     for part in range(found.sizes["stable_part"]):
         own = found.isel(stable_part=part)
-        ends = zip(*(own[f"stable_{each}"].values.tolist() for each in ("value", "frequency", "end_kind")), strict=True)
+        stable = zip(
+            *(own[f"stable_{each}"].values.tolist() for each in ("value", "frequency", "end_kind")), strict=True
+        )
         told = [
-            f"{prefixed(hertz if kind == 'none' else 0.0, 'Hz', 4)} at {shown(value)}" for value, hertz, kind in ends
+            f"{prefixed(hertz if kind == 'none' else 0.0, 'Hz', 4)} at {shown(value)}" for value, hertz, kind in stable
         ]
         console.print(f"stable part {part + 1}: first frequency from {' to '.join(told)}")
         if (own["stable_end_kind"] == "none").all():

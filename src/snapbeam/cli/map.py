@@ -92,11 +92,10 @@ def compute_map(
         write_map(dataset, output)
     files = [output]
     if plot is not None:
+        curves: dict[str, Any] = {} if over is None else {"over": over}
         overlays = {"measurements": overlay, "quasi_static_line": quasi_static_line}
         files.append(
-            draw_computed(
-                dataset, plot, output, variable, **({} if over is None else {"over": settings.full_name(over)})
-            )
+            draw_computed(dataset, plot, output, variable, **curves)
             if variable not in (None, "response_class")
             else draw_computed(dataset, plot, output, "response_class", **overlays)
         )
