@@ -120,7 +120,7 @@ class _Layers(Harvester):
 
     @property
     def ends(self) -> _Array:
-        """Where each patch begins and ends, over the length; shape (patches, 2)."""
+        """Ends of each patch over the length, shape (patches, 2)."""
         return self._rows[:, :2]
 
     def row(self, model: ReducedModel) -> _Array:
@@ -392,7 +392,7 @@ class PiezoelectricPatches(_Layers):
         Returns
         -------
         list of Harvester
-            For ``System(..., harvesters=...)``.  The first has the voltage and the resistance of the load.
+            Harvesters for ``System(..., harvesters=...)``.  The first has the voltage and the resistance of the load.
 
         Examples
         --------

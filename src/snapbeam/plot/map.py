@@ -373,9 +373,6 @@ def plot_statistic(
     with frame(ax, height=74.0) as ax:
         if along is not None and len(dims) == 2:
             _curves(ax, dataset, data, along)
-            dress(ax.xaxis, dataset, along)
-            ax.set_ylabel(label)
-            ax.set_yscale("log" if log else "linear")
         elif dims[:1] == ["sweep"] or len(dims) == 1:
             if len(dims) > 1:
                 _swept(ax, dataset, data, dims[1])
@@ -388,9 +385,6 @@ def plot_statistic(
                     _band(ax, dataset.squeeze(), name, points)
                 if float(np.ptp(data.values)) < 1e-6 * abs(middle := float(np.mean(data.values))):
                     ax.set_ylim(middle - 0.1 * abs(middle), middle + 0.1 * abs(middle))
-            dress(ax.xaxis, dataset, dims[-1])
-            ax.set_ylabel(label)
-            ax.set_yscale("log" if log else "linear")
         else:
             across, upward = in_order(dataset, dims)
             field = np.ma.masked_invalid(data.transpose(upward, across).values)
@@ -404,6 +398,10 @@ def plot_statistic(
             color_bar(mesh, ax, label, pad=0.02)
             dress(ax.xaxis, dataset, across)
             dress(ax.yaxis, dataset, upward)
+        if along is not None or len(dims) == 1 or dims[:1] == ["sweep"]:
+            dress(ax.xaxis, dataset, dims[-1] if along is None else along)
+            ax.set_ylabel(label)
+            ax.set_yscale("log" if log else "linear")
         set_title(ax, caption(dataset, 2, dims))
     return ax
 
@@ -477,15 +475,8 @@ def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None
     looks = {"up": ("^-", BEAM_COLOR, BEAM_COLOR), "down": ("v--", SHAKER_COLOR, "white")}
     for row, kind in zip(data.values, dataset["sweep"].values, strict=True):
         look, color, face = looks[str(kind)]
-        ax.plot(
-            points,
-            row,
-            look,
-            color=color,
-            markerfacecolor=face,
-            markersize=1.2 * marker_size(points.size),
-            label=f"swept {kind}",
-        )
+        size = 1.2 * marker_size(points.size)
+        ax.plot(points, row, look, color=color, markerfacecolor=face, markersize=size, label=f"swept {kind}")
     ax.legend(loc="best")
 
 

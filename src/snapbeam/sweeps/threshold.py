@@ -153,7 +153,8 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     pulled_in = np.zeros_like(response, dtype=bool)
     if any(law.is_limited() for law in setup.system.local_forces):
         ended = np.argwhere(computed["status"].transpose(*whole).values == RunStatus.DIVERGED)
-        axes = {name: setup.points.axes[name] for name in (*(each for each in setup.points.axes if each != along), along)}
+        axes = dict(setup.points.axes)
+        axes[along] = axes.pop(along)  # the last, as of the statuses
         for at in ended:
             point = {name: own[i].item() for (name, own), i in zip(axes.items(), at, strict=True)}
             pulled_in[tuple(at)] = _pulls_in(*setup.neighbour(point))
