@@ -36,8 +36,8 @@ def test_widths_of_a_figure_are_those_of_the_style(stored, tmp_path) -> None:
             sizes[style] = image.size[0] / image.info["dpi"][0] * 25.4
     assert sizes["talk"] == pytest.approx(130.0, abs=0.5) and sizes["ieee"] == pytest.approx(88.9, abs=0.5)
     assert sizes[""] == pytest.approx(90.0, abs=0.5)
-    result = CliRunner().invoke(app, ["plot", str(stored), "-o", str(tmp_path / "x.png"), "--style", "slides"])
-    assert result.exit_code == 2 and "style = 'slides': must be one of 'elsevier'" in result.output
+    result = CliRunner().invoke(app, ["plot", str(stored), "-o", str(tmp_path / "x.png"), "--style", "poster"])
+    assert result.exit_code == 2 and "style = 'poster': must be one of 'elsevier'" in result.output
 
 
 @pytest.mark.parametrize("command", ["simulate", "map", "threshold", "probability", "gradient", "design", "equilibria",

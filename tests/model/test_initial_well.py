@@ -125,3 +125,17 @@ def test_every_result_names_the_well():
         attrs = attributes_of("", system, sb.Integration(), plan, {})
         assert attrs["initial_well"] == well
         assert attrs["initial_well_reason"] == f"initial_well = {well!r}"
+
+
+def test_a_stop_that_a_run_begins_inside_of_is_told() -> None:
+    """The gap of the stop below is that to the upper well, from which the first stop pushes away; the run begins in the other."""
+    beam = sb.Beam(length=0.2, thickness=5e-4, width=0.01, density=7850.0, young_modulus=2e11, buckling_level=4e-4)
+    law = sb.KelvinVoigt(linear_stiffness=2e4, linear_damping=0.5)
+    stops = [
+        sb.Contact(law, sb.Striker(drive=sb.FixedStop(), side=side, gap=gap, location=0.5))
+        for side, gap in (("above", 1e-3), ("below", 5e-4))
+    ]
+    system = sb.System(sb.ReducedModel.from_beam(beam, modes=1), contacts=stops, initial_well="lower")
+    (found,) = (each for each in system.diagnostics() if each.code == "begins-inside")
+    assert found.numbers["depth"] == pytest.approx(2 * 4e-4 - 5e-4) and "contact.2" in found.message
+    assert not any(each.code == "begins-inside" for each in system.replace(initial_well=None).diagnostics())

@@ -94,6 +94,10 @@ def test_tornado() -> None:
     assert [text.get_text().split("\n")[0] for text in ax.get_yticklabels()] == ["contact stiffness", "location"]
     widths = sorted(round(abs(patch.get_width()), 6) for patch in ax.patches)
     assert widths == [0.01, 0.01, 0.03, 0.03]
+    ax = plot_tornado(dataset.assign_attrs(quantity="peak contact force", quantity_units="N"))
+    assert ax.get_xlabel() == "Peak contact force (mN)" and max(
+        each.get_width() for each in ax.patches
+    ) == pytest.approx(30.0)
     with pytest.raises(InputError, match="no sensitivities"):
         plot_tornado(xr.Dataset())
 
@@ -113,3 +117,16 @@ def test_designs() -> None:
     assert ax.collections[0].get_offsets().shape == (int((goal >= 0.4).sum()), 2)
     with pytest.raises(InputError, match="must be one of location"):
         plot_designs(dataset, "gap")
+
+
+def test_an_objective_has_a_prefix_of_its_unit() -> None:
+    """Powers of some µW are drawn in µW, with their intervals and all candidates."""
+    from snapbeam.plot.uncertainty import _with_prefix
+    from snapbeam.util.datasets import xr
+
+    watts, attrs = [3.1e-4, 2.5e-5], {"units": "W", "long_name": "power"}
+    names = ("objective_power", "objective_power_low", "objective_power_high", "tried_objective_power")
+    found = _with_prefix(xr.Dataset({name: ("x", watts, attrs) for name in names}), "objective_power")
+    for name in names:
+        assert found[name].attrs["units"] == "µW"
+        assert found[name].values == pytest.approx([310.0, 25.0])

@@ -102,7 +102,7 @@ def test_every_figure_of_a_notebook_is_shown(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(("name", "width"), [("elsevier", 90.0), ("ieee", 88.9), ("talk", 130.0)])
+@pytest.mark.parametrize(("name", "width"), [("elsevier", 90.0), ("ieee", 88.9), ("nature", 89.0), ("slides", 130.0)])
 def test_a_style_sets_widths_and_text_and_can_be_taken_back(name, width):
     from snapbeam.plot.style import figure_style, new_figure
 
@@ -112,10 +112,10 @@ def test_a_style_sets_widths_and_text_and_can_be_taken_back(name, width):
             figure = new_figure("single", 60.0)
             text = figure.text(0.5, 0.5, "text")
             assert 25.4 * figure.get_figwidth() == pytest.approx(width)
-            assert text.get_fontsize() == (12.0 if name == "talk" else 8.0)
+            assert text.get_fontsize() == {"slides": 12.0, "nature": 7.0}.get(name, 8.0)
     finally:
         sb.plot.plot_style("elsevier")
     with figure_style():
         assert 25.4 * new_figure("double").get_figwidth() == pytest.approx(190.0)
     with pytest.raises(sb.InputError, match="name"):
-        sb.plot.plot_style("nature")
+        sb.plot.plot_style("poster")

@@ -144,11 +144,11 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
     "map over a thickness": (
         "striker",
         lambda s: sb.sweep(s, axes(("beam.thickness", "380 um:420 um:3"), SPEED), SHORT),
-        ("Thickness in the direction of bending $h$\n(µm)", MM_S),
+        ("Thickness in the direction of bending\n$h$ (µm)", MM_S),
     ),
     "map over a location": (
         "striker", lambda s: sb.sweep(s, axes(("contact.location_m", "60 mm:150 mm:4"), SPEED), SHORT),
-        ("Distance from the left end of the striker\n(mm)", MM_S),
+        ("Distance from the left end of the\nstriker (mm)", MM_S),
     ),
     "line of a map": (
         "base", lambda s: sb.sweep(s, axes(GRAVITIES), SHORT), (G, "Mid-span displacement $w/b$\n($b$ = 700 µm),\nminimum and maximum")
@@ -172,7 +172,7 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
     ),
     "quantiles of the striker": (
         "striker", lambda s: quantiles(s, SPEED[0], (0.005, 0.2), STRUCK),
-        (EXCITATION, "Threshold: velocity amplitude of the striker\n(mm/s)"),
+        (EXCITATION, "Threshold: velocity amplitude of the\nstriker (mm/s)"),
     ),
     "sensitivities": (
         "striker",

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 import snapbeam as sb
-from snapbeam.cli.summary import map_summary
+from snapbeam.cli.summary import map_facts, map_summary
 from snapbeam.util.proportions import mean_interval
 from snapbeam.util.validation import InputError
 
@@ -63,3 +63,28 @@ def test_the_figure_and_the_summary_have_the_mean(shaken) -> None:
 def test_a_map_without_seeds_is_refused(shaken) -> None:
     with pytest.raises(InputError, match="no map with an axis of seeds"):
         sb.mean_over_seeds(shaken.isel(base_excitation_seed=0))
+
+
+def test_curves_over_an_axis_have_an_interval_each(shaken) -> None:
+    layers = shaken.expand_dims({"harvester_resistance": [1e3, 1e4, 1e5]}, -1).copy(deep=True)
+    layers["harvester_resistance"].attrs["parameter"] = "harvester.resistance"
+    layers["harvested_power"] = layers["harvested_power"] * layers["harvester_resistance"] ** 0.25
+    layers["harvested_power"].attrs = shaken["harvested_power"].attrs
+    means = sb.mean_over_seeds(layers)["harvested_power"]
+    ax = sb.plot.plot_statistic(layers, "harvested_power", over="resistance")
+    assert ax.get_xlabel().endswith("(Ω)")
+    assert [each.get_label() for each in ax.lines] == ["0.1 g", "0.2 g", "0.3 g"] and len(ax.collections) == 3
+    for at, line in enumerate(ax.lines):
+        drawn = np.asarray(line.get_ydata(), dtype=float)
+        assert drawn / drawn[0] == pytest.approx(means[at].values / float(means[at, 0]))
+    ax = sb.plot.plot_statistic(layers, "harvested_power", over="base_excitation.rms_g")
+    assert [each.get_label() for each in ax.lines] == ["1000 Ω", "10 kΩ", "100 kΩ"]
+    with pytest.raises(InputError, match="is not an axis of the figure"):
+        sb.plot.plot_statistic(layers, "harvested_power", over="beam.thickness")
+
+
+def test_the_highest_value_of_the_json_has_its_interval(shaken) -> None:
+    found, means = map_facts(shaken, "peak_voltage")["highest"], sb.mean_over_seeds(shaken)
+    at = int(means["peak_voltage"].values.argmax())
+    assert found["point"] == {"base_excitation_rms_g": AXES["base_excitation.rms_g"][at]}
+    assert found["interval"] == [float(means[f"peak_voltage_{end}"][at]) for end in ("low", "high")]

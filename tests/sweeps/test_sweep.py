@@ -147,7 +147,7 @@ def test_drawn_with_right_labels(system, tmp_path) -> None:
     cases = {
         "level": (
             {"beam.buckling_level": levels, "velocity_amplitude": np.linspace(0.05, 0.5, 6)},
-            "Height of the buckled beam at its centre $b$\n(µm)", "Velocity amplitude $V$",
+            "Height of the buckled beam at its centre\n$b$ (µm)", "Velocity amplitude $V$",
         ),
         "modes": (
             {"modes": [1, 2, 4], "frequency_ratio": np.linspace(0.5, 2.0, 6)},

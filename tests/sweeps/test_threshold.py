@@ -136,7 +136,7 @@ def test_several_numbers_of_modes():
 @pytest.mark.parametrize(
     ("parameter", "values", "axes", "message"),
     [
-        ("modes", [1, 2], {"frequency_ratio": [0.5, 1.0]}, "parameter = 'modes': must be a number that may differ"),
+        ("modes", [1, 2], {"frequency_ratio": [0.5, 1.0]}, "parameter = 'modes': must be a real number"),
         ("velocity_amplitude", AMPLITUDE, [1.0], "axes = .*: must map parameters to arrays"),
         ("velocity_amplitude", 0.3, {"frequency_ratio": [0.5, 1.0]}, "at least two values to choose from"),
         ("velocity_amplitude", [0.3, 0.1], {"frequency_ratio": [0.5, 1.0]}, "must be strictly increasing"),

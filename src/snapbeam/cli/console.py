@@ -81,7 +81,7 @@ _FORCE = Annotated[
 _STYLE = Annotated[
     str | None,
     typer.Option(
-        "--style", help="Widths and letters of figures: elsevier, ieee or talk, as of snapbeam.plot.plot_style.",
+        "--style", help="Widths and letters of figures: elsevier, ieee, nature or slides, as of snapbeam.plot.plot_style.",
         rich_help_panel="Output", metavar="NAME",
     ),
 ]  # fmt: skip
@@ -550,13 +550,22 @@ def draw_computed(
 ) -> Path:
     """Draw a result that the command has computed, as :func:`draw`; errors as of :func:`kept_if_not_drawn`."""
     save = functools.partial(write_map, dataset) if save is None else save
-    with kept_if_not_drawn(lambda file: plot_command(file, path, variable, options.get("window")), kept, save):
+    with kept_if_not_drawn(
+        lambda file: plot_command(file, path, variable, options.get("window"), options.get("over")), kept, save
+    ):
         return draw(dataset, path, variable, **options)
 
 
-def plot_command(file: str, path: Path, variable: str | None = None, window: tuple[float, float] | None = None) -> str:
+def plot_command(
+    file: str,
+    path: Path,
+    variable: str | None = None,
+    window: tuple[float, float] | None = None,
+    over: str | None = None,
+) -> str:
     """The command that draws a result file."""
     words = ["snapbeam", "plot", file, "-o", str(path)]
     words += [] if variable is None else ["--variable", variable]
+    words += [] if over is None else ["--over", over]
     words += [] if window is None else ["--window", f"{window[0]:.12g}:{window[1]:.12g}"]
     return shlex.join(words)

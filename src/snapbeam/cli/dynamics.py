@@ -378,7 +378,9 @@ def backbone_curve(request: _Request) -> _Found:
             request.settings.free_system, progress=report, **{name: getattr(request, name) for name in names}
         )
     hertz, stable = curve["frequency"].values, curve["stable"].values
+    without = ", ".join(request.settings.exciting)
     return curve, [
+        *([f"Free motion, without {without}."] if without else []),
         f"{hertz.size} motions in {request.took}, {hertz[0]:.5g} to {hertz[-1]:.5g} Hz; {int(stable.sum())} stable",
         f"The curve ends: {curve.attrs['end']}",
     ]

@@ -80,6 +80,14 @@ def equilibria(
             metavar="NAME=START:STOP",
         ),
     ] = None,
+    variable: Annotated[
+        str | None,
+        typer.Option(
+            help="What --plot draws over the parameter: midspan_displacement (default) or natural_frequency.",
+            rich_help_panel="Branches over a parameter",
+            metavar="NAME",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -119,13 +127,14 @@ def equilibria(
     ]
     if asked and not with_force:
         raise InputError(f"{', '.join(asked)}: belongs to the force-displacement curve; add --force-displacement")
+    if variable is not None and (over is None or plot is None):
+        raise InputError(f"variable = {variable!r}: names what --plot draws over a parameter; give --over and --plot")
     if with_force and over is not None:
         raise InputError("--over, --force-displacement: give one of the two")
     check_pictures(("plot", plot))
     settings = configured(given)
     settings_potential = potential = settings.potential
     model = potential.model
-    assert model.beam is not None
     if (lower_frequency is None) != (upper_frequency is None):
         raise InputError("lower_frequency, upper_frequency: give both, or neither")
     console = out()
@@ -134,6 +143,10 @@ def equilibria(
             raise InputError(
                 "lower_frequency, upper_frequency with a force: the imperfection is identified from a beam without forces; "
                 "leave the force out"
+            )
+        if model.beam is None:
+            raise InputError(
+                "lower_frequency, upper_frequency: the imperfection is that of a beam; this model has none"
             )
         model = identify_imperfection(
             model.beam, lower_frequency, upper_frequency, identify, model.modes, model.imperfection
@@ -146,8 +159,6 @@ def equilibria(
             f"buckling_level = {model.beam.buckling_level:.6g} m, imperfection {identify} = "
             f"{getattr(model.imperfection, identify):.6g} {unit}"
         )
-    beam = model.beam
-    assert beam is not None
     found = potential.equilibria
     heights = [potential.center(each) for each in found]
     metres, length_unit = scale_of(heights, "m")
@@ -180,7 +191,7 @@ def equilibria(
     add_json(
         modal_error=error,
         bistable=len(freq) > 1,
-        buckling_level=beam.buckling_level,
+        buckling_level=None if model.beam is None else model.beam.buckling_level,
         imperfection={} if model.imperfection is None else {
             name: value for name, value in vars(model.imperfection).items() if isinstance(value, (float, str))
         },
@@ -193,16 +204,20 @@ def equilibria(
     if with_force:
         _force_displacement(same, potential, 0.5 if location is None else location, well, output, plot)
     if over is not None:
-        _branches(settings, over, output, plot)
+        _branches(settings, over, output, plot, variable)
 
 
-def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) -> None:
+def _branches(settings: Any, over: str, output: Path | None, plot: Path | None, variable: str | None) -> None:
     """Print the critical points over a parameter, and write the branches and their figure."""
     from snapbeam.model.equilibrium_branches import equilibrium_branches
     from snapbeam.model.parameters import lookup
     from snapbeam.util.si_prefixes import prefixed
-    from snapbeam.util.validation import InputError
+    from snapbeam.util.validation import InputError, choice
 
+    if variable is not None:
+        from snapbeam.plot.force_displacement import BRANCH_FIGURES
+
+        choice("variable", variable, BRANCH_FIGURES)
     name, equals, text = over.partition("=")
     name = settings.full_name(name.strip())
     unit = lookup(name).quantity.unit
@@ -228,6 +243,13 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) 
         console.print(f"no critical points over {name}")
     for part in range(found.sizes["stable_part"]):
         own = found.isel(stable_part=part)
+        stable = zip(
+            *(own[f"stable_{each}"].values.tolist() for each in ("value", "frequency", "end_kind")), strict=True
+        )
+        told = [
+            f"{prefixed(hertz if kind == 'none' else 0.0, 'Hz', 4)} at {shown(value)}" for value, hertz, kind in stable
+        ]
+        console.print(f"stable part {part + 1}: first frequency from {' to '.join(told)}")
         if (own["stable_end_kind"] == "none").all():
             first, last = (prefixed(float(each), "m", 4) for each in own["stable_displacement"].values)
             between = " to ".join(shown(float(each)) for each in own["stable_value"].values)
@@ -241,9 +263,10 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None) 
         critical_outcomes=[str(each) for each in found["critical_outcome"].values],
         stable_values=found["stable_value"].values,
         stable_displacements=found["stable_displacement"].values,
+        stable_frequencies=found["stable_frequency"].values,
         stable_end_kinds=found["stable_end_kind"].values.tolist(),
     )
-    _write(found, output, plot)
+    _write(found, output, plot, variable)
 
 
 def _force_displacement(
@@ -259,7 +282,7 @@ def _force_displacement(
     console = out()
     console.print(
         f"force at {location:g} of the length, from the {curve.attrs['well']} well ({curve.attrs['well_chosen_as']}); "
-        f"{curve.sizes['branch_number']} branches, {curve.sizes['critical_point']} critical points"
+        f"branches: {curve.sizes['branch_number']}, critical points: {curve.sizes['critical_point']}"
     )
     for name, words in (("snap_through", "snap-through"), ("snap_back", "snap-back")):
         force, place = float(curve[f"{name}_force"]), float(curve[f"{name}_displacement"])
@@ -286,9 +309,9 @@ def _force_displacement(
     _write(curve, output, plot)
 
 
-def _write(dataset: Any, output: Path | None, plot: Path | None) -> None:
+def _write(dataset: Any, output: Path | None, plot: Path | None, variable: str | None = None) -> None:
     """Write a result and its figure."""
     if output is not None:
         out().print(f"Written: {file_line(write_map(dataset, output))}")
     if plot is not None:
-        out().print(f"Written: {file_line(draw_computed(dataset, plot, output))}")
+        out().print(f"Written: {file_line(draw_computed(dataset, plot, output, variable))}")

@@ -38,8 +38,7 @@ def frequencies(
     potential = settings.potential
     model = potential.model
     beam = model.beam
-    assert beam is not None
-    if model.imperfection is not None or not potential.is_of_the_structure_alone:
+    if beam is None or model.imperfection is not None or not potential.is_of_the_structure_alone:
         _print_wells(potential, count, modal_error(settings.static_system))
         _print_circuits(settings, count)
         return

@@ -29,6 +29,7 @@ def compute_map(
             metavar="NAME",
         ),
     ] = None,
+    over: opt.CurvesOver = None,
     measurements: opt.Measurements = None,
     quasi_static_line: opt.QuasiStaticLine = False,
     threads: opt.Threads = None,
@@ -51,6 +52,7 @@ def compute_map(
     set_request([settings.system.hash, settings.integration, axes, stored["options"]])
     check_outputs(output, plot)
     _check_variable(variable, plot, overlaid=measurements is not None or quasi_static_line)
+    _check_over(over, variable, settings, axes)
     if plot is not None:
         _check_axes(plot, axes, variable)
     system = settings.system
@@ -90,13 +92,14 @@ def compute_map(
         write_map(dataset, output)
     files = [output]
     if plot is not None:
+        curves: dict[str, Any] = {} if over is None else {"over": over}
         overlays = {"measurements": overlay, "quasi_static_line": quasi_static_line}
         files.append(
-            draw_computed(dataset, plot, output, variable)
+            draw_computed(dataset, plot, output, variable, **curves)
             if variable not in (None, "response_class")
             else draw_computed(dataset, plot, output, "response_class", **overlays)
         )
-    add_json(**map_facts(dataset), seconds=elapsed, files=files)
+    add_json(**map_facts(dataset, variable), seconds=elapsed, files=files)
     out().print(map_summary(dataset, files, None if opt.is_long(keeping) else elapsed, variable))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
     if counts.failed:
@@ -147,6 +150,17 @@ def _check_variable(variable: str | None, plot: Path | None, *, overlaid: bool) 
             f"variable = {variable!r}: measured responses and the quasi-static line are drawn over response classes; "
             "leave them out"
         )
+
+
+def _check_over(over: str | None, variable: str | None, settings: Any, axes: dict[str, Any]) -> None:
+    """Refuse, before any run, curves of nothing or over no axis."""
+    from snapbeam.model.parameter_file import same_axis
+    from snapbeam.util.validation import InputError
+
+    if over is not None and variable in (None, "response_class"):
+        raise InputError(f"over = {over!r}: curves are of a statistic; give --variable, such as peak_force, and --plot")
+    if over is not None and not set(same_axis(settings.full_name(over))) & axes.keys():
+        raise InputError(f"over = {over!r}: is not an axis of this map; its axes: {', '.join(axes)}")
 
 
 def _check_axes(path: Path, axes: dict[str, Any], variable: str | None) -> None:

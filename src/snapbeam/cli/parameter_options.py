@@ -89,7 +89,7 @@ _OPTIONS = {
 }
 _WORDS = {
     "initial_state.initial_well": "well that runs begin in, by name or by its index; by default the one that the first striker or stop "
-    "pushes away from",
+    "pushes away from; unforced: that of the beam without local forces, which begin with the run",
     "contact.radius": "radius of the sphere, m; with the next two options, instead of --contact-stiffness",
     "contact.young_modulus": "Young's moduli of sphere and beam, Pa: E1,E2",
     "contact.poisson_ratio": "Poisson ratios of sphere and beam: nu1,nu2",
@@ -260,7 +260,7 @@ def _option(name: str, is_axis: bool) -> Any:
     if row is not None and row.quantity.kind is str:
         return Annotated[str | None, typer.Option(flag, metavar="|".join(row.quantity.choices), **options)]
     if name == "initial_state.initial_well":
-        return Annotated[str | None, typer.Option(flag, metavar="lower|upper|INDEX", **options)]
+        return Annotated[str | None, typer.Option(flag, metavar="lower|upper|unforced|INDEX", **options)]
     if name == "model.modes":
         return Annotated[str | None, typer.Option(flag, metavar="COUNT|auto", **options)]
     if row is not None and row.quantity.kind is int:
@@ -476,6 +476,15 @@ Threads = Annotated[int | None, count_option("Number of processor cores; all by 
 Plot = Annotated[
     Path | None,
     typer.Option("--plot", help="Figure file to write: .png, .pdf or .svg.", rich_help_panel=_OUTPUT, metavar="FILE"),
+]
+CurvesOver = Annotated[
+    str | None,
+    typer.Option(
+        "--over",
+        help="Axis of a map to draw a statistic over, as a curve for each value of the other axis.",
+        rich_help_panel=_OUTPUT,
+        metavar="NAME",
+    ),
 ]
 Output = Annotated[
     Path, typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel=_OUTPUT, metavar="FILE")
@@ -772,17 +781,17 @@ def config_of_file(path: Path, point: str | None) -> Config:
     sections: dict[str, dict[str, Any]] = parsed_json(text, f"from = {str(path)!r}")
     if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
         raise InputError(
-            f"from = {str(path)!r}: has a recorded drive, which the file does not contain; use it from Python"
+            f"from = {str(path)!r}: has a recorded drive or large matrices, which the file does not contain; use it from "
+            "Python, or --config with what System.save writes"
         )
-    if "mass" in sections.get("model", {}):
-        raise InputError(f"from = {str(path)!r}: is of a model given by matrices; use it from Python")
     run = {
         name: value
         for name, value in parsed_json(dataset.attrs.get("integration", "{}"), f"from = {str(path)!r}").items()
         if value is not None and name != "engine"
     }
-    if sections.get("initial_state", {}).keys() - {"initial_well"}:
-        raise InputError(f"from = {str(path)!r}: has its own initial state; use it from Python")
+    sections = {
+        part: {name: value for name, value in own.items() if value is not None} for part, own in sections.items()
+    }
     sections["integration"] = run
     for name, value in _at_point(dataset, point, path).items():
         section, field = split_name(name)

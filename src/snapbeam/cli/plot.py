@@ -44,6 +44,7 @@ def plot(
             metavar="NAME=VALUE",
         ),
     ] = None,
+    over: opt.CurvesOver = None,
     measurements: opt.Measurements = None,
     quasi_static_line: opt.QuasiStaticLine = False,
     window: opt.Window = None,
@@ -69,12 +70,16 @@ def plot(
         attrs = dataset.attrs
         overlay = read_overlay(measurements, attrs.get("reference_frequency"), attrs.get("beam_buckling_level"))
         options = {"measurements": overlay, "quasi_static_line": quasi_static_line}
+    if over is not None and ("response_class" not in dataset or figure == "response_class"):
+        raise InputError(f"over = {over!r}: curves are of a statistic of a map, not of {figure!r}; give --variable")
     if window is not None:
         if figure != "run":
             raise InputError(
                 f"window = {window!r}: belongs to the figure 'run' of a run, not to {figure!r} (file: {kind}); leave it out"
             )
         options = {"window": opt.parse_window(window)}
+    if over is not None:
+        options = {"over": over}
     draw(dataset, output, variable, **options)
     add_json(files=[output])
     out().print(f"Written: {file_line(output)}")

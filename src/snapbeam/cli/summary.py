@@ -93,8 +93,8 @@ def initial_well_lines(dataset: xr.Dataset) -> list[str]:
     return [f"Runs begin in the {well if well[-1].isdigit() else f'{well} well'} ({reason})."]
 
 
-def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any], str] | None:
-    """Return the point and the line of the highest value of *variable*, by default of the power of a harvester."""
+def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any], str, dict[str, Any]] | None:
+    """Return the point, the line and the values of the highest *variable*, by default of the power of a harvester."""
     name = variable if variable not in (None, "response_class") else None
     if name is None and "harvester_type" in dataset.attrs:
         name = "harvested_power_last_quarter"
@@ -109,15 +109,17 @@ def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any],
     at = np.unravel_index(int(np.nanargmax(values.values)), values.shape)
     point = _point(values, dict(zip(values.dims, at, strict=True)))
     where = ", ".join(coordinate_text(dataset, each, point[each]) for each in point)
+    facts: dict[str, Any] = {"variable": name, "value": float(values.values[at]), "point": dict(point)}
     line = f"Highest {statistic_text(means, name, values.values[at])}"
     if seeds:
         ends = [float(means[f"{name}{end}"].values[at]) for end in ("_low", "_high")]
         line += f" ({' to '.join(value_text(means, name, each) for each in ends)}, 95 % interval of the mean)"
+        facts["interval"] = ends
         near = int((means[f"{name}_high"] >= ends[0]).sum()) - 1
         where += f"; {near} of {values.size - 1} other points may have as much" if values.size > 1 else ""
         point |= {each: dataset[each].values[0].item() for each in seeds}
     line += f" at {where}" if where else ""
-    return point, line + (f"; not known at {unknown} of {total} points" if unknown else "")
+    return point, line + (f"; not known at {unknown} of {total} points" if unknown else ""), facts
 
 
 def _ranges(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
@@ -132,9 +134,10 @@ def _ranges(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
     return lines
 
 
-def map_facts(dataset: xr.Dataset) -> dict[str, Any]:
-    """Summary of a map as plain values: points of each class and status, the lowest interwell point, the notch."""
+def map_facts(dataset: xr.Dataset, variable: str | None = None) -> dict[str, Any]:
+    """Summary of a map as plain values: points of each class and status, lowest interwell point, notch, highest value."""
     dataset = in_units(dataset)
+    best = _highest(dataset, variable)
     kinds, codes = np.asarray(dataset["response_class"].values), np.asarray(dataset["status"].values)
     low = lowest_interwell(dataset)
     return {
@@ -143,6 +146,7 @@ def map_facts(dataset: xr.Dataset) -> dict[str, Any]:
         "statuses": {kind.name.lower(): int((codes == kind).sum()) for kind in RunStatus if (codes == kind).any()},
         "lowest_interwell": low,
         "deepest_notch": None if low is None else deepest_notch(dataset),
+        **({} if best is None else {"highest": best[2]}),
     }
 
 
@@ -356,9 +360,11 @@ def status_lines(dataset: xr.Dataset) -> list[str]:
     if "status" not in dataset:
         return []
     codes = np.asarray(dataset["status"].values)
-    lines = []
+    pulled_in = int(dataset.attrs.get("pull_in_runs", 0))
+    lines = [f"{pulled_in} of {codes.size} runs left the displacements of a force: pull-in, counted as snap-through."]
+    lines = lines if pulled_in else []
     for status in RunStatus:
-        count = int((codes == status).sum())
+        count = int((codes == status).sum()) - (pulled_in if status is RunStatus.DIVERGED else 0)
         if count and status not in (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.FILLED):
             lines.append(f"[bold red]{count} failed[/] ({status.name}): {status.advice}")
     decided = int((codes == RunStatus.EARLY_STOP).sum())

@@ -274,6 +274,7 @@ def probability(
     from snapbeam.plot.units import in_units
     from snapbeam.uncertainty.monte_carlo import outcome_named
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
+    from snapbeam.util.validation import InputError
 
     settings, uncertainty, asked = read(file, "probability", law)
     check_outputs(output, plot)
@@ -283,7 +284,12 @@ def probability(
     options |= {"outcomes": outcome} if outcome else {}
     options |= {"statistics": statistic} if statistic else {}
     runs: Any = asked["runs"] if set(asked) == {"runs"} else taken(SamplingPlan, asked, "probability")
-    arguments = (settings.system, settings.axes() or _default_axes(settings.system), uncertainty, runs)
+    axes = settings.axes() or _default_axes(settings.system)
+    if plot is not None and not 1 <= sum(np.size(each) > 1 for each in axes.values()) <= 2:
+        raise InputError(
+            "plot: probabilities are drawn over one or two axes of more than one value; name them in [sweep]"
+        )
+    arguments = (settings.system, axes, uncertainty, runs)
     words = ("probability map", "runs")
     found = _compute(probability_map, words, arguments, settings, estimate_cost, yes, threads, checkpoint, **options)
     if found is None:
@@ -292,8 +298,7 @@ def probability(
     small = {str(name): each.values for name, each in dataset.variables.items()
              if name not in dataset["runs"].dims and each.size <= 4000}  # fmt: skip
     told = in_units(dataset)
-    axes = {str(dim): told[dim].values for dim in told["runs"].dims if dim in told.coords}
-    add_json(results=small, axes=axes)
+    add_json(results=small, axes={str(dim): told[dim].values for dim in told["runs"].dims if dim in told.coords})
     drawn = outcome_named(outcome[0])[0] if outcome else str(dataset.attrs["watched_outcome"])
     finish(dataset, output, plot, lambda ds: plot_probability(ds, drawn), _lines_probability(told, elapsed))
 

@@ -64,8 +64,8 @@ def equilibrium_branches(
         ("limit" or "bifurcation"), ``critical_value``, ``critical_displacement`` (m), ``critical_branch``,
         ``critical_unstable_directions``, 0 where a stable part of the branch ends, and ``critical_outcome``: "unstable"
         on an unstable branch, else "pull-in" if the beam leaves the range of a law beyond the point, or "another well".
-        Over ``stable_part`` and ``stable_end`` (first, last): ``stable_value`` and ``stable_displacement`` (m) where
-        each stable part of a branch begins and ends, and ``stable_end_kind``, "limit", "bifurcation", or "none" where
+        Over ``stable_part`` and ``stable_end`` (first, last): ``stable_value``, ``stable_displacement`` (m) and
+        ``stable_frequency`` (the first, Hz) where each stable part of a branch begins and ends, and ``stable_end_kind``, "limit", "bifurcation", or "none" where
         it ends at the end of the range, at the end of the range of a law or at another branch.
 
     See Also
@@ -163,6 +163,13 @@ def equilibrium_branches(
                 -1, 2
             ),
             attributes("m", "displacement of the centre at the ends of a stable part"),
+        ),
+        "stable_frequency": (
+            ("stable_part", "stable_end"),
+            np.array([[_frequencies(potential_of(value), a, 0)[0] for value, a in each] for each in ends]).reshape(
+                -1, 2
+            ),
+            attributes("Hz", "first natural frequency at the ends of a stable part"),
         ),
         "stable_end_kind": (
             ("stable_part", "stable_end"),

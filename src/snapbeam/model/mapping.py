@@ -15,29 +15,26 @@ from snapbeam.model.base_excitation import BaseExcitation
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions
 from snapbeam.model.external_force import FORCES, ExternalForce
+from snapbeam.model.harvester import PiezoelectricHarvester, PiezoelectricPatches
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.parameters import SECTIONS, kind_of, kinds_of, row_of
 from snapbeam.model.quantity import NUMBERED, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.striker import Contact, Striker
-from snapbeam.util.validation import InputError, InputTypeError, mapping, shown
+from snapbeam.util.validation import InputError, InputTypeError, finite_array, mapping, shown
 
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude", "length_scale",
 )  # fmt: skip
 _OPTIONAL = ("base_shape", "elongation_matrix", "patch_shape", "damping")
-_START = (
-    "amplitude",
-    "velocity",
-    "phase",
-    "striker_position",
-    "contact_time",
-    "striker_shift",
-    "striker_rate",
-    "indentation",
+OF_MATRICES = (*_MATRICES, *_OPTIONAL, "transverse_force", "damping_ratio", "reference_frequency")
+"""Keys of the section of a model given by matrices."""
+START = (
+    "amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate", "indentation",
     "circuit",
-)
+)  # fmt: skip
+"""Keys of a whole initial state."""
 
 
 def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
@@ -84,7 +81,7 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         for number, each in enumerate(getattr(system, _TUPLES[kind]), 1):
             sections[section_of(kind, number)] = _described(each)
     if start is not None:
-        values = {name: getattr(start, name) for name in _START}
+        values = {name: getattr(start, name) for name in START}
         if start.contact_time.size == 1:
             values["contact_time"] = start.contact_time[..., 0]
         # of several strikers or circuits, those without a number of their own are at rest
@@ -135,18 +132,37 @@ def parts_from_mapping(sections: Mapping[str, Any]) -> dict[str, Any]:
         if name in sections:
             parts[name] = _moved(kind, "motion", sections[name], name)
     parts["forces"] = tuple(_force(section, values) for section, values in _numbered_sections(sections, "force"))
-    parts["harvesters"] = tuple(
-        _chosen(values, section) for section, values in _numbered_sections(sections, "harvester")
-    )
+    made = [_harvesters(values, section) for section, values in _numbered_sections(sections, "harvester")]
+    # what patches in series have beside the first follows all, whose numbers stay
+    parts["harvesters"] = (*(first for first, *_ in made), *(each for _, *rest in made for each in rest))
     if "initial_state" in sections:
         values = dict(sections["initial_state"])
-        _only(values, "initial_state", ["initial_well", *_START])
+        _only(values, "initial_state", ["initial_well", *START])
         if "initial_well" in values:
             parts["initial_well"] = values.pop("initial_well")
         if values or "initial_well" not in parts:
             _needed(values, "initial_state", State)
             parts["initial_state"] = State(**values)
     return parts
+
+
+def _harvesters(values: Mapping[str, Any], section: str) -> list[Any]:
+    """The harvesters of a section: more than one of patches that it wires in series."""
+    if values.get("type") != PiezoelectricPatches.name or "wiring" not in values:
+        return [_chosen(values, section)]
+    own = dict(values)
+    rows, each = (np.atleast_1d(finite_array(f"[{section}] {name}", own.pop(name, ()))) for name in _OF_PATCHES)
+    if rows.ndim != 2 or rows.shape[1] != 3 or each.shape != rows.shape[:1]:
+        raise InputError(
+            f"[{section}] patches, capacitance: must be rows of three numbers, and one number for each row"
+        )
+    _only(own, section, ["type", "wiring", "resistance"])
+    _needed(own | dict.fromkeys(_OF_PATCHES), section, PiezoelectricPatches)
+    patches = [
+        PiezoelectricHarvester(patch_start=a, patch_end=b, moment_per_volt=m, capacitance=c, resistance=1.0)
+        for (a, b, m), c in zip(rows.tolist(), each.tolist(), strict=True)
+    ]
+    return list(PiezoelectricPatches.wired(patches, own["wiring"], resistance=own["resistance"]))
 
 
 def _force(section: str, values: Mapping[str, Any]) -> Any:
@@ -234,7 +250,7 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
         raise InputError(
             "[imperfection]: belongs to a beam; give the transverse_force of a structure given by matrices"
         )
-    _only(own, "model", [*_MATRICES, *_OPTIONAL, "transverse_force", "damping_ratio", "reference_frequency"])
+    _only(own, "model", [*OF_MATRICES])
     for name in ("mass", "stiffness", "contact_shape"):
         if name not in own:
             raise InputError(f"[model] {name} is missing: give it, or a section [beam]")
@@ -303,6 +319,7 @@ def _only(values: Mapping[str, Any], section: str, known: list[str]) -> None:
 _OF_MODEL = ("modes", "damping_ratio", "reference_frequency")
 
 
+_OF_PATCHES = ("patches", "capacitance")
 _MOVED = {"base_excitation": BaseExcitation, "axial_load": AxialLoadModulation}
 """Parts with a motion, by the section of a system."""
 _TUPLES = {"contact": "contacts", "force": "forces", "harvester": "harvesters"}

@@ -19,8 +19,9 @@ from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.external_force import FORCES
+from snapbeam.model.harvester import WIRINGS
 from snapbeam.model.integration import CYCLES, Integration
-from snapbeam.model.mapping import flattened, labels_of, parts_from_mapping, read_file, resolved
+from snapbeam.model.mapping import OF_MATRICES, START, flattened, labels_of, parts_from_mapping, read_file, resolved
 from snapbeam.model.modal_convergence import converged_modes, error_of_auto
 from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physical, parse_axis, unit_of
 from snapbeam.model.parameters import (
@@ -40,6 +41,7 @@ from snapbeam.model.parameters import SECTIONS as SYSTEM_SECTIONS
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import check_label, numbered, quantities, split_name
 from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.state import State
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System, told_as
 from snapbeam.util.files import atomic_path, check_writable
@@ -176,12 +178,15 @@ def checked_sections(
 def _known(section: str, values: Mapping[str, Any]) -> list[str]:
     """Names that a section may hold, those of its type if that is given."""
     kind = numbered(section)[0]
+    if kind == "model" and "mass" in values:
+        return [*OF_MATRICES]
     rows = [row for row in parameters().values() if row.section == kind]
     rows = [row for row in rows if not _is_of_other_type(row, values)]
     names = [split_name(row.name)[1] for row in rows]
     names += ["type"] if kinds_of(kind) else []
     names += ["label"] if kind in ("contact", "force") else []
     names += [*MATERIALS, *WANTED] if kind == "contact" else []
+    names += ["wiring"] if kind == "harvester" and values.get("type", "patches") == "patches" else []
     return names + [split_name(full)[1] for full in physical_names(f"{section}.{name}" for name in names)]
 
 
@@ -197,9 +202,11 @@ def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any
     own = found.setdefault(section, {})
     if section == "sweep":
         return _checked_axis(name, value, own, flat)
-    if section == "initial_state":
+    if section == "initial_state" and name in START and "amplitude" in flat[section]:
+        row: Parameter | None = None
+    elif section == "initial_state":
         try:
-            row: Parameter | None = lookup(f"initial_state.{name}")
+            row = lookup(f"initial_state.{name}")
         except InputError:
             return f"{name}: unknown key; must be initial_well, amplitude[i], velocity[i] or striker_position"
     else:
@@ -209,7 +216,9 @@ def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any
             what = "unknown key" if row is None else f"is not a key of type {flat[section]['type']!r}"
             return f"{name}: {what}{_nearest(name, known)}"
         row = row_of(f"{section}.{name}")
-    if row is None:
+    if name == "capacitance" and "wiring" in flat[section]:  # of each patch
+        message, checked = _each_with_unit(name, value, "F")
+    elif row is None:
         message, checked = _special(section, name, value)
     else:
         message, checked = _by_row(row, name, value)
@@ -283,6 +292,10 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
         if kind_of(numbered(section)[0], value) is None:
             return f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}", None
         return "", value
+    if section in ("model", "initial_state"):
+        return _array(name, value)
+    if name == "wiring":
+        return ("", value) if value in WIRINGS else (f"{name} = {shown(value)}: must be {' or '.join(WIRINGS)}", None)
     if name == "label":
         try:
             check_label(value)
@@ -305,12 +318,25 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
                 None,
             )
         return "", float(value)
-    pair = list(value) if isinstance(value, (list, tuple)) else None
-    if pair is None or len(pair) != 2 or not all(isinstance(each, (int, float)) for each in pair):
+    message, pair = _each_with_unit(name, value, MATERIALS[name][0])
+    if message:
+        return message, None
+    if len(pair) != 2:
         return f"{name} = {shown(value)}: must be a list of two numbers, of sphere and beam", None
     if name == "young_modulus" and any(0.0 < each < 1e3 for each in pair):
         return f"young_modulus = {shown(value)}: must be in Pa; is it given in GPa?", None
     return "", [float(each) for each in pair]
+
+
+def _each_with_unit(name: str, value: Any, unit: str) -> tuple[str, Any]:
+    """A list of numbers, each of which may have a unit."""
+    found = [_from_text(name, each, unit) for each in value] if isinstance(value, (list, tuple)) else []
+    for message, number in found:
+        if message or not isinstance(number, (int, float)):
+            return message or f"{name} = {shown(value)}: must be a list of numbers", None
+    if not found:
+        return f"{name} = {shown(value)}: must be a list of numbers", None
+    return "", [float(number) for _, number in found]
 
 
 def _full_name(name: str, sections: Mapping[str, Any]) -> str:
@@ -351,6 +377,8 @@ def parsed_axis(name: str, value: Any) -> Any:
 
 def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Error messages for contradictions between values that are each valid."""
+    if "mass" in found.get("model", {}) and "beam" in found:
+        return ["[beam]: leave it out of a file with the matrices of [model]"]
     contact = found.get("contact", {})
     given = [name for name in MATERIALS if name in contact]
     if given and "stiffness" in contact:
@@ -440,6 +468,11 @@ class Config:
         """The line ``extends = "paper"`` of a file, if the paper's values complete these."""
         return {"extends": "paper"} if self.extends_paper else {}
 
+    @property
+    def is_of_matrices(self) -> bool:
+        """True if the model is given by matrices, without a beam."""
+        return "mass" in self.section("model")
+
     def section(self, name: str) -> dict[str, Any]:
         """Values given in a section."""
         return dict(self.given.get(name, {}))
@@ -488,7 +521,7 @@ class Config:
     @cached_property
     def defaulted(self) -> tuple[str, ...]:
         """Names of values that were not given: those of the paper's beam for another beam, else the default drive."""
-        if not self.section("beam"):
+        if not self.section("beam") and not self.is_of_matrices:
             return ()
         found, swept = self._defaults(), self.axes() if self.section("sweep") else {}
         driven = not (self._is_unstruck or self._stands_still)
@@ -496,7 +529,7 @@ class Config:
         return tuple(
             f"{section}.{name}"
             for section in sections
-            for name in found[section]
+            for name in found.get(section, ())
             if name not in {*self.section(section), "modes", "location"} and f"{section}.{name}" not in swept
         )
 
@@ -515,7 +548,7 @@ class Config:
             sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
         else:
             sections = {
-                name: {key: value for key, value in values.items() if f"{name}.{key}" not in swept}
+                name: {k: v for k, v in values.items() if v is not None and f"{name}.{k}" not in swept}
                 for name, values in self.system.to_mapping().items()
             }
             sections.pop("initial_state", None)
@@ -538,9 +571,12 @@ class Config:
     def _defaults(self) -> dict[str, dict[str, Any]]:
         """Values by section of what need not be given."""
         found = self._of_paper()
+        if self.is_of_matrices:
+            del found["beam"]
+            found["model"] = {}
         if self.extends_paper:
             return found
-        own = {"model": {"modes": MODES}, "drive": found["drive"]}
+        own = {"model": {"modes": MODES} if found["model"] else {}, "drive": found["drive"]}
         return {section: own.get(section, {}) for section in found}
 
     def _require(self, *sections: str) -> None:
@@ -550,6 +586,8 @@ class Config:
         lines, of_paper = [], self._of_paper()
         for section in sections:
             given = self._with_axes(section).keys()
+            if self.is_of_matrices and section in ("beam", "model"):
+                continue
             missing = [name for name in of_paper[section] if name not in given and name != "modes"]
             if missing:
                 lines.append(f"[{section}] {', '.join(missing)}: missing")
@@ -668,7 +706,7 @@ class Config:
     def is_static(self) -> bool:
         """True if the file describes only a beam and forces on it, without the damping that a motion needs."""
         kinds = {numbered(name)[0] for name in self.given}
-        damped = "damping_ratio" in self.section("model") and self._around
+        damped = {"damping_ratio", "damping"} & self.section("model").keys() and self._around
         return (
             not self.extends_paper and not damped and not kinds - {"beam", "model", "boundary", "imperfection", "force"}
         )
@@ -689,6 +727,8 @@ class Config:
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
         start = self.section("initial_state")
+        if "amplitude" in start:
+            return system.replace(initial_state=State(**start))
         return system.replace(**{f"initial_state.{name}": value for name, value in start.items()}) if start else system
 
     @property
@@ -710,26 +750,24 @@ class Config:
 
     @property
     def free_system(self) -> System:
-        """The model with its forces and harvesters, for questions about free motion.
+        """The model with its forces and harvesters, for questions about free motion."""
+        return System(**self._parts(*(name for name in self._around if numbered(name)[0] in ("force", "harvester"))))
 
-        Raises
-        ------
-        InputError
-            If an excitation or a striker is given.
-        """
-        kept = [name for name in self._around if numbered(name)[0] in ("force", "harvester")]
-        acting = [name for name in (*self._around, *_STRIKING) if name not in kept and self.section(name)]
-        if acting:
-            raise InputError(f"{', '.join(acting)}: free motion is computed; leave out {acting[0]}")
-        return System(**self._parts(*kept))
+    @property
+    def exciting(self) -> list[str]:
+        """Sections of what a free motion is without: excitations and strikers."""
+        kept = ("force", "harvester")
+        return [name for name in (*self._around, *_STRIKING) if numbered(name)[0] not in kept and self.section(name)]
 
     def _parts(self, *forces: str) -> dict[str, Any]:
         self._require("beam")
-        own = {
-            name: self._with_axes(name) if self._may_be_axis(name) else self.section(name) for name in ("beam", "model")
+        sections = {
+            name: values | (self._with_axes(name) if self._may_be_axis(name) else self.section(name))
+            for name, values in self._defaults().items()
+            if name in ("beam", "model")
         }
-        sections = {name: self._defaults()[name] | own[name] for name in own}
-        sections["model"].setdefault("damping_ratio", DAMPING_RATIO)  # has no effect without motion
+        if "damping" not in sections["model"]:
+            sections["model"].setdefault("damping_ratio", DAMPING_RATIO)  # has no effect without motion
         sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
         sections |= {name: self._with_axes(name) for name in forces if self.section(name)}
         later = _without_units(sections)

@@ -29,7 +29,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.quantity import NUMBERED, RUN, ParameterField, numbered, quantities, section_of, split_name
 from snapbeam.model.reduced_model import MODEL_QUANTITIES
-from snapbeam.model.state import START_NAME, checked_well
+from snapbeam.model.state import START_NAME, checked_initial_well
 from snapbeam.model.striker import Striker
 from snapbeam.util.validation import InputError, shown
 
@@ -128,7 +128,7 @@ def _rows() -> Iterable[Parameter]:
                 yield dataclasses.replace(row, kinds=(kind_name,))
 
 
-_INITIAL_WELL = ParameterField("1", "well that runs begin in", kind=object, optional=True, parse=checked_well)
+_INITIAL_WELL = ParameterField("1", "well that runs begin in", kind=object, optional=True, parse=checked_initial_well)
 
 
 def kind_of(section: str, name: object) -> Any:

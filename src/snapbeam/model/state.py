@@ -291,6 +291,20 @@ def checked_well(name: str, value: Any) -> str | int:
     return int(value) if whole else value
 
 
+UNFORCED = "unforced"
+"""Initial well of a run whose local forces, such as the voltage of an electrode, begin with it."""
+
+
+def checked_initial_well(name: str, value: Any) -> str | int:
+    """A well as of :func:`checked_well`, or that of the structure without its local forces."""
+    if value == UNFORCED:
+        return UNFORCED
+    try:
+        return checked_well(name, value)
+    except InputError as error:
+        raise InputError(f"{error}, or {UNFORCED!r}") from None
+
+
 def amplitude_scale(model: ReducedModel) -> float:
     """Return the unit of the amplitudes of an initial condition, m^0.5.
 

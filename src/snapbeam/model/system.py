@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar
@@ -31,11 +31,12 @@ from snapbeam.model.parameters import PHYSICAL, SECTIONS, Parameter, lookup, nam
 from snapbeam.model.potential import Potential
 from snapbeam.model.quantity import section_of
 from snapbeam.model.reduced_model import ReducedModel
-from snapbeam.model.state import State, checked_well, rest_state, started
+from snapbeam.model.state import UNFORCED, State, checked_initial_well, checked_well, rest_state, started
 from snapbeam.model.striker import Contact, Striker
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.provenance import canonical_json
+from snapbeam.util.si_prefixes import prefixed
 from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
 _A: dict[str, tuple[Any, str]] = {
@@ -78,8 +79,9 @@ class System:
         Circuits that turn motion into power in a resistor.
     initial_state : State, optional
         State in which runs begin, one and not a batch; at rest in *initial_well* by default.
-    initial_well : {"lower", "upper"} or int, optional
-        Well in which runs begin at rest, by name or by its index in ``unloaded_potential.wells``.  By default the one that the
+    initial_well : {"lower", "upper", "unforced"} or int, optional
+        Well in which runs begin at rest, by name or by its index in ``unloaded_potential.wells``; "unforced" is the well
+        without the local forces, which then begin with the run, as a voltage that is switched on.  By default the one that the
         first striker or stop pushes away from, touched by it; :attr:`initial_well_text` names it.
 
     See Also
@@ -136,7 +138,7 @@ class System:
         if self.initial_well is not None:
             if start is not None:
                 raise InputError("initial_well, initial_state: give one of the two")
-            object.__setattr__(self, "initial_well", checked_well("initial_well", self.initial_well))
+            object.__setattr__(self, "initial_well", checked_initial_well("initial_well", self.initial_well))
         if self.axial_load is not None and model.beam is None:
             raise InputError(
                 "axial_load: changes the axial load of a beam; a structure given by matrices has its load in its stiffness"
@@ -429,7 +431,8 @@ class System:
             if each.inertia > 0.0:
                 theta = self.model.linear_modes.T @ each.row(self.model)
                 little, much = (float(each.loss(np.array([ohms]))[0]) for ohms in (1e-9, 1e9))
-                found[int(little < much)] += np.outer(theta, theta) / each.inertia
+                for at in (0, 1) if little == much == 0.0 else (int(little < much),):
+                    found[at] += np.outer(theta, theta) / each.inertia
         opened, short = (np.sqrt(np.maximum(np.linalg.eigvalsh(each), 0.0)) / (2.0 * np.pi) for each in found)
         return opened, short
 
@@ -437,13 +440,17 @@ class System:
         """Amplitudes of an equilibrium, by default of the well that runs begin in."""
         if equilibrium is not None and not isinstance(equilibrium, Equilibrium):
             equilibrium = self.potential.well(checked_well("equilibrium", equilibrium))
-        return self._start_at_rest.amplitude if equilibrium is None else equilibrium.amplitude
+        if equilibrium is not None:
+            return equilibrium.amplitude
+        return (self.rest_state if self.initial_well == UNFORCED else self._start_at_rest).amplitude
 
     @property
     def _start_at_rest(self) -> State:
         """State at rest in the initial well."""
         if self.initial_well is None:
             return self.rest_state
+        if self.initial_well == UNFORCED:
+            return rest_state(self.model, self.striker)
         try:
             return State(amplitude=self.unloaded_potential.well(self.initial_well))  # type: ignore[arg-type]
         except InputError as error:
@@ -460,8 +467,8 @@ class System:
 
         Of an initial state it is the well on whose side of the dividing height the centre is.
         """
-        if self.initial_state is not None:
-            return self.model.side_of(self.initial_state.amplitude)
+        if self.initial_state is not None or self.initial_well == UNFORCED:
+            return self.model.side_of(self.start_state.amplitude)
         potential, alpha = self.unloaded_potential, self.start_state.amplitude
         distances = [float(np.abs(each.amplitude - alpha).max()) for each in potential.wells]
         if len(distances) < 2:
@@ -488,7 +495,25 @@ class System:
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Diagnostics: values that look like another unit, and assumptions of the model that do not hold."""
         parts = [(section_of("harvester", number), each) for number, each in enumerate(self.harvesters, 1)]
-        return doubts_of(self.unloaded_potential, self.striker, [*parts, *self.moving])
+        found = doubts_of(self.unloaded_potential, self.striker, [*parts, *self.moving])
+        return (*found, *self._overlaps()) if self.initial_well not in (None, UNFORCED) else found
+
+    def _overlaps(self) -> Iterator[Diagnostic]:
+        """Contacts with a gap that a run in the chosen well begins inside of."""
+        for number, each in enumerate(self.contacts, 1):
+            gap, side = each.striker.gap, 1.0 if each.striker.side == "above" else -1.0
+            if gap is None or gap < 0.0:
+                continue
+            moved = self.start_state.amplitude - self.rest_state.amplitude
+            depth = side * float(self.model.shape_at(each.striker.location) @ moved) - gap
+            if depth > 1e-6 * (self.model.length_scale or 1.0):
+                section = section_of("contact", number)
+                yield Diagnostic(
+                    "begins-inside",
+                    f"{section}: its tip begins {prefixed(depth, 'm', 3)} inside the beam: the gap is that to the beam in the "
+                    f"well that the first striker pushes away from, but initial_well is {self.initial_well!r}",
+                    {"depth": depth},
+                )
 
     # ------------------------------------------------------------------ identity and files
 

@@ -195,7 +195,10 @@ _KINDS = (
     ),
     _Kind(
         "equilibrium branches", {"critical_value", "natural_frequency"}, {"critical_point"},
-        lambda _: {"midspan_displacement": force_displacement.plot_equilibrium_branches},
+        lambda _: {
+            name: partial(force_displacement.plot_equilibrium_branches, variable=name)
+            for name in force_displacement.BRANCH_FIGURES
+        },
     ),
     _Kind("map", {"response_class"}, set(), _map),
 )  # fmt: skip

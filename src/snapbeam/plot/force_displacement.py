@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from snapbeam.model.parameters import lookup
 from snapbeam.plot.style import SERIES_COLORS, contains, frame, legend_below
 from snapbeam.util.si_prefixes import prefixed, scale_of
-from snapbeam.util.validation import checked
+from snapbeam.util.validation import checked, choice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -140,9 +140,15 @@ def _critical(dataset: xr.Dataset, ax: Axes, prefix_w: float, prefix_f: float) -
     return handles
 
 
+BRANCH_FIGURES = ("midspan_displacement", "natural_frequency")
+"""What :func:`plot_equilibrium_branches` draws over a parameter."""
+
+
 @checked
-def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw the equilibria of a system over a parameter: displacement of the centre, stability, critical points.
+def plot_equilibrium_branches(
+    dataset: xr.Dataset, ax: Axes | None = None, *, variable: str = "midspan_displacement"
+) -> Axes:
+    """Draw the equilibria of a system over a parameter: displacement or frequency, stability, critical points.
 
     Parameters
     ----------
@@ -150,6 +156,8 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
         Of :func:`snapbeam.model.equilibrium_branches`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
+    variable : {"midspan_displacement", "natural_frequency"}
+        Displacement of the centre, or first natural frequency of the stable parts, which is 0 where one ends.
 
     Examples
     --------
@@ -159,12 +167,15 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
     >>> found = sb.model.equilibrium_branches(sb.System(plate, forces=[electrode]), "force.voltage", (0.0, 8.0))
     >>> ax = sb.plot.plot_equilibrium_branches(found)
     """
-    needed = ("midspan_displacement", "unstable_directions", "critical_value")
-    contains(dataset, "equilibrium branches", *needed)
+    contains(dataset, "equilibrium branches", "midspan_displacement", "unstable_directions", "critical_value")
+    frequency = choice("variable", variable, BRANCH_FIGURES) == "natural_frequency"
     row = lookup(dataset.attrs["parameter"])
     value, place = dataset[row.short].values, dataset["midspan_displacement"].values
+    crossings, heights = dataset["critical_value"].values, dataset["critical_displacement"].values
+    if frequency:
+        place, heights = dataset["natural_frequency"].values[:, 0], np.zeros_like(heights)
     names = np.where(dataset["unstable_directions"].values == 0, "stable", "unstable")
-    prefix, unit = scale_of(place, "m")
+    prefix, unit = scale_of(place, "Hz" if frequency else "m")
     size, axis = _short_axis(value, row.quantity.unit)
     label = dataclasses.replace(row, quantity=dataclasses.replace(row.quantity, unit=axis)).label
     handles: list[Line2D] = []
@@ -172,15 +183,19 @@ def plot_equilibrium_branches(dataset: xr.Dataset, ax: Axes | None = None) -> Ax
         for number in np.unique(dataset["branch"].values):
             own = dataset["branch"].values == number
             handles += _pieces(ax, value[own] / size, place[own] / prefix, names[own])
+        if frequency:
+            handles = [each for each in handles if each.get_label() == "stable"]
         for kind, (marker, words) in _MARKERS.items():
             at = dataset["critical_kind"].values == kind
+            if frequency:
+                at &= dataset["critical_unstable_directions"].values == 0
             if at.any():
                 handles += ax.plot(
-                    dataset["critical_value"].values[at] / size, dataset["critical_displacement"].values[at] / prefix,
+                    crossings[at] / size, heights[at] / prefix,
                     marker, markerfacecolor="white", markeredgecolor="#000000", markersize=4.5, linestyle="", label=words,
                 )  # fmt: skip
         ax.set_xlabel(label)
-        ax.set_ylabel(f"Displacement at mid-span ({unit})")
+        ax.set_ylabel(f"{'First natural frequency' if frequency else 'Displacement at mid-span'} ({unit})")
         ax.legend(handles=_in_order(handles), loc="best")
     return ax
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import textwrap
+import json
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +16,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from snapbeam.model.mapping import labels_of, resolved
+from snapbeam.model.parameters import lookup, named_in, ratio_of
+from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection, quasi_static_threshold
 from snapbeam.plot.agreement import draw_agreement
-from snapbeam.plot.axes import axis_label, dress, edges_of, positions
+from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of, tick_text, wrapped
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CLASS_COLORS,
@@ -136,7 +139,11 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         _draw_line(ax, dataset, name)
         set_title(ax, caption(dataset, 2, (name,)))
         if legend:
-            legend_below(ax, class_handles(dataset["response_class"].values, wells_of(dataset.attrs)))
+            kinds = dataset["response_class"].values
+            handles = class_handles(kinds, wells_of(dataset.attrs))
+            if 0 < dataset.attrs.get("pull_in_runs", 0) == (kinds == ResponseClass.UNKNOWN).sum():
+                handles[-1].set_label(str(handles[-1].get_label()).replace("unknown", "pull-in"))
+            legend_below(ax, handles)
     return ax
 
 
@@ -313,7 +320,9 @@ _DECADES = 300.0
 
 
 @checked
-def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None) -> Axes:
+def plot_statistic(
+    dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None, over: str | None = None
+) -> Axes:
     """Draw a statistic of a map: colours over two axes, a curve over one, coloured dots of a list of points.
 
     Cells of runs that failed, or that have none of it, are grey.
@@ -329,6 +338,8 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
         Where to draw; a new figure one column wide by default.
     log : bool, optional
         Whether colours, or the axis, go by powers of ten; by default where the values span more than two of them.
+    over : str, optional
+        One of two axes, such as ``"harvester.resistance"``: over it a curve is drawn for each value of the other one.
 
     Examples
     --------
@@ -358,8 +369,11 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
     data = values.copy(data=scaled.reshape(values.shape))
     if log is None:
         log = wants_powers(scaled)
+    along = None if over is None else _axis_named(dataset, dims, over)
     with frame(ax, height=74.0) as ax:
-        if dims[:1] == ["sweep"] or len(dims) == 1:
+        if along is not None and len(dims) == 2:
+            _curves(ax, dataset, data, along)
+        elif dims[:1] == ["sweep"] or len(dims) == 1:
             if len(dims) > 1:
                 _swept(ax, dataset, data, dims[1])
             else:
@@ -369,9 +383,8 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
                 )
                 if f"{name}_low" in dataset:
                     _band(ax, dataset.squeeze(), name, points)
-            dress(ax.xaxis, dataset, dims[-1])
-            ax.set_ylabel(label)
-            ax.set_yscale("log" if log else "linear")
+                if float(np.ptp(data.values)) < 1e-6 * abs(middle := float(np.mean(data.values))):
+                    ax.set_ylim(middle - 0.1 * abs(middle), middle + 0.1 * abs(middle))
         else:
             across, upward = in_order(dataset, dims)
             field = np.ma.masked_invalid(data.transpose(upward, across).values)
@@ -385,8 +398,50 @@ def plot_statistic(dataset: xr.Dataset, name: str, ax: Axes | None = None, *, lo
             color_bar(mesh, ax, label, pad=0.02)
             dress(ax.xaxis, dataset, across)
             dress(ax.yaxis, dataset, upward)
+        if along is not None or len(dims) == 1 or dims[:1] == ["sweep"]:
+            dress(ax.xaxis, dataset, dims[-1] if along is None else along)
+            ax.set_ylabel(label)
+            ax.set_yscale("log" if log else "linear")
         set_title(ax, caption(dataset, 2, dims))
     return ax
+
+
+def _axis_named(dataset: xr.Dataset, dims: list[str], over: str) -> str:
+    """The axis that a parameter names, as a ratio or in its physical unit."""
+    full = {each: str(dataset[each].attrs.get("parameter", each)) for each in dims}
+    labels = labels_of(json.loads(dataset.attrs.get("system", "{}")))
+    row = (
+        None
+        if over in dims
+        else lookup(named_in(resolved(over, labels), {split_name(each)[0]: {} for each in full.values()}))
+    )
+    for each, name in full.items():
+        if over == each or (row is not None and ratio_of(row.name) == ratio_of(lookup(name).name)):
+            return each
+    raise InputError(f"over = {over!r}: is not an axis of the figure; its axes: {', '.join(dims)}")
+
+
+def _curves(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, along: str) -> None:
+    """Draw a statistic over one axis as a curve for each value of the other, with the interval of its mean."""
+    (other,) = (str(each) for each in data.dims if each != along)
+    points, _ = positions(dataset, along)
+    _, words = positions(dataset, other)
+    name, colors = str(data.name), crameri.batlow(np.linspace(0.0, 0.85, data.sizes[other]))
+    factor, _ = _label(dataset, name, dataset[name].values)
+    for at, (color, mark) in enumerate(zip(colors, itertools.cycle("os^Dv<>"), strict=False)):
+        value = tick_text(dataset, other, float(dataset[other][at]), 4) if words is None else words[at]
+        text = value if words is None else f"{symbol_of(dataset, other) or other} = {value}"
+        values = data.isel({other: at}).values
+        ax.plot(points, values, f"{mark}-", color=color, markersize=1.2 * marker_size(points.size), label=text)
+        if f"{name}_low" in dataset:
+            low, high = (
+                dataset[f"{name}{end}"].isel({other: at}).squeeze().values / factor for end in ("_low", "_high")
+            )
+            ax.fill_between(points, low, high, where=np.isfinite(high - low), color=color, alpha=0.2, linewidth=0.0)
+    handles = ax.get_legend_handles_labels()[0]
+    if f"{name}_low" in dataset:
+        handles.append(Patch(color="0.75", label=_interval_words(dataset)))
+    legend_below(ax, handles)
 
 
 def _of_any_seed(dataset: xr.Dataset, name: str) -> xr.Dataset:
@@ -401,13 +456,17 @@ def _band(ax: Axes, dataset: xr.Dataset, name: str, points: _Array) -> None:
     factor, _ = _label(dataset, name, dataset[name].values)
     low, high = (dataset[f"{name}{end}"].values / factor for end in ("_low", "_high"))
     known = np.isfinite(low) & np.isfinite(high)
-    share = f"{100.0 * float(dataset.attrs.get('confidence', 0.95)):g} % interval of the mean"
-    ax.fill_between(points, low, high, where=known, color=BEAM_COLOR, alpha=0.25, linewidth=0.0, label=share)
+    words = _interval_words(dataset)
+    ax.fill_between(points, low, high, where=known, color=BEAM_COLOR, alpha=0.25, linewidth=0.0, label=words)
     if f"{name}_quantile" in dataset:
         for level, dashes in zip(dataset["quantile"].values, itertools.cycle(("--", "-.", ":"))):
             values = dataset[f"{name}_quantile"].sel(quantile=level).values / factor
             ax.plot(points, values, dashes, color=SHAKER_COLOR, label=f"{level:g} quantile")
     legend_below(ax)
+
+
+def _interval_words(dataset: xr.Dataset) -> str:
+    return f"{100.0 * float(dataset.attrs.get('confidence', 0.95)):g} % interval of the mean"
 
 
 def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None:
@@ -416,15 +475,8 @@ def _swept(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, name: str) -> None
     looks = {"up": ("^-", BEAM_COLOR, BEAM_COLOR), "down": ("v--", SHAKER_COLOR, "white")}
     for row, kind in zip(data.values, dataset["sweep"].values, strict=True):
         look, color, face = looks[str(kind)]
-        ax.plot(
-            points,
-            row,
-            look,
-            color=color,
-            markerfacecolor=face,
-            markersize=1.2 * marker_size(points.size),
-            label=f"swept {kind}",
-        )
+        size = 1.2 * marker_size(points.size)
+        ax.plot(points, row, look, color=color, markerfacecolor=face, markersize=size, label=f"swept {kind}")
     ax.legend(loc="best")
 
 
@@ -452,9 +504,9 @@ def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, s
     words = words[:1].upper() + words[1:]
     if unit == "1":
         words = scale_text(dataset.attrs, words) if "over $b" in words else words
-        return 1.0, textwrap.fill(words, _LONGEST)
+        return 1.0, wrapped(words, _LONGEST)
     factor, scaled = scale_of(values, unit)
-    return factor, textwrap.fill(f"{words} ({scaled})", _LONGEST)
+    return factor, wrapped(f"{words} ({scaled})", _LONGEST)
 
 
 # ----------------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator
 
 from snapbeam.model.drive.shock import GRAVITY
+from snapbeam.plot.axes import wrapped
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CENTER_COLOR,
@@ -189,7 +189,7 @@ def plot_spectrum(
         ax.set(xlim=(0.0, top), yscale="log", ylim=(max(shown.max() * 1e-5, 1e-300), shown.max() * 2.0))
         ax.set_xlabel(_FREQUENCY[name])
         words = _words(dataset, variable)
-        ax.set_ylabel(textwrap.fill(words if unit == "1" else f"{words} ({unit})", 40))
+        ax.set_ylabel(wrapped(words if unit == "1" else f"{words} ({unit})", 40))
     return ax
 
 
@@ -503,6 +503,9 @@ def plot_run(run: Run | xr.Dataset, window: tuple[float, float] | None = None, a
     >>> ax = sb.plot.plot_run(run, window=(10.0, 15.0))
     """
     dataset = dataset_of(run, "displacement_at_striker")
+    if "striker_forces" in dataset:  # the largest of all strikers
+        most = {"contact_force": "striker_forces", "penetration_normalised": "striker_penetrations"}
+        dataset = dataset.assign({name: dataset[every].max("striker") for name, every in most.items()})
     axis_name, label = across(dataset)
     part, period = cut(dataset, axis_name, window), 1.0
     if _is_of_one_event(dataset):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.constant_velocity import ConstantVelocity
 from snapbeam.model.drive.fixed_stop import FixedStop
-from snapbeam.model.harvester import ElectromagneticHarvester, PiezoelectricHarvester
+from snapbeam.model.harvester import ElectromagneticHarvester, PiezoelectricHarvester, PiezoelectricPatches
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import numbered
 from snapbeam.model.striker import Striker
@@ -70,7 +71,7 @@ def draw_surroundings(ax: Axes, system: System, x: _Array, w: _Array, sign: floa
     """Draw what surrounds the beam; *x* and *w* are its shape at rest, *sign* the striker's side."""
     if system.base_excitation is not None:
         _base(ax, system, sign, wide)
-    if isinstance(system.harvester, PiezoelectricHarvester):
+    if isinstance(system.harvester, PiezoelectricHarvester | PiezoelectricPatches):
         _layers(ax, system.harvester, x, w, sign, wide)
     if isinstance(system.harvester, ElectromagneticHarvester):
         _coil(ax, system.harvester, x, w, sign, wide)
@@ -94,16 +95,18 @@ def _base(ax: Axes, system: System, sign: float, wide: float) -> None:
         ax.text(at + 0.75, -sign * 2.05, "not on the base", ha="left", va="center", color=_COLOR)
 
 
-def _layers(ax: Axes, piezo: PiezoelectricHarvester, x: _Array, w: _Array, sign: float, wide: float) -> None:
-    """Both layers along the beam, and wires to a resistor on the other side than the striker."""
-    inside = (x >= piezo.patch_start * wide) & (x <= piezo.patch_end * wide)
-    for away in (1.0, -1.0):
+def _layers(
+    ax: Axes, piezo: PiezoelectricHarvester | PiezoelectricPatches, x: _Array, w: _Array, sign: float, wide: float
+) -> None:
+    """Both layers of each patch along the beam, and wires of the first to a resistor on the other side than the striker."""
+    for away, (first, last) in itertools.product((1.0, -1.0), piezo.ends):
+        inside = (x >= first * wide) & (x <= last * wide)
         outline = np.concatenate((
             np.stack((x[inside], w[inside] + 0.03 * away), axis=1),
             np.stack((x[inside], w[inside] + (0.03 + _LAYER) * away), axis=1)[::-1],
         ))  # fmt: skip
         ax.add_patch(Polygon(outline, closed=True, facecolor=_COLOR, alpha=0.75, edgecolor="none", zorder=4))
-    at = 0.5 * (piezo.patch_start + piezo.patch_end) * wide
+    at = 0.5 * float(piezo.ends[0].sum()) * wide
     there = float(np.interp(at, x, w))
     _resistor(ax, at, there + sign * (0.03 + _LAYER), sign, prefixed(piezo.resistance, r"$\Omega$"))
 

@@ -95,6 +95,8 @@ _RC: Any = {
 _STYLES: dict[str, tuple[tuple[float, float], float, str]] = {
     "elsevier": ((90.0, 190.0), 8.0, "DejaVu Sans"),
     "ieee": ((88.9, 181.9), 8.0, "STIXGeneral"),
+    "nature": ((89.0, 183.0), 7.0, "DejaVu Sans"),
+    "slides": ((130.0, 254.0), 12.0, "DejaVu Sans"),
     "talk": ((130.0, 254.0), 12.0, "DejaVu Sans"),
 }
 """Widths of one and of two columns, mm; size of labels, points; font."""
@@ -106,8 +108,9 @@ def plot_style(name: str) -> None:
 
     Parameters
     ----------
-    name : {"elsevier", "ieee", "talk"}
-        Columns of 90 and 190 mm, the default; of 88.9 and 181.9 mm with a serif font; of 130 and 254 mm with larger text.
+    name : {"elsevier", "ieee", "nature", "slides", "talk"}
+        Columns of 90 and 190 mm, the default; of 88.9 and 181.9 mm with a serif font; of 89 and 183 mm with smaller text;
+        of 130 and 254 mm with larger text, for slides or a talk.
 
     Raises
     ------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from matplotlib.lines import Line2D
 from snapbeam.model.parameters import PHYSICAL, lookup
 from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection
-from snapbeam.plot.axes import axis_label, dress, edges_of, is_geometric, positions
+from snapbeam.plot.axes import AXIS_LABELS, axis_label, dress, edges_of, is_geometric, positions, wrapped
 from snapbeam.plot.map import in_order, quasi_static_along
 from snapbeam.plot.style import (
     CLASS_COLORS,
@@ -33,7 +32,7 @@ from snapbeam.plot.style import (
 )
 from snapbeam.plot.units import in_symbols, in_units, ratio_along, ratio_name, scale_text
 from snapbeam.solver.statistics import STATISTICS
-from snapbeam.util.si_prefixes import prefixed
+from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, checked, shown
 
@@ -83,6 +82,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     free = next((name for name in known if name != objectives[0]), variables[0])
     across = over or (f"objective_{objectives[1]}" if len(objectives) > 1 else free)
     up = f"objective_{objectives[0]}"
+    dataset = _with_prefix(_with_prefix(dataset, up), across)
     with frame(ax, dataset, height=84.0) as ax:
         x, y = dataset[f"tried_{across}"].values, dataset[f"tried_{up}"].values
         kept = (dataset["violation"].values == 0.0) & np.isfinite(y)
@@ -105,6 +105,19 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     return ax
 
 
+def _with_prefix(dataset: xr.Dataset, name: str) -> xr.Dataset:
+    """The dataset with an objective or a variable in its unit with a prefix of the SI, such as µW."""
+    unit = str(dataset[name].attrs.get("units", "1"))
+    if not unit.isalpha() or name in AXIS_LABELS or unit in ("g", "um"):
+        return dataset
+    factor, scaled = scale_of(dataset[f"tried_{name}"].values, unit)
+    own = [f"{start}{name}{end}" for start, end in (("", ""), ("", "_low"), ("", "_high"), ("tried_", ""))]
+    return dataset.assign({
+        each: (dataset[each] / factor).assign_attrs(dataset[each].attrs | {"units": scaled})
+        for each in own if each in dataset
+    })  # fmt: skip
+
+
 def _errors(dataset: xr.Dataset, name: str, own: np.ndarray) -> np.ndarray | None:
     if f"{name}_low" not in dataset:
         return None
@@ -115,13 +128,14 @@ def _errors(dataset: xr.Dataset, name: str, own: np.ndarray) -> np.ndarray | Non
 
 def _label(dataset: xr.Dataset, name: str) -> str:
     short = name.removeprefix("objective_")
-    if f"fixed_{short}" in dataset.attrs or "parameter" in dataset.get(short, dataset[name]).attrs:
-        return axis_label(dataset, short)
     labels = dataset[name].attrs
+    row = lookup(labels["parameter"]) if "parameter" in labels else None
+    if f"fixed_{short}" in dataset.attrs or (row is not None and labels.get("units") == row.quantity.unit):
+        return axis_label(dataset, short)
     unit, words = str(labels.get("units", "1")), in_symbols(str(labels.get("long_name", name)))
     words = re.sub("(?<=[a-z])_(?=[a-z])", " ", words)  # names of statistics in it
     words = scale_text(dataset.attrs, words) if "over $b" in words else words
-    return textwrap.fill(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}", 44)
+    return wrapped(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}", 44)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -138,7 +152,7 @@ _WORDS = {
 
 
 def _words_of(outcome: str) -> str:
-    return _WORDS.get(outcome) or textwrap.fill(f"Probability that {outcome.replace('_', ' ')}", 40)
+    return _WORDS.get(outcome) or wrapped(f"Probability that {outcome.replace('_', ' ')}", 40)
 
 
 _DASHES: dict[float, Any] = {0.05: ":", 0.5: "-", 0.95: "--"}
@@ -299,7 +313,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
         ends = data.drop_vars(raised, errors="ignore").assign_coords({raised: (raised, [bottom, top])})
         dress(ax.yaxis, ends, raised)
         label = axis_label(ends, raised)
-        ax.set(xlim=x[[0, -1]], ylabel=textwrap.fill(f"Threshold: {label[:1].lower()}{label[1:]}", 44))
+        ax.set(xlim=x[[0, -1]], ylabel=wrapped(f"Threshold: {label[:1].lower()}{label[1:]}", 44))
         reach = np.nanmax(np.where(np.isfinite(data["threshold_high"]), data["threshold_high"], np.nan))
         ax.set_ylim(min(0.0, bottom), min(top, 1.08 * float(reach)) if np.isfinite(reach) else top)
         share = 100.0 * float(data.attrs.get("confidence", 0.95))
@@ -334,8 +348,10 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
-    middle = float(data.attrs["quantity_mean"])
-    half, low, high = (data[f"effect{end}"].values for end in ("", "_low", "_high"))
+    middle, unit = float(data.attrs["quantity_mean"]), str(data.attrs["quantity_units"])
+    found = [data[f"effect{end}"].values for end in ("", "_low", "_high")]
+    scale, unit = scale_of([abs(middle), *map(abs, found[0])], unit) if unit.isalpha() else (1.0, unit)
+    middle, (half, low, high) = middle / scale, (each / scale for each in found)
     for sign, color, label in (
         (-1.0, _BLUE, "one standard deviation lower"),
         (1.0, _RED, "one standard deviation higher"),
@@ -345,10 +361,9 @@ def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
         interval = f"{100.0 * float(data.attrs['confidence']):g} % interval" if sign > 0.0 else None
         ax.errorbar(middle + sign * half, place, xerr=error, fmt="none", label=interval, **_BARS)
     ax.axvline(middle, color="black", linewidth=0.6)
-    unit = str(data.attrs["quantity_units"])
     words = in_symbols(str(data.attrs["quantity"]))
     text = f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
-    ax.set_xlabel(textwrap.fill(text, 40))
+    ax.set_xlabel(wrapped(text, 40))
     legend_below(ax)
 
 
@@ -364,7 +379,7 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
         error = np.stack([value - low, high - value])
         ax.errorbar(value, place + shift, xerr=error, fmt="none", label=words, **_BARS)
     ax.axvline(0.0, color="black", linewidth=0.6)
-    ax.set_xlabel(textwrap.fill(f"Share of the variance of {in_symbols(str(data.attrs['quantity']))}", 44))
+    ax.set_xlabel(wrapped(f"Share of the variance of {in_symbols(str(data.attrs['quantity']))}", 44))
     legend_below(ax)
 
 
@@ -455,7 +470,7 @@ def _elasticities(data: xr.Dataset, ax: Axes) -> list[Any]:
     ax.axvline(0.0, color="black", linewidth=0.6)
     if not np.isfinite(value).any():
         ax.text(0.5, 0.5, "the quantity is 0", transform=ax.transAxes, ha="center", va="center")
-    ax.set_xlabel(textwrap.fill(f"Change of {words}", 44) + "\nfor 1 % of the parameter (%)")
+    ax.set_xlabel(wrapped(f"Change of {words}", 44) + "\nfor 1 % of the parameter (%)")
     return [doubtful] if np.isfinite(value[~sure]).any() else []
 
 

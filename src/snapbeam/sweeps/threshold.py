@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup, ratio_of
 from snapbeam.model.system import System
+from snapbeam.simulation.simulate import simulate
 from snapbeam.sweeps.compute import CheckpointOptions, compute_sweep
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
@@ -60,12 +62,16 @@ def threshold(
     therefore two curves: the lowest interwell value, and the value from which every run is interwell.  snapbeam runs
     every point of the grid, so both curves are exact on that grid.
 
+    A run that leaves the displacements of a local force, as in pull-in to an electrode, counts as interwell if it does so
+    at ``accuracy="reference"`` too: variable ``pull_in``.  Another run with the status ``DIVERGED`` has failed.  The dynamic pull-in voltage is thus a threshold over ``force.voltage`` with
+    ``initial_well="unforced"``, and the shock or vibration that a loaded electrode survives is one over its amplitude.
+
     Parameters
     ----------
     system : System
         Nominal system; parameters that are not in *axes* have its values.
     parameter : str
-        Parameter to raise, such as ``"velocity_amplitude"``: one that may differ between the runs of an ensemble.
+        Parameter to raise, any real number of the system, such as ``"velocity_amplitude"`` or ``"force.voltage"``.
     values : array_like
         Values of that parameter, strictly increasing, in its unit: the range and the resolution of the threshold.
     axes : mapping of str to array_like, optional
@@ -99,8 +105,7 @@ def threshold(
     Raises
     ------
     InputError
-        If the parameter belongs to the model and cannot differ between the runs of an ensemble, or there are fewer
-        than two values.
+        If the parameter is no real number, or there are fewer than two values.
 
     See Also
     --------
@@ -119,10 +124,8 @@ def threshold(
     ('frequency_ratio',)
     """
     row = system.parameter(parameter) if isinstance(system, System) else lookup(parameter)
-    if not row.is_run or row.quantity.kind is not float:
-        raise InputError(
-            f"parameter = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
-        )
+    if row.quantity.kind is not float:
+        raise InputError(f"parameter = {shown(parameter)}: must be a real number, such as velocity_amplitude")
     axes = {} if axes is None else axes
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map parameters to arrays of values")
@@ -147,10 +150,18 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     dims = tuple(lookup(name).short for name in setup.points.axes if name != along)
     whole = (*dims, row.short)
     response = computed["response_class"].transpose(*whole).values
-    rows = _thresholds(response)
+    pulled_in = np.zeros_like(response, dtype=bool)
+    if any(law.is_limited() for law in setup.system.local_forces):
+        ended = np.argwhere(computed["status"].transpose(*whole).values == RunStatus.DIVERGED)
+        axes = dict(setup.points.axes)
+        axes[along] = axes.pop(along)  # the last, as of the statuses
+        for at in ended:
+            point = {name: own[i].item() for (name, own), i in zip(axes.items(), at, strict=True)}
+            pulled_in[tuple(at)] = _pulls_in(*setup.neighbour(point))
+    rows = _thresholds(np.where(pulled_in, ResponseClass.TRANSIENT_2, response))
     attrs = setup.attributes("threshold of the interwell response of a struck bistable beam")
     attrs.pop("early_termination")
-    attrs |= {"parameter": row.short, "runs": int(response.size)}
+    attrs |= {"parameter": row.short, "runs": int(response.size), "pull_in_runs": int(pulled_in.sum())}
     dataset = xr.Dataset(coords=setup.coordinates(), attrs=attrs)
     words = row.quantity.long_name
     symbol = f" {row.quantity.symbol}" if row.quantity.symbol else ""
@@ -172,10 +183,26 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
         "flag_meanings": " ".join(_OUTCOMES),
     }
     dataset["outcome"] = (dims, rows["outcome"].astype(np.int8), flags)
+    dataset["pull_in"] = (whole, pulled_in, {"units": "1", "long_name": "run that leaves the displacements of a force"})
     extremes = () if dims else ("min_midspan_displacement", "max_midspan_displacement")
     for name in ("response_class", "status", *extremes):
         dataset[name] = (whole, computed[name].transpose(*whole).values, computed[name].attrs)
     return dataset
+
+
+def _pulls_in(system: System, integration: Integration) -> bool:
+    """Return whether a run leaves the displacements of a local force, at the accuracy of reference too."""
+    how = integration.replace(step=None, accuracy="reference", early_termination=False)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run = simulate(system, how).dataset
+    except InputError:  # it begins outside of them
+        return False
+    time, q, p = (run[name].values[-2:] for name in ("time", "modal_amplitude", "modal_velocity"))
+    later = q[-1] + 2.0 * (time[-1] - time[0]) * p[-1]
+    diverged = str(run.attrs["status"]).startswith(RunStatus.DIVERGED.name)
+    return diverged and bool(np.isfinite(later).all()) and not system.unloaded_potential.holds(later)
 
 
 def _thresholds(response: NDArray[np.int8]) -> dict[str, NDArray[Any]]:

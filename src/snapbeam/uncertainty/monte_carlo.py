@@ -437,7 +437,7 @@ def outcome_named(given: Any, name: str = "outcome") -> tuple[str, Event]:
         )
     statistic, sign, value = found.groups()
     row = number_statistic(name, statistic)
-    key, unit = _SCALES.get(row.normalised_by, ("", row.unit)) if unit_in_text(value) else ("", row.unit)
+    key, unit = scale_key(statistic, row.unit, value)
     try:
         limit = number_in_unit(value, unit)
     except InputError as error:
@@ -450,6 +450,12 @@ def outcome_named(given: Any, name: str = "outcome") -> tuple[str, Event]:
 
     words = row.long_name.removesuffix(f", over {row.normalised_by}") if key else row.long_name
     return f"{statistic} {sign} {value}", Event(f"{words} {sign} {value}", happened, statistic)
+
+
+def scale_key(statistic: str, unit: str, value: str) -> tuple[str, str]:
+    """Key of the scale, and unit, of a value that is given with a unit of a statistic over a scale; else no key and *unit*."""
+    over = STATISTICS[statistic].normalised_by if statistic in STATISTICS else ""
+    return _SCALES.get(over, ("", unit)) if unit_in_text(value) else ("", unit)
 
 
 def metres_key(statistic: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,10 +19,11 @@ from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Columns
 from snapbeam.uncertainty.differential_evolution import DifferentialEvolution, front_of
 from snapbeam.uncertainty.distributions import ParameterUncertainty
-from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, trials_of
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, scale_key, trials_of
 from snapbeam.util.diagnostics import Diagnostic, counting, tell
 from snapbeam.util.proportions import mean_interval, proportion
 from snapbeam.util.provenance import canonical_json
+from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -230,8 +231,8 @@ class Constraint:
     ----------
     quantity : str
         Name of the quantity, as in :class:`Objective`.
-    lower, upper : float, optional
-        One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
+    lower, upper : float or str, optional
+        One of them at least, a number in the unit of the quantity or text with a unit, as ``"5 N"``.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
         Required fraction of all systems that satisfy a constraint of a statistic of runs, in (0, 1).
 
@@ -251,14 +252,27 @@ class Constraint:
     lower: float | None = None
     upper: float | None = None
     probability: float = 0.95
+    scale: str = field(default="", init=False, repr=False)
 
     def __post_init__(self) -> None:
         kind = quantity_of(self.quantity).kind
         if self.lower is None and self.upper is None:
             raise InputError(f"constraint of {self.quantity}: must have lower or upper")
+        scales = {"" for each in (self.lower, self.upper) if each is not None and not isinstance(each, str)}
         for name in ("lower", "upper"):
-            if getattr(self, name) is not None:
-                finite(name, getattr(self, name))
+            value = getattr(self, name)
+            if isinstance(value, str):
+                key, unit = scale_key(self.quantity, self._quantity.unit, value)
+                scales.add(key)
+                try:
+                    value = number_in_unit(value, unit)
+                except InputError as error:
+                    raise InputError(f"{name} = {getattr(self, name)!r}, of {self.quantity}: {error}") from None
+            if value is not None or getattr(self, name) is not None:
+                object.__setattr__(self, name, finite(name, value))
+        if len(scales) > 1:
+            raise InputError(f"constraint of {self.quantity}: give both of lower and upper a unit, or none")
+        object.__setattr__(self, "scale", scales.pop())
         within("probability", self.probability, 0.0, 1.0)
         if kind == "outcome":
             if self.upper is not None or self.lower is None:
@@ -536,6 +550,7 @@ class DesignProblem:
     def _kept(self, constraint: Constraint, found: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
         """Mask of the runs that satisfy a constraint; failed runs satisfy none."""
         values = constraint._quantity.of(self.trials.system, found)
+        values = values * found[constraint.scale] if constraint.scale else values
         return np.asarray(constraint.kept(values) & reached(found))
 
     def _missing(self, found: dict[str, NDArray[Any]], *, hopeful: bool = False) -> float:
@@ -579,7 +594,8 @@ def problem_of(
         if row.quantity.kind is not float or row.section == "integration":
             raise InputError(f"{name}: cannot be chosen; must be a real number of the system")
         try:
-            low, high = (float(row.quantity.check(str(name), each)) for each in pair)
+            numbers = (number_in_unit(each, row.quantity.unit) if isinstance(each, str) else each for each in pair)
+            low, high = (float(row.quantity.check(str(name), each)) for each in numbers)
         except (TypeError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
@@ -593,6 +609,8 @@ def problem_of(
     require_held(
         [*(objective.quantity for objective in made), *(constraint.quantity for constraint in kept)], trials.system
     )
+    if any(constraint.scale for constraint in kept):
+        trials = replace(trials, scaled=True)
     integer("samples", samples, 8, 10**6)
     if trials.uncertainty.is_empty:
         raise InputError("uncertainty: nothing is uncertain, so every probability is 0 or 1; give tolerances")
