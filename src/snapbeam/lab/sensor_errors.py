@@ -485,20 +485,23 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None, bool], float]:
     edges = np.unique(np.searchsorted(freq, freq[0] * 1.01**steps))
     count = np.diff(np.append(edges, freq.size))
     freq, power = np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count
-    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 17), [0.0, *np.geomspace(0.03, 30.0, 7)])
+    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 65), [0.0, *np.geomspace(0.03, 30.0, 13)])
     colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
-    slope, knee = np.meshgrid([0.5, 1.0], np.geomspace(0.03, 3.0, 9))
+    slope, knee = np.meshgrid([0.5, 1.0], np.geomspace(0.03, 3.0, 17))
     bent = ((freq / drive) ** 2 + knee.reshape(-1, 1) ** 2) ** (-0.5 * slope.reshape(-1, 1))
-    colours = np.vstack([colours, bent])
+    colours = np.vstack([np.ones_like(freq), colours, bent])
     falling = colours[:, 0] >= colours[:, -1]
+    shapes = np.log(colours) @ count
+    weights = count / colours
 
     def misfit(one: _Filter | None, white: bool) -> float:
-        kept = 1.0 if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
-        # noise that rises and is filtered again would explain any hill
-        any_colour = colours[falling] if one is not None and one.kind == "low_pass" else colours
-        shape = (np.ones((1, freq.size)) if white else any_colour) * kept
-        level = (count * power / shape).sum(-1) / count.sum()
-        return 2.0 / lines * float(np.min(count.sum() * np.log(level) + (count * np.log(shape)).sum(-1)))
+        kept = np.ones_like(freq) if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
+        total = count.sum() * np.log(weights @ (power / kept) / count.sum()) + shapes
+        if white:
+            total = total[:1]
+        elif one is not None and one.kind == "low_pass":
+            total = total[falling]  # noise that rises and is filtered again would explain any hill
+        return 2.0 / lines * (float(total.min()) + float(count @ np.log(kept)))
 
     return misfit
 

@@ -256,6 +256,13 @@ KINDS = table(
         "explain it alike: look at the frames about it",
     ),
     Kind(
+        "camera.rate_changes", ERROR,
+        "the frequency of the striker's drive, counted in frames, before and after each frame",
+        "from about frame {first:.0f} on the drive has {ratio:.2f} times its frequency before: the frame rate changed within "
+        "the recording; keep the frames before, or give each part its frame_rate (--frame-rate)",
+        ("frame_rate",),
+    ),
+    Kind(
         "camera.scattered", WARNING,
         "how the scatter of the striker about its steady sine grows with its speed",
         "the striker scatters with its speed, by {size:.2f} frames: an uneven trigger, or edges that are found less well "
