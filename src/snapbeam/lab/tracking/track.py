@@ -38,6 +38,7 @@ from snapbeam.lab.tracking.settings import FrameFlag, Orientation, Scene, Tracki
 from snapbeam.lab.tracking.survey import CLIPPED, pixel_noise, saturation_level, survey
 from snapbeam.simulation.dataset import trajectory_dataset
 from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, to_json
+from snapbeam.util.packages import needing
 from snapbeam.util.singular_values import polyfit
 from snapbeam.util.validation import InputError, InputTypeError, instance, integer, positive
 
@@ -56,11 +57,18 @@ _CLIPPED_ERROR = 0.05  # px; an overexposed edge is sharper than pixels can foll
 
 
 def tracked_dataset(
-    rows: TrackedRows, recording: Recording, scene: Scene, settings: TrackingSettings, drift: float, fields: VideoFields
+    rows: TrackedRows,
+    recording: Recording,
+    scene: Scene,
+    settings: TrackingSettings,
+    drift: float,
+    fields: VideoFields,
+    moves: float,
 ) -> xr.Dataset:
     """The dataset of a tracked recording; see :func:`snapbeam.lab.track` for its variables.
 
-    *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video.
+    *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video, *moves*
+    [px] by how much the background does.
     """
     trail = pulse = 0.0
     opened = None if recording.exposure is None else recording.exposure * recording.frame_rate
@@ -103,7 +111,7 @@ def tracked_dataset(
     offset = math.hypot(_offset_error(rows.row, rest), scene.row_errors[1])
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0)
+    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0, moves)
     diagnostics = (
         *recording.diagnostics,
         *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate),
@@ -237,6 +245,10 @@ def _attributes(
 _SAMPLE_PIXELS = 6_000_000
 _HEAD = 8
 _BATCH_PIXELS = 5_000_000
+_CLEAR = 6.0  # px between the beam and the background that is followed, beside its blur
+_LEAST_BACKGROUND = 16  # rows of it
+_MOST_FRAMES = (10.0, 90.0)  # %, between which its shifts count
+_SWINGS, _SWING = 4.0, 0.2  # times by which both halves must move more alike than apart, and px, for a motion
 
 
 def track(
@@ -305,6 +317,7 @@ def track(
         prepare(sample), wanted, saturated=prepare.saturated, pixel_size=_pixel(recording, wanted)[0], head=head
     )
     marks = _FixedMarks(sample[:head], wanted, turn)
+    background = _Background(prepare(sample[:head]), measure_beam(scene.beam, prepare(sample)).row, scene, wanted)
     follower = Follower(scene, wanted.blur_limit)
     size = int(np.clip(_BATCH_PIXELS // (recording.shape[0] * recording.shape[1]), 4, 128))
     done = 0
@@ -314,13 +327,14 @@ def track(
         near = beam.row + scene.beam.thickness
         tip = None if scene.shaker is None else measure_shaker(scene.beam, scene.shaker, frames, near, beam.slope)
         follower.add(frames, beam, tip, marks(batch))
+        background.add(frames, beam.row)
         done += batch.shape[0]
         if progress is not None:
             progress(done, len(recording))
-    rows = follower.result(recording.numbers)
+    rows, moves = background.doubted(follower.result(recording.numbers), recording.numbers)
     apart = fields_apart(recording, prepare, scene.beam, rows, wanted.side in ("below", "above"))
     fields = VideoFields(apart, alternation(rows.row))
-    return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields)
+    return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields, moves)
 
 
 def _pixel(recording: Recording, settings: TrackingSettings) -> tuple[float, float]:
@@ -399,6 +413,58 @@ class _FixedMarks:
         if np.isfinite(drift).any():
             self.largest = max(self.largest, float(np.nanmax(np.abs(drift))))
         return Drift(drift, 1.0 / np.sqrt(np.maximum(weight, 1e-30)))
+
+
+class _Background:
+    """Rows by which the background, on the far side of the beam, moves from frame to frame, in two halves of its columns.
+
+    Nothing in it moves, so where both halves move alike the picture does: an electronic stabiliser, or the camera.
+    """
+
+    def __init__(self, head: Floats, row: Floats, scene: Scene, settings: TrackingSettings) -> None:
+        self.margin = _CLEAR + 4.0 * scene.beam.edge_width
+        self.found: list[Floats] = []
+        top = float(np.nanmin(row)) - self.margin if np.isfinite(row).any() else 0.0
+        self.rows = slice(0, max(int(top), 0))
+        clear = self.rows.stop >= _LEAST_BACKGROUND and not settings.fixed_marks and settings.background is None
+        self.references = [half.mean(0) for half in self._halves(head)] if clear else []
+
+    def _halves(self, frames: Floats) -> list[NDArray[np.float32]]:
+        half = frames.shape[2] // 2
+        parts = frames[:, self.rows, :half], frames[:, self.rows, half:]
+        return [np.ascontiguousarray(part, dtype=np.float32) for part in parts]
+
+    def add(self, frames: Floats, row: Floats) -> None:
+        """Follow the background in a batch of turned frames, where the beam at *row* does not come near it."""
+        if not self.references:
+            return
+        with needing("a background that is followed", "lab"):
+            import cv2
+
+        both = []
+        for parts, reference in zip(self._halves(frames), self.references, strict=True):
+            window = cv2.createHanningWindow(reference.shape[::-1], cv2.CV_32F)
+            both.append([cv2.phaseCorrelate(reference, part, window)[0][1] for part in parts])
+        self.found.append(np.where(row - self.margin >= self.rows.stop - 1.0, both, np.nan))
+
+    def doubted(self, rows: TrackedRows, numbers: NDArray[np.int64]) -> tuple[TrackedRows, float]:
+        """The rows with what the background moves in their errors, and by how much [px] it does; 0 if it stands still."""
+        if not self.found:
+            return rows, 0.0
+        first, second = np.concatenate(self.found, axis=1)
+        known = np.isfinite(first)
+        if known.sum() < 0.5 * known.size:
+            return rows, 0.0
+        alike, apart = 0.5 * (first + second), 0.5 * (first - second)
+        swing, noise = (float(np.ptp(np.percentile(one[known], _MOST_FRAMES))) for one in (alike, apart))
+        if swing < max(_SWINGS * noise, _SWING):
+            return rows, 0.0
+        moved = np.full(rows.row.size, np.nan)
+        moved[numbers] = np.abs(alike)
+        most = float(np.nanpercentile(moved, _MOST_FRAMES[1]))
+        moved = np.where(moved < 2.0 * most, moved, most)
+        errors = np.hypot(rows.error, moved), np.hypot(rows.shaker_error, moved)
+        return dataclasses.replace(rows, error=errors[0], shaker_error=errors[1]), most
 
 
 # ----------------------------------------------------------------------------------------------------
