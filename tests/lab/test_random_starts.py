@@ -64,7 +64,7 @@ def test_white_noise_excludes_a_high_pass_and_a_start_is_no_notch(start):
     noise = np.random.default_rng(41).standard_normal(time.size)
     drive = measure_drive(make_signal(0.02 * (rise * np.cos(2.0 * np.pi * since + 1.0) + 0.02 * noise), "m/s", 4e3))
     assert not doubtful(diagnostics_of(drive))
-    assert abs(drive.steady.amplitude - 0.02) < 2.0 * drive.steady.amplitude_se < 0.02 * 0.1
+    assert abs(drive.steady.amplitude - 0.02) < 2.0 * drive.steady.amplitude_se < 0.02 * 0.3
 
 
 @pytest.mark.parametrize("seed, k", [(811, 6), (811, 45), (811, 50), (811, 114), (9001, 0), (9001, 39), (9001, 106)])
