@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from snapbeam.lab.camera import Recording, profile_shift
 from snapbeam.lab.tracking.diagnostics import (
@@ -38,7 +39,6 @@ from snapbeam.lab.tracking.settings import FrameFlag, Orientation, Scene, Tracki
 from snapbeam.lab.tracking.survey import CLIPPED, pixel_noise, saturation_level, survey
 from snapbeam.simulation.dataset import trajectory_dataset
 from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, to_json
-from snapbeam.util.packages import needing
 from snapbeam.util.singular_values import polyfit
 from snapbeam.util.validation import InputError, InputTypeError, instance, integer, positive
 
@@ -63,12 +63,12 @@ def tracked_dataset(
     settings: TrackingSettings,
     drift: float,
     fields: VideoFields,
-    moves: float,
+    moves: Floats,
 ) -> xr.Dataset:
     """The dataset of a tracked recording; see :func:`snapbeam.lab.track` for its variables.
 
     *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video, *moves*
-    [px] by how much the background does.
+    [px] by how much the background does in each frame.
     """
     trail = pulse = 0.0
     opened = None if recording.exposure is None else recording.exposure * recording.frame_rate
@@ -111,7 +111,9 @@ def tracked_dataset(
     offset = math.hypot(_offset_error(rows.row, rest), scene.row_errors[1])
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0, moves)
+    seen = SeenMotion(
+        rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0, float(moves.max())
+    )
     diagnostics = (
         *recording.diagnostics,
         *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate),
@@ -128,9 +130,9 @@ def tracked_dataset(
     if scene.shape.clipped > CLIPPED:
         misfit = max(misfit, _CLIPPED_ERROR)
     rounded = 0.5 * rounding_shift(scene.beam)
-    common = math.hypot(offset, recording.edge_error, misfit, rounded, scene.noise.made_up)
+    common = np.hypot(math.hypot(offset, recording.edge_error, misfit, rounded, scene.noise.made_up), moves)
     beam_error = np.hypot(rows.error, common)
-    shaker_error = np.hypot(rows.shaker_error, math.hypot(common, bent))
+    shaker_error = np.hypot(rows.shaker_error, np.hypot(common, bent))
     valid = np.isfinite(beam_mm) & (np.isfinite(shaker_mm) if shaker is not None else True)
     scaled: dict[str, NDArray] = {}
     if settings.buckling_level is not None:
@@ -248,7 +250,9 @@ _BATCH_PIXELS = 5_000_000
 _CLEAR = 6.0  # px between the beam and the background that is followed, beside its blur
 _LEAST_BACKGROUND = 16  # rows of it
 _MOST_FRAMES = (10.0, 90.0)  # %, between which its shifts count
-_SWINGS, _SWING = 4.0, 0.2  # times by which both halves must move more alike than apart, and px, for a motion
+_REACH, _STRIPE = 16, 8  # rows it may move by, and columns of the stripes that make either half
+_FINE = (1.0, 4.0)  # px, between which its structure is followed
+_SWINGS, _SWING = 2.0, 0.2  # times by which both halves must move more alike than apart, and px, for a motion
 
 
 def track(
@@ -331,10 +335,10 @@ def track(
         done += batch.shape[0]
         if progress is not None:
             progress(done, len(recording))
-    rows, moves = background.doubted(follower.result(recording.numbers), recording.numbers)
+    rows = follower.result(recording.numbers)
     apart = fields_apart(recording, prepare, scene.beam, rows, wanted.side in ("below", "above"))
     fields = VideoFields(apart, alternation(rows.row))
-    return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields, moves)
+    return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields, background.moves(recording.numbers))
 
 
 def _pixel(recording: Recording, settings: TrackingSettings) -> tuple[float, float]:
@@ -416,9 +420,10 @@ class _FixedMarks:
 
 
 class _Background:
-    """Rows by which the background, on the far side of the beam, moves from frame to frame, in two halves of its columns.
+    """Rows by which the background, on the far side of the beam, moves from frame to frame, by two halves of its columns.
 
-    Nothing in it moves, so where both halves move alike the picture does: an electronic stabiliser, or the camera.
+    Nothing in it moves, so where both halves move alike the picture does: an electronic stabiliser, or the camera.  Light
+    that the beam sheds on it is smooth, and taken out.
     """
 
     def __init__(self, head: Floats, row: Floats, scene: Scene, settings: TrackingSettings) -> None:
@@ -426,45 +431,50 @@ class _Background:
         self.found: list[Floats] = []
         top = float(np.nanmin(row)) - self.margin if np.isfinite(row).any() else 0.0
         self.rows = slice(0, max(int(top), 0))
+        self.reach = min(self.rows.stop // 3, _REACH)
         clear = self.rows.stop >= _LEAST_BACKGROUND and not settings.fixed_marks and settings.background is None
-        self.references = [half.mean(0) for half in self._halves(head)] if clear else []
+        self.reference = self._fine(head).mean(0)[self.reach : -self.reach] if clear else None
 
-    def _halves(self, frames: Floats) -> list[NDArray[np.float32]]:
-        half = frames.shape[2] // 2
-        parts = frames[:, self.rows, :half], frames[:, self.rows, half:]
-        return [np.ascontiguousarray(part, dtype=np.float32) for part in parts]
+    def _fine(self, frames: Floats) -> Floats:
+        """The background without noise of single pixels and without what is smooth."""
+        part = np.asarray(frames[:, self.rows], dtype=np.float32)
+        return np.asarray(np.subtract(*(gaussian_filter(part, (0, sigma, sigma)) for sigma in _FINE)))
 
     def add(self, frames: Floats, row: Floats) -> None:
         """Follow the background in a batch of turned frames, where the beam at *row* does not come near it."""
-        if not self.references:
+        if self.reference is None:
             return
-        with needing("a background that is followed", "lab"):
-            import cv2
-
+        fine, height = self._fine(frames), self.reference.shape[0]
+        parts = [fine[:, k : k + height] for k in range(2 * self.reach + 1)]
+        along = np.stack([np.einsum("nrc,rc->nc", part, self.reference) for part in parts], 1)
+        square = np.stack([np.einsum("nrc,nrc->nc", part, part) for part in parts], 1)
+        stripe = np.arange(fine.shape[2]) // _STRIPE % 2
         both = []
-        for parts, reference in zip(self._halves(frames), self.references, strict=True):
-            window = cv2.createHanningWindow(reference.shape[::-1], cv2.CV_32F)
-            both.append([cv2.phaseCorrelate(reference, part, window)[0][1] for part in parts])
+        for half in (0, 1):
+            alike = along[..., stripe == half].sum(2) / np.sqrt(square[..., stripe == half].sum(2) + 1e-30)
+            best = np.clip(alike.argmax(1), 1, alike.shape[1] - 2)
+            before, at, after = (np.take_along_axis(alike, best[:, None] + k, 1)[:, 0] for k in (-1, 0, 1))
+            bend = np.minimum(before + after - 2.0 * at, -1e-30)
+            both.append(best - self.reach + np.clip(0.5 * (before - after) / bend, -0.5, 0.5))
         self.found.append(np.where(row - self.margin >= self.rows.stop - 1.0, both, np.nan))
 
-    def doubted(self, rows: TrackedRows, numbers: NDArray[np.int64]) -> tuple[TrackedRows, float]:
-        """The rows with what the background moves in their errors, and by how much [px] it does; 0 if it stands still."""
+    def moves(self, numbers: NDArray[np.int64]) -> Floats:
+        """What the background moves in each frame [px], with the noise of that; 0 where it stands still or is not seen."""
+        moves: Floats = np.zeros(int(numbers[-1]) + 1)
         if not self.found:
-            return rows, 0.0
+            return moves
         first, second = np.concatenate(self.found, axis=1)
         known = np.isfinite(first)
         if known.sum() < 0.5 * known.size:
-            return rows, 0.0
+            return moves
         alike, apart = 0.5 * (first + second), 0.5 * (first - second)
         swing, noise = (float(np.ptp(np.percentile(one[known], _MOST_FRAMES))) for one in (alike, apart))
         if swing < max(_SWINGS * noise, _SWING):
-            return rows, 0.0
-        moved = np.full(rows.row.size, np.nan)
-        moved[numbers] = np.abs(alike)
+            return moves
+        moved = np.hypot(alike, noise)
         most = float(np.nanpercentile(moved, _MOST_FRAMES[1]))
-        moved = np.where(moved < 2.0 * most, moved, most)
-        errors = np.hypot(rows.error, moved), np.hypot(rows.shaker_error, moved)
-        return dataclasses.replace(rows, error=errors[0], shaker_error=errors[1]), most
+        moves[numbers] = np.where(moved < 2.0 * most, moved, most)
+        return moves
 
 
 # ----------------------------------------------------------------------------------------------------
