@@ -198,10 +198,8 @@ def measured(kind, rng, folder, **asked):
     turn = Orientation(stage.side, camera.shape)
     shown = recording
     if kind == "lamp pulse":  # the light of the last tenth of an exposure of 0.9 frames
-        late = (
-            np.interp(time + 0.81 / camera.frame_rate, time, beam),
-            np.interp(time + 0.81 / camera.frame_rate, time, shaker),
-        )
+        late = [np.interp(time + 0.81 / camera.frame_rate, time, one) for one in (beam, shaker)]
+        late[0][0], late[1][0] = beam[0], shaker[0]  # the rest before is drawn from the first value
         shown = render_recording(
             time, *(sign * one for one in late), camera=dataclasses.replace(camera, exposure=0.09 / camera.frame_rate),
             stage=stage, defects=Defects(**scene.defects), rest_frames=scene.rest_frames, rng=1,

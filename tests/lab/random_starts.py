@@ -1,7 +1,7 @@
 """Records of a shaker with starts and noise of many kinds, good and behind a high-pass filter, and what is told of them.
 
 ``python tests/lab/random_starts.py GOOD FILTERED [SEED]`` prints the rates of ``docs/data/verification.md``, of the
-seed 811 that no rule was set with.
+seed 811; records of it set the rule for white noise, and 5500 none.
 """
 
 from __future__ import annotations

@@ -604,7 +604,7 @@ KINDS_VIBROMETER = table(
         "vibrometer.high_pass_possible", INFO,
         "noise and start of the motion, against a high-pass filter of the first order",
         "noise and start do not exclude a high-pass filter (AC coupling) of up to {corner:.3g} Hz, which would take "
-        "{loss_percent:.2g} % of the amplitude: it is in the standard error; a sudden start after a longer rest, a longer "
+        "{loss_percent:.2g} % of the amplitude: {taken_percent:.2g} % is in the standard error; a sudden start after a longer rest, a longer "
         "record or less noise excludes it, and DC coupling or a corner below {limit:.2g} Hz",
     ),
     Kind(

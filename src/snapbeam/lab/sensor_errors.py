@@ -40,6 +40,7 @@ _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
 _START = 20.0  # cycles of the start that a filter shapes
 _CONTRADICTS = 40.0  # chi-square of what a start or a drive that no model describes to the noise leaves
+_SPREADS = 2.0  # standard deviations of chi-square that a start leaves by chance
 _DESCRIBED = 1.2  # times its noise up to which what a start leaves is noise
 _PASSES = 0.05  # of the drive that a filter must let pass for it to be seen at all
 _BETWEEN = 0.02  # of a start, which filters between those that are tried leave
@@ -168,8 +169,10 @@ def find_errors(record: Record) -> list[Hypothesis]:
     found nothing that matters.
     """
     slow = np.asarray(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, record.left.size), 3), dtype=np.float64)
-    # a zero that drifts is no noise
-    record = record._replace(left=record.left - slow @ solve(slow, record.left))
+    drift = slow @ solve(slow, record.left)
+    # a zero that drifts is no noise; a drift of noise alone is left, for what it is taken out of is no longer that noise
+    if float(drift @ drift) > float(chi2.isf(FALSE_ALARM_RATE, 4)) * record.fit.noise_rms**2:
+        record = record._replace(left=record.left - drift)
     told: list[Hypothesis] = []
     for group in (
         (_converters, _jumps), (_curves, _courses), (_clocks, _jitter), (_filters,), (_hidden_filters,)
@@ -185,7 +188,8 @@ def find_errors(record: Record) -> list[Hypothesis]:
                 told.append(best)
                 continue
             # an error that explains nearly as much is not told, but may be there; a large one would show elsewhere
-            near = [one for one in found if one.score > max(best.score - _AHEAD, 0.0) and one.loss < _HIDDEN]
+            near = [one for one in found if one.score > max(best.score - _AHEAD, 0.0)]
+            near = [one for one in near if one.loss < _HIDDEN or not one.kind]
             loss, shift = (max((getattr(one, name) for one in near), default=0.0) for name in ("loss", "shift"))
             if max(loss, shift) > 0.0:
                 told.append(Hypothesis("", best.score, 1, loss, shift))
@@ -380,32 +384,36 @@ def _hidden_filters(record: Record) -> list[Hypothesis]:
     """The largest loss by a high-pass that noise and start do not exclude: in the standard error, and no doubt.
 
     It is possible where both together are not against it, or where one of them shows it, whatever the other says: noise
-    may hold the end of a transient, and a start may be of any kind.  White noise excludes a filter that would have
-    coloured it, unless the start is, to the noise, that behind the filter: noise may be added after it.
+    may hold the end of a transient, and a start may be of any kind, so what no filter explains of it excuses one.  White
+    noise behind a filter was coloured with the filter's own corner, a coincidence that is as rare as the filter would
+    have coloured white noise much: the loss is taken with the root of that probability.
     """
     if not record.early.size:
         return []
     drive = record.fit.frequency
     filters = [one for one in _candidates(drive) if one.kind == "high_pass"]
     misfit = _noise_misfit(record)
-    # a colour that a filter makes white needs the filter's own corner
-    white = misfit(None, True) - misfit(None, False) < _SHOWS
-    noise = np.array([misfit(one, white) for one in filters]) - misfit(None, white)
+    noise = np.array([misfit(one, False) for one in filters]) - misfit(None, False)
     start, unexplained, freedom = _free_start(record, filters)
     described = 1.0 + unexplained / freedom
-    weight = 1.0 / described if described < 2.0 else 0.0  # a start of another kind says nothing
-    both = np.minimum(noise, _CONTRADICTS) + np.maximum(weight * start, -_CONTRADICTS)
+    excused = min(float(start.min()), 0.0) + max(unexplained - _SPREADS * math.sqrt(2.0 * freedom), 0.0)
+    against = np.maximum(start, excused) - max(0.0, excused)
+    both = np.minimum(noise, _CONTRADICTS) + np.maximum(against, -_CONTRADICTS)
     possible = both < min(float(both.min()), 0.0) + _POSSIBLE
     possible |= noise < min(float(noise.min()) + _POSSIBLE, -_SHOWS)
     possible |= start < min(float(start.min()) + _POSSIBLE + unexplained, -_SHOWS)
     possible &= (noise < _CONTRADICTS) | ((start < -_CONTRADICTS) & (described < _DESCRIBED))
     loss = np.array([1.0 / abs(one.response(drive)) - 1.0 for one in filters])
-    if not (possible & (loss > _UNSEEN)).any():
+    taken = np.where(possible, loss, 0.0)
+    if misfit(None, True) - misfit(None, False) < _SHOWS:
+        white = np.array([misfit(one, True) for one in filters]) - misfit(None, True)
+        taken *= np.sqrt(_SHOWS / np.maximum(white, _SHOWS))
+    most = int(np.argmax(taken))
+    if taken[most] < _UNSEEN:
         return []
-    most = int(np.argmax(np.where(possible, loss, 0.0)))
-    taken = float(loss[most])
-    numbers = {"corner": filters[most].centre, "loss_percent": 100.0 * taken / (1.0 + taken), "limit": 0.05 * drive}
-    return [Hypothesis("high_pass_possible", math.inf, 1, taken, numbers=numbers)]
+    numbers = {"corner": filters[most].centre, "limit": 0.05 * drive}
+    numbers |= {"loss_percent": 100.0 * loss[most] / (1.0 + loss[most]), "taken_percent": 100.0 * taken[most]}
+    return [Hypothesis("high_pass_possible", math.inf, 1, float(taken[most]), numbers=numbers)]
 
 
 def _free_start(record: Record, filters: list[_Filter]) -> tuple[_Array, float, int]:
@@ -477,20 +485,23 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None, bool], float]:
     edges = np.unique(np.searchsorted(freq, freq[0] * 1.01**steps))
     count = np.diff(np.append(edges, freq.size))
     freq, power = np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count
-    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 17), [0.0, *np.geomspace(0.03, 30.0, 7)])
+    slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 65), [0.0, *np.geomspace(0.03, 30.0, 13)])
     colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
-    slope, knee = np.meshgrid([0.5, 1.0], np.geomspace(0.03, 3.0, 9))
+    slope, knee = np.meshgrid([0.5, 1.0], np.geomspace(0.03, 3.0, 17))
     bent = ((freq / drive) ** 2 + knee.reshape(-1, 1) ** 2) ** (-0.5 * slope.reshape(-1, 1))
-    colours = np.vstack([colours, bent])
+    colours = np.vstack([np.ones_like(freq), colours, bent])
     falling = colours[:, 0] >= colours[:, -1]
+    shapes = np.log(colours) @ count
+    weights = count / colours
 
     def misfit(one: _Filter | None, white: bool) -> float:
-        kept = 1.0 if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
-        # noise that rises and is filtered again would explain any hill
-        any_colour = colours[falling] if one is not None and one.kind == "low_pass" else colours
-        shape = (np.ones((1, freq.size)) if white else any_colour) * kept
-        level = (count * power / shape).sum(-1) / count.sum()
-        return 2.0 / lines * float(np.min(count.sum() * np.log(level) + (count * np.log(shape)).sum(-1)))
+        kept = np.ones_like(freq) if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
+        total = count.sum() * np.log(weights @ (power / kept) / count.sum()) + shapes
+        if white:
+            total = total[:1]
+        elif one is not None and one.kind == "low_pass":
+            total = total[falling]  # noise that rises and is filtered again would explain any hill
+        return 2.0 / lines * (float(total.min()) + float(count @ np.log(kept)))
 
     return misfit
 

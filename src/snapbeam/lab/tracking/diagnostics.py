@@ -256,6 +256,13 @@ KINDS = table(
         "explain it alike: look at the frames about it",
     ),
     Kind(
+        "camera.rate_changes", ERROR,
+        "the frequency of the striker's drive, counted in frames, before and after each frame",
+        "from about frame {first:.0f} on the drive has {ratio:.2f} times its frequency before: the frame rate changed within "
+        "the recording; keep the frames before, or give each part its frame_rate (--frame-rate)",
+        ("frame_rate",),
+    ),
+    Kind(
         "camera.scattered", WARNING,
         "how the scatter of the striker about its steady sine grows with its speed",
         "the striker scatters with its speed, by {size:.2f} frames: an uneven trigger, or edges that are found less well "
@@ -279,6 +286,13 @@ KINDS = table(
         "something beyond the beam in most frames though no shaker is followed",
         "a shaker is in view though shaker=False (--no-shaker): its columns are kept out of the search for the beam",
         ("shaker",),
+    ),
+    Kind(
+        "camera.background_moves", WARNING,
+        "the background beyond the beam in both halves of its columns, frame by frame",
+        "the background moves with the picture, by up to {shift_px:.2f} px: an electronic stabiliser, or a camera that moves; "
+        "it is in the standard errors; record without a stabiliser, or take it out with fixed_marks (--fixed-mark)",
+        ("fixed_marks",),
     ),
     Kind(
         "camera.drift", INFO,
@@ -305,7 +319,8 @@ class SeenMotion:
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
     [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the
     frames; ``trail``, the share of the frame before that a frame still shows; ``pulse``, the frames by which its
-    instant within the exposure is open; ``open_share``, the exposure over the time between frames, 0 if not known.
+    instant within the exposure is open; ``open_share``, the exposure over the time between frames, 0 if not known; ``moves`` [px] of
+    the background, 0 if it stands still.
     """
 
     rows: TrackedRows
@@ -319,6 +334,7 @@ class SeenMotion:
     trail: float
     pulse: float
     open_share: float
+    moves: float
 
 
 def tracking_diagnostics(
@@ -344,6 +360,8 @@ def tracking_diagnostics(
         told += _of_the_tip(scene, seen)
     if scene.striker_in_view:
         told.append(KINDS["striker_in_view"].found())
+    if seen.moves > 0.0:
+        told.append(KINDS["background_moves"].found(shift_px=seen.moves))
     if seen.drift > 0.05:
         told.append(KINDS["drift"].found(drift_px=seen.drift))
     return tuple(told)

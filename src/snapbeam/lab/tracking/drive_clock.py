@@ -12,6 +12,7 @@ import math
 import numpy as np
 from scipy.stats import chi2, f
 
+from snapbeam.lab.least_squares import sines
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.lab.sine_fit import SineFit, fit_sine, spectral_peak
 from snapbeam.lab.tracking.edges import Floats
@@ -28,6 +29,9 @@ _FRAMES, _PIXELS = 0.3, 0.2  # that a step is at least
 _JITTER = 0.05  # frames
 _MEDIAN = 2.7  # times as many squares a median needs for the error of a mean
 _FADING = (0.05, 0.2)  # time constants of a start that is not over, over the length
+_WINDOW, _LEAST_WINDOW = 1.6, 16  # cycles and frames in which the frequency of the drive is found
+_PURE = 0.02  # of its square that a sine leaves in them
+_SAME = 0.08  # by which their frequencies may differ
 _BLOCK = 8  # frames, for noise that is alike in neighbours
 
 
@@ -53,9 +57,10 @@ def steady_striker(shaker: Floats) -> tuple[SignalSamples, SineFit] | None:
 
 def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
     """Kinds and numbers of what is wrong with the times of the frames, from the rows [px] of the striker."""
+    changed = _rate_change(shaker)
     steady = steady_striker(shaker)
-    if steady is None:
-        return []
+    if steady is None or changed:
+        return changed
     part, fit = steady
     first, last = int(part.time[0]), int(part.time[-1]) + 1
     wave = fit.waveform(np.arange(first - 1, last + 1, dtype=np.float64))
@@ -65,6 +70,46 @@ def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
         return told
     noise = max(1.4826 * float(np.median(np.abs(np.diff(off, 2)))) / math.sqrt(6.0), _LEAST_NOISE)
     return _steps(part, off, noise, fit.frequency)
+
+
+def _rate_change(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
+    """A frequency of the drive, counted in frames, that is another multiple from some frame on: the frame rate changed."""
+    known = np.flatnonzero(np.isfinite(shaker))
+    if known.size < 64 or known.size < 0.8 * shaker.size:
+        return []
+    frames = np.arange(shaker.size, dtype=np.float64)
+    values = np.interp(frames, frames[known], shaker[known])
+    try:
+        guess = spectral_peak(SignalSamples(values, frames, 1.0))
+    except InputError:
+        return []
+    width = max(round(_WINDOW / guess), _LEAST_WINDOW)
+    if values.size < 4 * width:
+        return []
+    windows = np.lib.stride_tricks.sliding_window_view(values, width)[:: max(width // 16, 1)]
+    grid = guess * np.geomspace(0.4, 2.5, 93)
+    left = []
+    for frequency in grid:
+        base = np.linalg.qr(np.column_stack([np.ones(width), sines(frames[:width], [frequency])]))[0]
+        left.append((windows**2).sum(1) - ((windows @ base) ** 2).sum(1))
+    rest = windows.var(1) * width
+    sound = (np.min(left, axis=0) < _PURE * rest) & (np.ptp(windows, axis=1) > 0.4 * np.ptp(windows))
+    found = grid[np.argmin(left, axis=0)][sound]
+    at = frames[: values.size - width + 1 : max(width // 16, 1)][sound] + 0.5 * width
+    if found.size < 24:
+        return []
+    before, after = float(np.median(found[: found.size // 6])), float(np.median(found[-found.size // 6 :]))
+    ratio = after / before
+    whole = max(ratio, 1.0 / ratio)
+    if round(whole) < 2 or abs(whole - round(whole)) > 0.1 * whole:
+        return []
+    alike = [np.abs(np.log(found / one)) < _SAME for one in (before, after)]
+    fits = np.cumsum(np.append(0, alike[0])) + np.cumsum(np.append(0, alike[1])[::-1])[::-1]
+    k = int(np.argmax(fits))
+    # windows about the change are of both rates
+    if fits[k] < found.size - 16 or min(k, found.size - k) < 4:
+        return []
+    return [("rate_changes", {"ratio": ratio, "first": round(0.5 * float(at[k - 1] + at[k]))})]
 
 
 def _steps(part: SignalSamples, off: Floats, noise: float, frequency: float) -> list[tuple[str, dict[str, float]]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from snapbeam.lab.camera import Recording, profile_shift
 from snapbeam.lab.tracking.diagnostics import (
@@ -56,11 +57,18 @@ _CLIPPED_ERROR = 0.05  # px; an overexposed edge is sharper than pixels can foll
 
 
 def tracked_dataset(
-    rows: TrackedRows, recording: Recording, scene: Scene, settings: TrackingSettings, drift: float, fields: VideoFields
+    rows: TrackedRows,
+    recording: Recording,
+    scene: Scene,
+    settings: TrackingSettings,
+    drift: float,
+    fields: VideoFields,
+    moves: Floats,
 ) -> xr.Dataset:
     """The dataset of a tracked recording; see :func:`snapbeam.lab.track` for its variables.
 
-    *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video.
+    *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video, *moves*
+    [px] by how much the background does in each frame.
     """
     trail = pulse = 0.0
     opened = None if recording.exposure is None else recording.exposure * recording.frame_rate
@@ -103,7 +111,9 @@ def tracked_dataset(
     offset = math.hypot(_offset_error(rows.row, rest), scene.row_errors[1])
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0)
+    seen = SeenMotion(
+        rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0, float(moves.max())
+    )
     diagnostics = (
         *recording.diagnostics,
         *tracking_diagnostics(scene, seen, settings, scale * offset, recording.frame_rate),
@@ -120,9 +130,9 @@ def tracked_dataset(
     if scene.shape.clipped > CLIPPED:
         misfit = max(misfit, _CLIPPED_ERROR)
     rounded = 0.5 * rounding_shift(scene.beam)
-    common = math.hypot(offset, recording.edge_error, misfit, rounded, scene.noise.made_up)
+    common = np.hypot(math.hypot(offset, recording.edge_error, misfit, rounded, scene.noise.made_up), moves)
     beam_error = np.hypot(rows.error, common)
-    shaker_error = np.hypot(rows.shaker_error, math.hypot(common, bent))
+    shaker_error = np.hypot(rows.shaker_error, np.hypot(common, bent))
     valid = np.isfinite(beam_mm) & (np.isfinite(shaker_mm) if shaker is not None else True)
     scaled: dict[str, NDArray] = {}
     if settings.buckling_level is not None:
@@ -237,6 +247,12 @@ def _attributes(
 _SAMPLE_PIXELS = 6_000_000
 _HEAD = 8
 _BATCH_PIXELS = 5_000_000
+_CLEAR = 6.0  # px between the beam and the background that is followed, beside its blur
+_LEAST_BACKGROUND = 16  # rows of it
+_MOST_FRAMES = (10.0, 90.0)  # %, between which its shifts count
+_REACH, _STRIPE = 16, 8  # rows it may move by, and columns of the stripes that make either half
+_FINE = (1.0, 4.0)  # px, between which its structure is followed
+_SWINGS, _SWING = 2.0, 0.2  # times by which both halves must move more alike than apart, and px, for a motion
 
 
 def track(
@@ -305,6 +321,7 @@ def track(
         prepare(sample), wanted, saturated=prepare.saturated, pixel_size=_pixel(recording, wanted)[0], head=head
     )
     marks = _FixedMarks(sample[:head], wanted, turn)
+    background = _Background(prepare(sample[:head]), measure_beam(scene.beam, prepare(sample)).row, scene, wanted)
     follower = Follower(scene, wanted.blur_limit)
     size = int(np.clip(_BATCH_PIXELS // (recording.shape[0] * recording.shape[1]), 4, 128))
     done = 0
@@ -314,13 +331,14 @@ def track(
         near = beam.row + scene.beam.thickness
         tip = None if scene.shaker is None else measure_shaker(scene.beam, scene.shaker, frames, near, beam.slope)
         follower.add(frames, beam, tip, marks(batch))
+        background.add(frames, beam.row)
         done += batch.shape[0]
         if progress is not None:
             progress(done, len(recording))
     rows = follower.result(recording.numbers)
     apart = fields_apart(recording, prepare, scene.beam, rows, wanted.side in ("below", "above"))
     fields = VideoFields(apart, alternation(rows.row))
-    return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields)
+    return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields, background.moves(recording.numbers))
 
 
 def _pixel(recording: Recording, settings: TrackingSettings) -> tuple[float, float]:
@@ -399,6 +417,64 @@ class _FixedMarks:
         if np.isfinite(drift).any():
             self.largest = max(self.largest, float(np.nanmax(np.abs(drift))))
         return Drift(drift, 1.0 / np.sqrt(np.maximum(weight, 1e-30)))
+
+
+class _Background:
+    """Rows by which the background, on the far side of the beam, moves from frame to frame, by two halves of its columns.
+
+    Nothing in it moves, so where both halves move alike the picture does: an electronic stabiliser, or the camera.  Light
+    that the beam sheds on it is smooth, and taken out.
+    """
+
+    def __init__(self, head: Floats, row: Floats, scene: Scene, settings: TrackingSettings) -> None:
+        self.margin = _CLEAR + 4.0 * scene.beam.edge_width
+        self.found: list[Floats] = []
+        top = float(np.nanmin(row)) - self.margin if np.isfinite(row).any() else 0.0
+        self.rows = slice(0, max(int(top), 0))
+        self.reach = min(self.rows.stop // 3, _REACH)
+        clear = self.rows.stop >= _LEAST_BACKGROUND and not settings.fixed_marks and settings.background is None
+        self.reference = self._fine(head).mean(0)[self.reach : -self.reach] if clear else None
+
+    def _fine(self, frames: Floats) -> Floats:
+        """The background without noise of single pixels and without what is smooth."""
+        part = np.asarray(frames[:, self.rows], dtype=np.float32)
+        return np.asarray(np.subtract(*(gaussian_filter(part, (0, sigma, sigma)) for sigma in _FINE)))
+
+    def add(self, frames: Floats, row: Floats) -> None:
+        """Follow the background in a batch of turned frames, where the beam at *row* does not come near it."""
+        if self.reference is None:
+            return
+        fine, height = self._fine(frames), self.reference.shape[0]
+        parts = [fine[:, k : k + height] for k in range(2 * self.reach + 1)]
+        along = np.stack([np.einsum("nrc,rc->nc", part, self.reference) for part in parts], 1)
+        square = np.stack([np.einsum("nrc,nrc->nc", part, part) for part in parts], 1)
+        stripe = np.arange(fine.shape[2]) // _STRIPE % 2
+        both = []
+        for half in (0, 1):
+            alike = along[..., stripe == half].sum(2) / np.sqrt(square[..., stripe == half].sum(2) + 1e-30)
+            best = np.clip(alike.argmax(1), 1, alike.shape[1] - 2)
+            before, at, after = (np.take_along_axis(alike, best[:, None] + k, 1)[:, 0] for k in (-1, 0, 1))
+            bend = np.minimum(before + after - 2.0 * at, -1e-30)
+            both.append(best - self.reach + np.clip(0.5 * (before - after) / bend, -0.5, 0.5))
+        self.found.append(np.where(row - self.margin >= self.rows.stop - 1.0, both, np.nan))
+
+    def moves(self, numbers: NDArray[np.int64]) -> Floats:
+        """What the background moves in each frame [px], with the noise of that; 0 where it stands still or is not seen."""
+        moves: Floats = np.zeros(int(numbers[-1]) + 1)
+        if not self.found:
+            return moves
+        first, second = np.concatenate(self.found, axis=1)
+        known = np.isfinite(first)
+        if known.sum() < 0.5 * known.size:
+            return moves
+        alike, apart = 0.5 * (first + second), 0.5 * (first - second)
+        swing, noise = (float(np.ptp(np.percentile(one[known], _MOST_FRAMES))) for one in (alike, apart))
+        if swing < max(_SWINGS * noise, _SWING):
+            return moves
+        moved = np.hypot(alike, noise)
+        most = float(np.nanpercentile(moved, _MOST_FRAMES[1]))
+        moves[numbers] = np.where(moved < 2.0 * most, moved, most)
+        return moves
 
 
 # ----------------------------------------------------------------------------------------------------
