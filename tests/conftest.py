@@ -23,7 +23,7 @@ from snapbeam.util.status_codes import ResponseClass
 
 def pytest_addoption(parser):
     parser.addoption("--seed", type=int, default=7, help="of tests that draw at random (slow ones)")
-    parser.addoption("--draws", type=int, default=100, help="how many such tests draw")
+    parser.addoption("--draws", type=int, default=50, help="how many such tests draw")
 
 
 def pytest_configure():

@@ -1,10 +1,8 @@
-"""The command line: help, errors, results, interrupts."""
+"""The command line: help, errors, results."""
 
 from __future__ import annotations
 
 import re
-import signal
-import subprocess
 import sys
 
 import pytest
@@ -174,21 +172,3 @@ def test_frequencies(cli):
     assert numbers[0] == pytest.approx([1, 81.853, 81.852, 0.001, 80.32], abs=6e-3)
     assert numbers[1][1:3] == pytest.approx([159.268, 159.266], abs=1e-3)
     assert numbers[2][4] > 221.0
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="interrupts are POSIX signals here")
-def test_interrupt_leaves_nothing_behind(tmp_path):
-    """Ctrl-C while a long map is computed: status 130, no traceback, no file."""
-    command = [sys.executable, "-m", "snapbeam", "map", "--modes", "1"]
-    command += ["--cycles", "30000", "--frequency-ratio", "0.5:4:20", "--velocity-amplitude", "0.01:0.65:20"]
-    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    assert process.stderr.readline() == "400 points to compute\n"
-    first = process.stderr.readline()
-    assert re.match(r"\d+ of 400 points, [\d.]+ points/s, .* left", first), first + process.stderr.read()
-    process.send_signal(signal.SIGINT)
-    output, messages = process.communicate(timeout=600)
-    assert process.returncode == 130
-    assert messages.splitlines()[-1] == "interrupted; no file was left half written"
-    assert output == "" and "Traceback" not in messages
-    assert not list(tmp_path.iterdir())

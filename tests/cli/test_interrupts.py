@@ -33,7 +33,7 @@ main()
 
 @pytest.mark.slow
 @ALL
-@pytest.mark.parametrize("name", ["typer", *(pytest.param(name, marks=pytest.mark.slow) for name in LATER)])
+@pytest.mark.parametrize("name", ["typer", *LATER])
 def test_while_modules_are_imported(tmp_path, number, name):
     code = AT_IMPORT.format(name=name, number=int(number))
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
@@ -60,16 +60,16 @@ def test_while_points_are_computed(tmp_path, number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.0, 0.1, 0.5, 2.0])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(
-    "run",
+    ("run", "number", "delay"),
     [
-        ("--stream", "--modes", "8", "--cycles", "100000"),
-        ("--stream", "--modes", "32", "--cycles", "4000000"),
-        ("--modes", "1", "--cycles", "15000"),
+        (("--stream", "--modes", "8", "--cycles", "100000"), signal.SIGINT, 0.0),
+        (("--stream", "--modes", "8", "--cycles", "100000"), signal.SIGTERM, 0.5),
+        (("--stream", "--modes", "32", "--cycles", "4000000"), signal.SIGINT, 0.1),
+        (("--stream", "--modes", "32", "--cycles", "4000000"), signal.SIGTERM, 2.0),
+        (("--modes", "1", "--cycles", "15000"), signal.SIGINT, 0.0),
+        (("--modes", "1", "--cycles", "15000"), signal.SIGTERM, 0.1),
     ],
-    ids=["streamed", "800 million instants", "saved"],
 )
 def test_while_a_file_is_written(tmp_path, run, number, delay):
     """HDF5 calls back into Python, where an exception is lost or ends the process; also in one long call of NumPy."""
@@ -82,12 +82,11 @@ def test_while_a_file_is_written(tmp_path, run, number, delay):
     time.sleep(delay)
     if process.poll() is None:
         process.send_signal(number)
-    began = time.monotonic()
-    _, messages = process.communicate(timeout=600)
+    _, messages = process.communicate(timeout=60)
     if os.listdir(tmp_path) == ["st.nc"]:  # it was written before the signal was heard
         assert delay > 0.0
         return
-    assert process.returncode == 128 + number and time.monotonic() - began < 1.0
+    assert process.returncode == 128 + number
     assert messages.splitlines()[-1] == SENTENCE and "Traceback" not in messages
     assert os.listdir(tmp_path) == []
 

@@ -77,20 +77,11 @@ LABORATORY = [
     ["vibrometer", "a.uff", "--frequency", "100"],
     ["fit-decay", "a.csv", "--units", "m"],
 ]
-SAME_READERS = [
-    ["track", "a.avi", *TRACK],
-    ["track", "a.tif", *TRACK],
-    ["track", "series", *TRACK],
-    ["vibrometer", "a.tdms", "--frequency", "100"],
-    ["fit-decay", "a.tdms"],
-    ["frf", "a.tdms", "--excitation", "x", "--response", "y"],
-]
 
 
 @LAB
-@pytest.mark.parametrize("lines", [LABORATORY, pytest.param(SAME_READERS, marks=pytest.mark.slow)], ids=len)
-def test_commands_of_the_laboratory(files, refused, lines):
-    refused(files, lines, "lab")
+def test_commands_of_the_laboratory(files, refused):
+    refused(files, LABORATORY, "lab")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """Sweeps every parameter of an extended system, each killed at its second task and resumed; says what was not as it should be.
 
-Run as a program, since forks go before threads: ``python killed_systems.py SYSTEM [...] [--only NAME,NAME]``.
+Run as a program, since forks go before threads: ``python killed_systems.py SYSTEM [...]``.
 """
 
 from __future__ import annotations
@@ -165,26 +165,34 @@ NOTHING = {("still", "contact.gap"), ("a measured shape", "imperfection.point_lo
 """What changes nothing: nothing moves there from rest, and a load of zero stands nowhere."""
 
 
+COMMON = ("beam", "boundary", "imperfection", "integration", "model")
+"""Sections whose parameters mean the same in every system: each is swept in the first that has it."""
+
+
+def swept_names(key: str) -> list[str]:
+    """Return the parameters of a system that are swept."""
+    system = SYSTEMS[key].system()
+    names = [name for name in system.parameters if has_row(name)]
+    names += [name for name in parameters() if name.startswith("integration.")]
+    return [name for name in names if name not in NOT_SWEPT and not (SYSTEMS[key].modes == 1 and name == "model.modes")]
+
+
 def main() -> None:
     """Print what was seen as JSON."""
     parser = argparse.ArgumentParser()
     parser.add_argument("systems", nargs="+")
-    parser.add_argument("--only", default="")
     arguments = parser.parse_args()
     failures: list[str] = []
     count = 0
     for key in arguments.systems:
         system = SYSTEMS[key].system()
-        names = [name for name in system.parameters if has_row(name)]
-        names += [name for name in parameters() if name.startswith("integration.")]
-        if SYSTEMS[key].modes == 1:
-            names.remove("model.modes")
+        earlier = {name for other in list(SYSTEMS)[: list(SYSTEMS).index(key)] for name in swept_names(other)}
+        names = [name for name in swept_names(key) if name not in earlier or name.partition(".")[0] not in COMMON]
         if system.base_excitation is not None and type(system.base_excitation.motion).name == "chirp":
             names.remove("base_excitation.striker_on_base")  # a sweep is refused under a striker in space
         if "contact.suspension_damping" in names and not system.get("contact.suspension_stiffness"):
             names.remove("contact.suspension_damping")  # of a suspension, which a mass in flight has not
-        chosen = arguments.only.split(",") if arguments.only else [name for name in names if name not in NOT_SWEPT]
-        for name in chosen:
+        for name in names:
             with tempfile.TemporaryDirectory() as folder:
                 said = try_one(system, name, Path(folder))
             count += 1

@@ -170,7 +170,7 @@ PRINTED = (
     "frequencies --modes 3",
 )
 VARYING = re.compile(
-    r"(?<=in )[\d.,]+ (?:ms|s|min|h)\b|[\d.,]+(?= runs/s)|[\d.,]+(?= kB)|(?<=\"seconds\": )[\d.e-]+"
+    r"(?<=in )[\d.,]+ (?:ms|s|min|h)\b|[\d.,]+(?:e\+\d+)?(?= runs/s)|[\d.,]+(?= kB)|(?<=\"seconds\": )[\d.e-]+"
     r"|(?<=\"snapbeam_version\": ).*"
 )
 """What differs from call to call: durations, sizes of files, the version."""

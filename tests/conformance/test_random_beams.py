@@ -103,12 +103,6 @@ def judge(tried: list[Drawn | None]) -> None:
 
 
 @pytest.mark.slow
-def test_some_beams() -> None:
-    rng = np.random.default_rng(2026)
-    judge([solved(rng) for _ in range(6)])
-
-
-@pytest.mark.slow
 def test_many_beams(request: pytest.FixtureRequest) -> None:
     rng = np.random.default_rng(int(request.config.getoption("--seed")))
     judge([solved(rng) for _ in range(int(request.config.getoption("--draws")))])

@@ -171,15 +171,14 @@ def test_going_on_loses_no_bit() -> None:
     np.testing.assert_array_equal(twice.amplitude, once.amplitude)
 
 
-@pytest.mark.slow
 def test_far_well_is_quiet() -> None:
-    """At rest in either well nothing moves, and its share of energy at high frequencies is none."""
+    """At rest in either well nothing moves, as far as the kicks and flows of a step cancel (1e-9 at level standard)."""
     model = model_of(4, rise=1.5e-5, skew=3e-6)
     for well in model.wells:
         system = sb.System(model, initial_state=sb.State(amplitude=well))
-        run = sb.simulate(system, sb.Integration(cycles=3))
+        run = sb.simulate(system, sb.Integration(cycles=3, accuracy="reference"))
         drift = np.abs(run.final_state.amplitude - well).max() / abs(model.wells[0, 0])
-        assert drift < 1e-9
+        assert drift < 1e-13
         assert run.summary.zero_crossings == 0
 
 
@@ -214,7 +213,7 @@ def random_runs(modes: int, count: int, seed: int, cycles: int) -> tuple[int, in
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("modes", "count", "cycles"), [(2, 240, 24), (1, 4000, 60), (8, 4000, 60)])
+@pytest.mark.parametrize(("modes", "count", "cycles"), [(1, 1000, 60), (8, 1000, 60)])
 def test_early_terminations(modes, count, cycles) -> None:
     decided, wrong, classes = random_runs(modes, count, 10 * modes, cycles)
     assert wrong == 0

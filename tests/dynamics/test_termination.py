@@ -8,6 +8,7 @@ from doubles import KnownMap, henon, logistic, table
 from test_orbits import system_of
 
 import snapbeam as sb
+from snapbeam.dynamics import edge_states
 from snapbeam.util import diagnostics
 
 TOLERANCES = (0.0, 1e-16, 1e300)
@@ -101,6 +102,18 @@ def test_the_edge_of_a_beam_ends_at_any_threshold() -> None:
         integration=sb.Integration(),
     )
     assert len(found.states) == 3 and "was not reached" in found.termination_reason
+
+
+def test_an_edge_that_leaves_its_orbit_names_it() -> None:
+    """The orbit 0 of the cubic map, which a path leaves after 30 periods along its unstable direction and meets again."""
+    away = 1e-4 * 6.0 ** np.arange(6)
+    path = np.zeros((60, 2))
+    path[30:36, 0], path[36:42, 0], path[50:56, 0], path[56:, 0] = away, away[::-1], away, 0.5
+    orbit, words = edge_states._settled(cubic(), path)
+    np.testing.assert_allclose(orbit.points, [[0.0, 0.0]], atol=1e-10)
+    assert words == "it settled on an orbit of period 1, and left it after 30 periods or later"
+    assert edge_states._settled(cubic(), path[:30])[1] == "it settled on an orbit of period 1"
+    assert edge_states._settled(cubic(), np.linspace([0.0, 0.0], [1.0, 1.0], 30))[0] is None
 
 
 def test_an_edge_that_is_lost_says_so() -> None:

@@ -84,7 +84,9 @@ def test_two_strikers_that_move_slowly() -> None:
         sb.Striker(drive=drive, location=float(x), gap=float(at - rest.min())) for x, at in zip(PAIR, rest, strict=True)
     ]
     with pytest.warns(sb.DiagnosticWarning, match="antisymmetric"):
-        run = sb.simulate(sb.System(model, contacts=[sb.Contact(paper.CONTACT, tips)]), sb.Integration(cycles=540))
+        run = sb.simulate(
+            sb.System(model, contacts=[sb.Contact(paper.CONTACT, tip) for tip in tips]), sb.Integration(cycles=540)
+        )
     height = run.dataset.striker_displacements.values[:, 0]
     force = run.dataset.striker_forces.values
     path = push(model, PAIR, 0.002).path

@@ -105,8 +105,13 @@ def test_the_quasi_static_optimum(tmp_path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:constraints. no reported design is known to satisfy them")
 def test_a_design_is_brought_to_its_constraint() -> None:
-    """P = 0.8 is asked: the design has 0.84 to 0.86, whose lower limit is 0.8, where it had 0.91; the distance is told."""
+    """P = 0.8 is asked: the design has 0.84 of 400 samples, whose lower limit is 0.8, where the search found 0.91.
+
+    These samples are favourable by 1.8 standard errors: 1600 others give 0.806, which leaves undecided if P >= 0.8, and
+    that is warned of.
+    """
     system = small_system(frequency_ratio=0.02, location=0.3)
     effort = sb.uncertainty.OptimizerSettings(
         generations=40, population=8, samples=40, validation_samples=400, candidates=4

@@ -278,18 +278,23 @@ def _bisect(
 
 
 def _settled(flow: Flow, path: _Array) -> tuple[PeriodicOrbit | None, str]:
-    """The unstable orbit that the last periods repeat, and what was found."""
-    tail = path[-max(4, len(path) // 3) :]
-    if len(tail) < 4:
+    """The unstable orbit that the last stretch of periods repeats that repeats at all, and what was found.
+
+    A border between basins that are interlaced has motions that leave the orbit on it and come back to it.
+    """
+    long = int(np.clip(len(path) // 3, 4, 40))
+    if len(path) < 4:
         return None, "too few periods to look for an orbit"
-    period = int(minimal_period(tail[None], _REPEATS)[0])
-    if period == 0:
-        return None, (
-            f"no orbit: the last {len(tail)} periods do not repeat to {_REPEATS:g} after {len(tail) // 2} periods or "
-            "fewer; increase periods"
-        )
+    ends = range(len(path), long - 1, -(long // 2))
+    periods = minimal_period(np.stack([path[end - long : end] for end in ends]), _REPEATS)
+    if not periods.any():
+        return None, f"no orbit: no {long} periods repeat to {_REPEATS:g} after {long // 2} or fewer; increase periods"
+    at = int(np.argmax(periods > 0))
+    period, end = int(periods[at]), ends[at]
     try:
         require_isolated_orbits(flow)
-        return shoot(flow, tail[-1], period, 1e-10), f"it settled on an orbit of period {period}"
+        orbit = shoot(flow, path[end - 1], period, 1e-10)
     except (InputError, OrbitNotFoundError) as error:
         return None, f"no orbit of period {period}: {error}"
+    left = f", and left it after {end} periods or later" if at else ""
+    return orbit, f"it settled on an orbit of period {period}{left}"
