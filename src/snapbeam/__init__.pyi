@@ -40,7 +40,6 @@ from .model.external_force import RecordedForce as RecordedForce
 from .model.force_displacement import force_displacement as force_displacement
 from .model.harvester import ElectromagneticHarvester as ElectromagneticHarvester
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester
-from .model.harvester import PiezoelectricPatches as PiezoelectricPatches
 from .model.imperfection import Imperfection as Imperfection
 from .model.integration import Integration as Integration
 from .model.local_force import CoulombFriction as CoulombFriction

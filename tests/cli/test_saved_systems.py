@@ -31,13 +31,13 @@ def matrices(**more) -> sb.ReducedModel:
     )  # fmt: skip
 
 
-def wired(wiring: str) -> list[sb.PiezoelectricPatches]:
+def wired(wiring: str) -> list[sb.model.PiezoelectricPatches]:
     rows = ((0.0, 0.22, 1.5e-4, 5e-7), (0.8, 1.0, 0.7e-4, 8e-7))
     patches = [
         sb.PiezoelectricHarvester(moment_per_volt=m, capacitance=c, resistance=1.0, patch_start=a, patch_end=b)
         for a, b, m, c in rows
     ]
-    return sb.PiezoelectricPatches.wired(patches, wiring, resistance=2e4)
+    return sb.model.PiezoelectricPatches.wired(patches, wiring, resistance=2e4)
 
 
 COIL = sb.ElectromagneticHarvester(force_factor=0.2, resistance=10.0, inductance=1e-2, location=0.3)

@@ -45,13 +45,15 @@ def test_none_is_missing() -> None:
     """Every kind of law, drive, motion of a base, load and harvester, and every parameter but those of runs.
 
     Laws with a memory are in ``test_elastic_plastic.py``.  ``test_external_force.py``, ``test_local_force.py``, ``test_shock.py``,
-    ``test_random_vibration.py`` and ``test_recorded_acceleration.py`` compare those with independent solutions.
+    ``test_random_vibration.py``, ``test_recorded_acceleration.py`` and ``model/test_wired_patches.py`` compare those with independent solutions.
     """
     others = sb.Shock, sb.RecordedAcceleration, RandomVibration
     elsewhere = {
         f"{section}.{name}" for section in ("drive", "base_excitation") for kind in others for name in quantities(kind)
     }
     elsewhere |= {f"contact.{name}" for law in LAWS.values() if law.memory for name in quantities(law)}
+    wired = {"patches", "patch_imbalance"}
+    elsewhere |= {f"harvester.{name}" for kind in wired for name in quantities(HARVESTERS[kind])}
     systems = [extended.system() for extended in SYSTEMS.values()]
     there = {(section, type(drive).name) for each in systems for section, drive in each.moving}
     there |= {("contact", type(contact.law).name) for each in systems for contact in each.contacts}
@@ -66,7 +68,7 @@ def test_none_is_missing() -> None:
         "harvester": HARVESTERS,
     }
     for section, names in known.items():
-        missing = {name for name in names if (section, name) not in there} - {kind.name for kind in others}
+        missing = {name for name in names if (section, name) not in there} - {kind.name for kind in others} - wired
         assert not missing, f"{section}: no extended system has {missing}"
     own = set().union(*(each.parameters for each in systems))
     missing = {

@@ -47,7 +47,7 @@ def linear_response(wiring: str, time: np.ndarray, start: np.ndarray) -> np.ndar
 
 @pytest.mark.parametrize("wiring", ["parallel", "series"])
 def test_a_run_has_the_voltage_of_the_separate_patches(wiring) -> None:
-    system = sb.System(MODEL, harvesters=sb.PiezoelectricPatches.wired(patches(), wiring, resistance=LOAD))
+    system = sb.System(MODEL, harvesters=sb.model.PiezoelectricPatches.wired(patches(), wiring, resistance=LOAD))
     speed = 1e-8 * np.array([1.0, -0.6, 0.3])  # small: linear
     well = system.potential.wells[0]
     state = sb.State(amplitude=well.amplitude, velocity=MODEL.linear_modes @ speed)
@@ -57,7 +57,7 @@ def test_a_run_has_the_voltage_of_the_separate_patches(wiring) -> None:
 
 
 def test_frequencies_are_those_of_the_separate_patches() -> None:
-    series = sb.System(MODEL, harvesters=sb.PiezoelectricPatches.wired(patches(), "series", resistance=LOAD))
+    series = sb.System(MODEL, harvesters=sb.model.PiezoelectricPatches.wired(patches(), "series", resistance=LOAD))
     opened, short = series.circuit_frequencies()
     separate = sb.System(MODEL, harvesters=patches())
     assert opened == pytest.approx(separate.circuit_frequencies()[0], rel=1e-12)  # no charge flows
@@ -78,12 +78,12 @@ def test_equal_patches_side_by_side_are_one(tmp_path) -> None:
         for a, b in ((0.0, 0.1), (0.1, 0.2))
     ]
     whole = sb.PiezoelectricHarvester(moment_per_volt=1e-4, capacitance=4e-7, resistance=LOAD, patch_end=0.2)
-    (both,) = sb.PiezoelectricPatches.wired(halves, resistance=LOAD)
+    (both,) = sb.model.PiezoelectricPatches.wired(halves, resistance=LOAD)
     assert both.row(MODEL) == pytest.approx(whole.row(MODEL))
     assert both.capacitance == pytest.approx(whole.capacitance)
     # a file keeps them, also those in series
     file = tmp_path / "series.toml"
-    series = sb.System(MODEL, harvesters=sb.PiezoelectricPatches.wired(halves, "series", resistance=LOAD))
+    series = sb.System(MODEL, harvesters=sb.model.PiezoelectricPatches.wired(halves, "series", resistance=LOAD))
     series.save(file)
     again = sb.System.load(file)
     assert again.poles() == pytest.approx(series.poles())
@@ -113,9 +113,9 @@ def test_constants_of_a_data_sheet() -> None:
 def test_patches_that_are_none_are_refused() -> None:
     for rows in ([], [[0.2, 0.1, 1.0]], [[0.0, 0.5]], [[-0.1, 0.5, 1.0]], [[0.0, 1.5, 1.0]]):
         with pytest.raises(InputError, match="patches"):
-            sb.PiezoelectricPatches(patches=rows, capacitance=1e-9, resistance=1.0)
+            sb.model.PiezoelectricPatches(patches=rows, capacitance=1e-9, resistance=1.0)
     with pytest.raises(InputError, match="one patch"):
-        sb.PiezoelectricPatches.wired([], resistance=1.0)
+        sb.model.PiezoelectricPatches.wired([], resistance=1.0)
 
 
 FILE = """
@@ -150,7 +150,7 @@ resistance = 10
 def test_a_file_wires_patches(tmp_path, wiring) -> None:
     file = tmp_path / "wired.toml"
     file.write_text(FILE.format(wiring=f'"{wiring}"', capacitance='["500 nF", 3e-7, "0.8 uF"]'))
-    system, expected = sb.System.load(file), sb.PiezoelectricPatches.wired(patches(), wiring, resistance=LOAD)
+    system, expected = sb.System.load(file), sb.model.PiezoelectricPatches.wired(patches(), wiring, resistance=LOAD)
     first, coil, *rest = system.harvesters
     assert system == system.replace(harvesters=[expected[0], coil, *expected[1:]])
     assert [type(each) for each in (first, *rest)] == [type(each) for each in expected]

@@ -83,7 +83,7 @@ def equilibria(
     variable: Annotated[
         str | None,
         typer.Option(
-            help="What --plot draws over the parameter: midspan_displacement (default) or natural_frequency.",
+            help="Variable that --plot draws over the parameter: midspan_displacement (default) or natural_frequency.",
             rich_help_panel="Branches over a parameter",
             metavar="NAME",
         ),

@@ -4,6 +4,7 @@ from .contact.stress import bending_stress as bending_stress
 from .contact.stress import hertz_stress as hertz_stress
 from .equilibrium_branches import equilibrium_branches as equilibrium_branches
 from .external_force import HalfSineForce as HalfSineForce
+from .harvester import PiezoelectricPatches as PiezoelectricPatches
 from .imperfection_identification import identify_imperfection as identify_imperfection
 from .modal_convergence import converged_modes as converged_modes
 from .modal_convergence import modal_error as modal_error

@@ -348,7 +348,7 @@ class PiezoelectricPatches(_Layers):
     --------
     >>> import snapbeam as sb
     >>> both = [[0.0, 0.25, 1e-5], [0.75, 1.0, 1e-5]]
-    >>> harvester = sb.PiezoelectricPatches(patches=both, capacitance=120e-9, resistance=1e5)
+    >>> harvester = sb.model.PiezoelectricPatches(patches=both, capacitance=120e-9, resistance=1e5)
     """
 
     patches: Any = quantity("1", "ends over the length and moment per volt of every patch", kind=object)
@@ -403,7 +403,7 @@ class PiezoelectricPatches(_Layers):
         ...     )
         ...     for x in (0.0, 0.8)
         ... )
-        >>> wired = sb.PiezoelectricPatches.wired([left, right], "series", resistance=1e5)
+        >>> wired = sb.model.PiezoelectricPatches.wired([left, right], "series", resistance=1e5)
         >>> print([f"{1e9 * each.capacitance:.0f} nF" for each in wired])
         ['30 nF', '30 nF']
         """

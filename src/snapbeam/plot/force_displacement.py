@@ -141,7 +141,7 @@ def _critical(dataset: xr.Dataset, ax: Axes, prefix_w: float, prefix_f: float) -
 
 
 BRANCH_FIGURES = ("midspan_displacement", "natural_frequency")
-"""What :func:`plot_equilibrium_branches` draws over a parameter."""
+"""Variables that :func:`plot_equilibrium_branches` draws over a parameter."""
 
 
 @checked

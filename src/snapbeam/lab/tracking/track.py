@@ -459,7 +459,7 @@ class _Background:
         self.found.append(np.where(row - self.margin >= self.rows.stop - 1.0, both, np.nan))
 
     def moves(self, numbers: NDArray[np.int64]) -> Floats:
-        """What the background moves in each frame [px], with the noise of that; 0 where it stands still or is not seen."""
+        """Displacement of the background in each frame [px], with its noise; 0 where it stands still or is not seen."""
         moves: Floats = np.zeros(int(numbers[-1]) + 1)
         if not self.found:
             return moves
