@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
+from snapbeam.model.contact.base import LAWS
 from snapbeam.model.quantity import RUN
 from snapbeam.util.validation import InputError
 
@@ -63,26 +64,31 @@ def test_words_are_no_threshold_and_frequencies_are_about_an_equilibrium() -> No
     assert loaded.replace(initial_well="unforced").poles() == pytest.approx(loaded.poles())
 
 
-@dataclass(frozen=True, kw_only=True)
-class BrokenStop(sb.ContactLaw):
-    """A law of one's own whose force is no number beyond a penetration."""
+@pytest.fixture
+def broken_stop():
+    """A law of one's own whose force is no number beyond a penetration; taken back afterwards."""
 
-    softness: float = sb.quantity("N/m", "constant", low=0.0, scope=RUN)
-    name = "broken_stop_of_a_test"
+    @dataclass(frozen=True, kw_only=True)
+    class BrokenStop(sb.ContactLaw):
+        softness: float = sb.quantity("N/m", "constant", low=0.0, scope=RUN)
+        name = "broken_stop_of_a_test"
 
-    def time_scale(self, mass, velocity):
-        return 1e-5
+        def time_scale(self, mass, velocity):
+            return 1e-5
 
-    @staticmethod
-    def force(law, penetration):
-        return law.softness * penetration * (1.0 if penetration < 1e-8 else math.nan)
+        @staticmethod
+        def force(law, penetration):
+            return law.softness * penetration * (1.0 if penetration < 1e-8 else math.nan)
+
+    yield BrokenStop
+    del LAWS[BrokenStop.name]
 
 
-def test_a_run_that_fails_for_another_reason_is_no_pull_in() -> None:
+def test_a_run_that_fails_for_another_reason_is_no_pull_in(broken_stop) -> None:
     """A stop that breaks the runs before the plate reaches the electrode: they failed."""
     values = SWITCHED * np.array([0.3, 0.9, 1.05])
     stop = sb.Striker(drive=sb.FixedStop(), side="above", gap=0.1 * GAP)
-    for contacts, failed in (([], 0), ([sb.Contact(BrokenStop(softness=1.0), stop)], 2)):
+    for contacts, failed in (([], 0), ([sb.Contact(broken_stop(softness=1.0), stop)], 2)):
         system = plate(initial_well="unforced", contacts=contacts)
         found = sb.threshold(system, "force.voltage", values, integration=sb.Integration(cycles=40))
         assert (found["status"] == sb.RunStatus.DIVERGED).values.tolist() == [False, failed > 0, True]
