@@ -615,7 +615,7 @@ class Potential:
         rates, axes = np.linalg.eigh(bend) if np.isfinite(bend).all() else (np.ones(1), np.eye(1))
         if (
             rates[0] < 0.0
-            and np.abs(modes @ np.linalg.lstsq(bend, modes.T @ self._gradient(start))[0]).max() <= _SAME * size
+            and np.abs(modes @ np.linalg.pinv(bend, hermitian=True) @ modes.T @ self._gradient(start)).max() <= _SAME * size
         ):
             away = modes @ axes[:, 0]
             away *= 1e-3 * size / np.abs(away).max() * math.copysign(1.0, float(self.model.midspan_shape @ away))

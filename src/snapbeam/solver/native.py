@@ -196,12 +196,19 @@ class _Arrays:
             "order": np.argsort(-ensemble.work, kind="stable").astype(np.int32),
             "outputs": 0,
             "states": np.zeros((ensemble.size, 0, 2 * n + 1 + 2 * channels.laws.size)),
-            "statistics": np.full((ensemble.size, len(STATISTICS)), np.nan),
-            "of_channels": np.zeros((ensemble.size, channels.laws.size, len(OF_CHANNEL))),
-            "held": np.tile([float(row.start) for row in self.updated], (ensemble.size, 1)),
+            "statistics": np.empty((ensemble.size, len(STATISTICS))),
+            "of_channels": np.empty((ensemble.size, channels.laws.size, len(OF_CHANNEL))),
+            "held": np.empty((ensemble.size, len(self.updated))),
             "account": 0,
         }
+        self.begin()
+
+    def begin(self) -> None:
+        """Outputs as they are before a run."""
+        self.batch["statistics"].fill(np.nan)
         self.batch["statistics"][:, 0] = -1.0
+        self.batch["of_channels"].fill(0.0)
+        self.batch["held"][:] = [float(row.start) for row in self.updated]
 
     def modes_of(self, states: _Array, laws: _Array) -> tuple[_Array, _Array]:
         """q and p of the structure, of those in the core and of the states of laws, shape (..., channels)."""
@@ -478,46 +485,58 @@ def record(
     ensemble: Ensemble, times: _Array, in_contact: bool, progress: Callable[[float], object] | None = None
 ) -> Iterator[Recorded]:
     """Integrate the one run of an ensemble once, and return its records, one part after the other."""
-    arrays = _Arrays(ensemble)
-    n = arrays.order.size
-    channels: Channels = arrays.channels
-    arrays.batch["account"], arrays.batch["outputs"] = 1, 1
-    arrays.batch["run"][:, RUN.index("output_interval")] = arrays.batch["run"][:, RUN.index("end")]
-    count = channels.laws.size
-    arrays.batch["states"] = np.full((1, 1, 2 * n + 1 + 2 * count), np.nan)
-    # one step may hold many instants
-    span = 2.0 * float(ensemble.step_times[0])
-    most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
-    width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
-    samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // width), most + 8)
-    saved = np.zeros(
-        (3 * (n + 64) + count * (11 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
-    )
-    recorder: dict[str, Any] = {
-        "times": np.ascontiguousarray(times, dtype=float),
-        "in_contact": int(in_contact),
-        "rows": np.empty((samples, 2 * n)),
-        "values": np.empty((samples, OF_SAMPLE + CHANNEL_SAMPLE * count)),
-        "impacts": np.empty((_IMPACTS + count, 5)),
-        "marks": np.zeros(5, dtype=np.dtype("l")),
-        "saved": saved,
-        "budget": _BUDGET,
-    }
-    layout = "modes" if n > FEW_MODES else "thread"
-    layout = os.environ.get("SNAPBEAM_LAYOUT") or layout
-    while True:
-        _core.record(arrays.problem, arrays.batch, recorder, layout, instruction_set())
-        arrays.check()
+    return Recording(ensemble, times, in_contact).pieces(progress)
+
+
+class Recording:
+    """The one run of an ensemble, ready to be integrated any number of times."""
+
+    def __init__(self, ensemble: Ensemble, times: _Array, in_contact: bool) -> None:
+        self.arrays = arrays = _Arrays(ensemble)
+        n = arrays.order.size
+        channels: Channels = arrays.channels
+        arrays.batch["account"], arrays.batch["outputs"] = 1, 1
+        arrays.batch["run"][:, RUN.index("output_interval")] = arrays.batch["run"][:, RUN.index("end")]
+        count = channels.laws.size
+        arrays.batch["states"] = np.empty((1, 1, 2 * n + 1 + 2 * count))
+        # one step may hold many instants
+        span = 2.0 * float(ensemble.step_times[0])
+        most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
+        width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
+        samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // width), most + 8)
+        saved = (3 * (n + 64) + count * (11 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
+        self.recorder: dict[str, Any] = {
+            "times": np.ascontiguousarray(times, dtype=float),
+            "in_contact": int(in_contact),
+            "rows": np.empty((samples, 2 * n)),
+            "values": np.empty((samples, OF_SAMPLE + CHANNEL_SAMPLE * count)),
+            "impacts": np.empty((_IMPACTS + count, 5)),
+            "marks": np.zeros(5, dtype=np.dtype("l")),
+            "saved": np.zeros(saved),
+            "budget": _BUDGET,
+        }
+        self.layout = os.environ.get("SNAPBEAM_LAYOUT") or ("modes" if n > FEW_MODES else "thread")
+        self.set = instruction_set()
+
+    def pieces(self, progress: Callable[[float], object] | None = None) -> Iterator[Recorded]:
+        """Integrate the run from its beginning, and return its records, one part after the other."""
+        arrays, recorder = self.arrays, self.recorder
+        arrays.begin()
+        arrays.batch["states"].fill(np.nan)
         marks = recorder["marks"]
-        accumulators = arrays.accumulators()
-        held, impacts = int(marks[1]), int(marks[2])
-        running = accumulators["status"][0] == RunStatus.INTERRUPTED
-        yield _recorded(arrays, recorder, held, impacts, accumulators)
-        if progress is not None:
-            progress(float(accumulators["time"][0]) / float(ensemble.runs["end"][0]))
-        if not running:
-            return
-        marks[1] = marks[2] = 0
+        marks.fill(0)
+        while True:
+            _core.record(arrays.problem, arrays.batch, recorder, self.layout, self.set)
+            arrays.check()
+            accumulators = arrays.accumulators()
+            held, impacts = int(marks[1]), int(marks[2])
+            running = accumulators["status"][0] == RunStatus.INTERRUPTED
+            yield _recorded(arrays, recorder, held, impacts, accumulators)
+            if progress is not None:
+                progress(float(accumulators["time"][0]) / float(arrays.ensemble.runs["end"][0]))
+            if not running:
+                return
+            marks[1] = marks[2] = 0
 
 
 def _recorded(arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: Records) -> Recorded:
