@@ -24,6 +24,8 @@ from snapbeam.solver.assemble import make_ensemble, run_columns
 from snapbeam.solver.native import Recording, integrate_with_output_states
 
 PACKAGE = "snapbeam"
+_MANY: dict[tuple[Any, ...], Any] = {}
+"""What ensembles are assembled from, by case and setting: only amplitudes differ."""
 
 
 def settings(case: Case) -> list[dict[str, Any]]:
@@ -181,7 +183,10 @@ def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
 def solve_many(cases: Sequence[Case], setting: dict[str, Any]) -> list[Array]:
     """Outputs of cases that differ in the amplitude of the first tip, as one ensemble."""
     case = cases[0]
-    run, origin = _prepared(case, setting)
+    known = case.name, case.horizon, *setting.values()
+    if known not in _MANY:
+        _MANY[known] = _prepared(case, setting)
+    run, origin = _MANY[known]
     columns = {"drive.displacement_amplitude": np.array([each.tips[0].amplitude for each in cases])}
     ensemble = make_ensemble(run.system, run.integration, run_columns(run.system, columns), plan=run.plan)
     table = ensemble.runs

@@ -612,11 +612,10 @@ class Potential:
         """
         size, start = np.abs(self.size).max(), self._start_of_descent(alpha)
         bend, modes = self._in_modes(self._tangent(start)), self.model.linear_modes
-        rates, axes = np.linalg.eigh(bend) if np.isfinite(bend).all() else (np.ones(1), np.eye(1))
-        if (
-            rates[0] < 0.0
-            and np.abs(modes @ np.linalg.pinv(bend, hermitian=True) @ modes.T @ self._gradient(start)).max() <= _SAME * size
-        ):
+        rates, axes = np.linalg.eigh(bend) if np.isfinite(bend).all() else (np.ones(len(modes)), np.eye(len(modes)))
+        slope = axes.T @ (modes.T @ self._gradient(start)) if rates[0] < 0.0 else rates
+        newton = modes @ axes @ np.divide(slope, rates, out=np.zeros_like(slope), where=rates != 0.0)
+        if rates[0] < 0.0 and np.abs(newton).max() <= _SAME * size:
             away = modes @ axes[:, 0]
             away *= 1e-3 * size / np.abs(away).max() * math.copysign(1.0, float(self.model.midspan_shape @ away))
             start = start + away if side == "above" else start - away
