@@ -10,6 +10,7 @@ import itertools
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -160,3 +161,24 @@ def test_energies_over_impacts_do_not_depend_on_the_step():
     assert (runs[0].impacts > 3).all()
     high = [run.high_frequency_energy_fraction.values for run in runs]
     np.testing.assert_allclose(high[0], high[1], rtol=1e-6)
+
+
+def test_a_chaotic_table_to_rounding() -> None:
+    """A ball on a vibrating table, exact flights between impacts: small errors grow by 1e9 over eleven impacts."""
+    speed, table, e = 4.0, 0.2, 0.8  # units of the ball: g = 1
+    model = sb.ReducedModel.from_matrices([[1.0]], [0.0], contact_shape=[1.0], reference_frequency=1.0 / (2.0 * np.pi))
+    weight = sb.ExternalForce(history=sb.ConstantForce(force=-1.0))
+    tip = sb.Striker(drive=sb.DisplacementSine(frequency_ratio=speed, displacement_amplitude=table), gap=0.0)
+    start = sb.State(amplitude=[0.5], velocity=[0.0])
+    system = sb.System(model, contacts=[sb.Contact(sb.Restitution(e), tip)], forces=[weight], initial_state=start)
+    run = sb.simulate(system, sb.Integration(cycles=20), sample_times=np.arange(0.0, 31.0, 0.5))
+    t0, x0, v0 = 0.0, 0.5, 0.0
+    impacts = run.impacts["onset"].values
+    grid = np.linspace(0.0, 5.0, 20_001)
+    for found in impacts[:6]:
+        gap = lambda s: x0 + v0 * s - 0.5 * s * s - table * np.sin(speed * (t0 + s))  # noqa: B023, E731
+        first = int(np.flatnonzero((gap(grid[1:]) < 0.0) & (grid[1:] > 1e-6))[0])
+        s = brentq(gap, grid[first], grid[first + 1], xtol=1e-16)
+        w = table * speed * np.cos(speed * (t0 + s))
+        x0, v0, t0 = x0 + v0 * s - 0.5 * s * s, w - e * (v0 - s - w), t0 + s
+        assert found == pytest.approx(t0, abs=3e-11)

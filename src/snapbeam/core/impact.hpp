@@ -63,8 +63,11 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
     Runs<L> &z = runs.z;
     Channel<L> &c = z.channel[number];
     const int n = z.s->size();
-    const Number zero = Number(0.0), M = c.M[number], tip = signal_slope(z, c), r = c.r0, away = c.P[0] * r, bounce = select(on, (r + away) / M, zero);
-    for (int i = 0; i < n; ++i) z.p[i] = fma(typename L::Cell(bounce), c.row[i], z.p[i]);
+    const Number zero = Number(0.0), M = c.M[number], tip = signal_slope(z, c);
+    // the tick is later than the zero of the gap: the rate was another one there, and the beam has gone on with its new velocity
+    const Number late = select(on, c.d0 / c.r0, zero), r = c.r0 - late * pressed_by(z, c, z.q, z.p, z.k);
+    const Number away = c.P[0] * r, bounce = select(on, (r + away) / M, zero);
+    for (int i = 0; i < n; ++i) z.p[i] = fma(typename L::Cell(bounce), c.row[i], z.p[i]), z.q[i] = fma(typename L::Cell(bounce * late), c.row[i], z.q[i]);
     const Number pressed = pressed_by(z, c, z.q, z.p, z.k);
     const Number height = Number(0.5) * away * away / max(pressed, Number(1e-300)), lasts = Number(2.0) * away / max(pressed * (Number(1.0) - c.P[0]), Number(1e-300));
     const Real soon = Real(6.283185307179586 * SOON / runs.s->fastest);
@@ -85,7 +88,7 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
         row[IMPACT_CHANNEL] = number, row[IMPACT_ONSET] = lane(z.t, 0) * lane(z.tick, 0), row[IMPACT_DURATION] = 0.0;
         row[IMPACT_FORCE] = NAN, row[IMPACT_IMPULSE] = lane(value(impulse), 0);
     }
-    assign(on, c.d0, zero), assign(on, c.r0, -left), assign(on, c.safe, z.t);
+    assign(on, c.d0, -left * late), assign(on, c.r0, -left), assign(on, c.safe, z.t);
     for (int j = 0; j < z.channels; ++j) {  // rates of the other ones; what was held together there may part
         Channel<L> &other = z.channel[j];
         if (!other.contact || j == number) continue;
