@@ -88,16 +88,6 @@ def test_numbers_of_the_comparison():
     assert f"SciPy {min(scipy):.0f} to {max(scipy):.0f}" in PLAIN
 
 
-def test_numbers_of_short_runs():
-    """The ratios of single runs in the tables of Impact-20; ``replicas`` and ``threshold`` are many runs."""
-    table = (ROOT / "impact20" / "results" / "table.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (\w+), \w+ \| ([\d.]+) \| [\w.]+ \|$", table, re.MULTILINE)
-    assert {"replicas", "threshold"} < {name for name, _ in rows}
-    single = [float(value) for name, value in rows if name not in ("replicas", "threshold")]
-    words = f"{min(single):.1f} to {max(single):.0f} times"
-    assert f"takes {words} less time" in PLAIN
-    assert f"takes {words} as long" in (ROOT / "impact20" / "README.md").read_text(encoding="utf-8")
-
 
 def test_numbers_of_the_claims():
     words = json.loads((ROOT / "docs" / "data" / "claims.json").read_text(encoding="utf-8"))["summary"]
