@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from snapbeam.util.diagnostics import Diagnostic, Severity
@@ -18,6 +19,11 @@ class Kind(NamedTuple):
         """The diagnostic with its numbers, in words; *told* stands for ``{told}`` in them."""
         words = self.says.format(told=told, **numbers)
         return Diagnostic(self.code, words, numbers, severity or self.severity)
+
+
+def holding(kinds: Mapping[str, Kind], *checks: tuple[str, bool, Mapping[str, float]]) -> list[Diagnostic]:
+    """The diagnostics whose condition holds, of names, conditions and numbers."""
+    return [kinds[name].found(None, "", **numbers) for name, holds, numbers in checks if holds]
 
 
 def table(group: str, **words: dict[str, str]) -> dict[str, Kind]:

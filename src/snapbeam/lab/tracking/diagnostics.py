@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from snapbeam.lab.diagnostics import table
+from snapbeam.lab.diagnostics import holding, table
 from snapbeam.lab.tracking.frame_order import FrameOrder
 from snapbeam.lab.tracking.measure import Rest, Touch, TrackedRows
 from snapbeam.lab.tracking.rulers import Ruler, compare_rulers, option_name, seen_rulers
@@ -169,23 +169,32 @@ def tracking_diagnostics(
     told = [*_of_the_beam(scene, seen), *_of_the_scale(scene, seen, settings)]
     told += [*_of_the_rest(seen, settings, offset_mm)]
     told += [*_of_the_motion(seen, settings, rate), *_of_the_order(seen.order, rate)]
-    if seen.trail > 0.0:
-        told.append(KINDS["lag"].found(share_percent=100.0 * seen.trail))
-    if seen.pulse > 0.0:
-        told.append(KINDS["pulse"].found(frames=seen.pulse))
-    if seen.rows.hollow > 0.0:
-        told.append(KINDS["curved"].found(hollow_px=seen.rows.hollow))
+    told += holding(
+        KINDS,
+        ("lag", seen.trail > 0.0, {"share_percent": 100.0 * seen.trail}),
+        ("pulse", seen.pulse > 0.0, {"frames": seen.pulse}),
+        ("curved", seen.rows.hollow > 0.0, {"hollow_px": seen.rows.hollow}),
+    )
     told += _of_the_edges(scene.shape, settings)
-    told += _of_the_pixels(scene, seen.fields)
+    noise, shift = scene.noise, rounding_shift(scene.beam)
+    alike = {"correlation": max(noise.along, noise.across), "factor": noise.factor, "made_px": noise.made_up}
+    told += holding(
+        KINDS,
+        ("interlaced", seen.fields.apart > 0.0, {"share": seen.fields.apart}),
+        ("fields", seen.fields.shift > 0.0, {"shift_px": seen.fields.shift}),
+        ("averaged", noise.lag > 0.0, {"correlation": noise.in_time, "lag": noise.lag}),
+        ("smoothed", noise.factor > 1.0 or noise.across > 0.0, alike),
+        ("few_levels", shift > 0.0, {"levels": scene.beam.contrast, "shift_px": shift}),
+    )
     told += _of_the_frames(seen.rows)
     if scene.shaker is not None:
         told += _of_the_tip(scene, seen)
-    if scene.striker_in_view:
-        told.append(KINDS["striker_in_view"].found())
-    if seen.moves > 0.0:
-        told.append(KINDS["background_moves"].found(shift_px=seen.moves))
-    if seen.drift > 0.05:
-        told.append(KINDS["drift"].found(drift_px=seen.drift))
+    told += holding(
+        KINDS,
+        ("striker_in_view", scene.striker_in_view, {}),
+        ("background_moves", seen.moves > 0.0, {"shift_px": seen.moves}),
+        ("drift", seen.drift > 0.05, {"drift_px": seen.drift}),
+    )
     return tuple(told)
 
 
@@ -300,27 +309,7 @@ def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Diagnost
         gamma = settings.gamma * shape.gamma
         error = settings.gamma * shape.gamma_se
         return [KINDS["gamma"].found(gamma=gamma, error=error, shift_px=2.0 * abs(shape.shift))]
-    if shape.misfit > 0.03:
-        return [KINDS["edge_shape"].found(misfit_percent=100.0 * shape.misfit)]
-    return []
-
-
-def _of_the_pixels(scene: Scene, fields: VideoFields) -> list[Diagnostic]:
-    told = []
-    if fields.apart > 0.0:
-        told.append(KINDS["interlaced"].found(share=fields.apart))
-    if fields.shift > 0.0:
-        told.append(KINDS["fields"].found(shift_px=fields.shift))
-    noise = scene.noise
-    if noise.lag > 0.0:
-        told.append(KINDS["averaged"].found(correlation=noise.in_time, lag=noise.lag))
-    if noise.factor > 1.0 or noise.across > 0.0:
-        alike = max(noise.along, noise.across)
-        told.append(KINDS["smoothed"].found(correlation=alike, factor=noise.factor, made_px=noise.made_up))
-    shift = rounding_shift(scene.beam)
-    if shift > 0.0:
-        told.append(KINDS["few_levels"].found(levels=scene.beam.contrast, shift_px=shift))
-    return told
+    return holding(KINDS, ("edge_shape", shape.misfit > 0.03, {"misfit_percent": 100.0 * shape.misfit}))
 
 
 def _of_the_frames(rows: TrackedRows) -> list[Diagnostic]:
@@ -355,20 +344,16 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
         # the sticker's own upper edge over the beam
         nearest = float(np.nanmin(gap)) - shaker.tip_offset - 0.5 * shaker.sticker.thickness
         told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
-    if shaker.turn:
-        told.append(KINDS["turned"].found(angle=math.degrees(math.atan(shaker.turn))))
-    if shaker.cut:
-        told.append(KINDS["rod_cut"].found())
-    if shaker.loose > 0.0:
-        told.append(KINDS["sticker_loose"].found(swing_px=shaker.loose))
     closest = never_touching(seen.penetration, seen.rows)
-    if closest > 0.0:
-        told.append(KINDS["no_contact" if shaker.certain else "never_touches"].found(gap_px=closest))
-    if contact_shift(seen.touch, scene.placed_error) > 0.0:
-        told.append(KINDS["contact_offset"].found(depth_px=seen.touch.penetration, error_px=seen.touch.error))
+    offset = {"depth_px": seen.touch.penetration, "error_px": seen.touch.error}
     with np.errstate(invalid="ignore"):
-        deep = seen.penetration - 5.0 * error > 1.0
-    if np.count_nonzero(deep) >= 3:
-        depth = float(np.nanmax(np.where(deep, seen.penetration, np.nan)))
-        told.append(KINDS["inside"].found(depth_px=depth, frames=int(np.count_nonzero(deep))))
-    return told
+        deep = seen.penetration[seen.penetration - 5.0 * error > 1.0]
+    return told + holding(
+        KINDS,
+        ("turned", shaker.turn != 0.0, {"angle": math.degrees(math.atan(shaker.turn))}),
+        ("rod_cut", shaker.cut, {}),
+        ("sticker_loose", shaker.loose > 0.0, {"swing_px": shaker.loose}),
+        ("no_contact" if shaker.certain else "never_touches", closest > 0.0, {"gap_px": closest}),
+        ("contact_offset", contact_shift(seen.touch, scene.placed_error) > 0.0, offset),
+        ("inside", deep.size >= 3, {"depth_px": float(deep.max(initial=0.0)), "frames": deep.size}),
+    )
