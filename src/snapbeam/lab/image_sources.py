@@ -443,21 +443,17 @@ class ArraySource(FrameSource):
 
 def take_header(source: FrameSource, header: CameraHeader) -> None:
     """Copy times and scales of a header to a source."""
-    source.frame_rate = header.timing.frame_rate
-    source.frame_rate_question = header.timing.question
-    source.pixel_size = header.pixel_size
-    source.pixel_size_hint = header.scale_hint
-    source.exposure = header.timing.exposure
-    source.diagnostics = header.diagnostics
+    source.frame_rate, source.frame_rate_question = header.frame_rate, header.question
+    source.pixel_size, source.pixel_size_hint = header.pixel_size, header.scale_hint
+    source.exposure = header.exposure
+    source.diagnostics = (*header.diagnostics, *source.diagnostics)
     source.metadata = {
         "format": "Photron mraw" if not header.image_suffix else f"Photron header of {header.image_suffix} images",
-        "camera": header.camera,
-        "comment": header.comment,
         "date": header.recorded,
-        "record_rate": header.timing.record_rate,
-        "skip": header.timing.skip,
-        "stored_bits": header.stored_bits,
-        "effective_bits": header.effective_bits,
+        **{
+            name: getattr(header, name)
+            for name in ("camera", "comment", "record_rate", "skip", "stored_bits", "effective_bits")
+        },
     }
 
 
@@ -560,9 +556,7 @@ def images_of_header(header: CameraHeader) -> FrameSource:
             f"{header.path}: says {header.frame_count} frames of {header.height} x {header.width} pixels; beside it "
             f"are {len(own)} {header.image_suffix} images of {source.shape[0]} x {source.shape[1]}"
         )
-    found = source.diagnostics
     take_header(source, header)
-    source.diagnostics += found
     if source.max_value > header.max_value and header.effective_side == "lower":
         source.max_value = header.max_value
     return source

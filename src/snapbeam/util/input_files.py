@@ -26,11 +26,11 @@ def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_
     """Return the contents of a regular file, *name* in refusals, of at most *largest* bytes."""
     file = file_path(name, path)
     try:
-        kind = file.stat().st_mode
-        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
+        found = file.stat()
+        if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
             raise InputError(f"{name} = {str(path)!r}: must be a regular file, not a device or a pipe")
         with file.open("rb") as stream:
-            data = stream.read(largest + 1)
+            data = stream.read(min(largest, max(found.st_size, 2**16)) + 1)  # which allocates as much
     except OSError as error:
         raise InputError(f"{name} = {str(path)!r}: cannot be read, {error.strerror or error}") from error
     if len(data) > largest:
