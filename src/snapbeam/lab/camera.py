@@ -57,15 +57,10 @@ class Recording:
     --------
     >>> import numpy as np
     >>> from snapbeam import lab
-    >>> time = np.arange(60) / 10e3  # s
-    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
-    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
-    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
-    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
-    >>> recording.frame_rate
-    10000.0
+    >>> np.save("frames.npy", np.zeros((5, 64, 64), dtype=np.uint8))
+    >>> with lab.open_recording("frames.npy", frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     print(len(recording), recording.shape)
+    5 (64, 64)
     """
 
     def __init__(
@@ -215,15 +210,10 @@ def open_recording(
     --------
     >>> import numpy as np
     >>> from snapbeam import lab
-    >>> time = np.arange(60) / 10e3  # s
-    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
-    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
-    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
-    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
-    >>> recording.pixel_size
-    1.2e-05
+    >>> np.save("frames.npy", np.zeros((5, 64, 64), dtype=np.uint8))
+    >>> with lab.open_recording("frames.npy", frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     print(recording.frame(4).max())
+    0
     """
     path = file_path("path", path)
     source = open_source(path)

@@ -35,10 +35,6 @@ def table(group: str, **words: dict[str, str]) -> dict[str, Kind]:
     }
 
 
-# ----------------------------------------------------------------------------------------------------
-# Camera and vibrometer against each other: direction, amplitude, clocks.
-
-
 KINDS_ALIGNMENT = table(
     "alignment",
     info={
@@ -56,11 +52,6 @@ KINDS_ALIGNMENT = table(
         "(--amplitude-from) camera takes the camera's",
     },
 )
-
-
-# ----------------------------------------------------------------------------------------------------
-# A calibrated beam against its data: what they determine, where they contradict each other or the model.
-
 
 KINDS_CALIBRATION = table(
     "calibration",
@@ -99,11 +90,6 @@ KINDS_CALIBRATION |= table(
     },
 )
 
-
-# ----------------------------------------------------------------------------------------------------
-# A measured run beside a simulated one: do the two shakers do the same.
-
-
 KINDS_COMPARISON = table(
     "comparison",
     info={
@@ -129,11 +115,6 @@ KINDS_COMPARISON = table(
         "classes, if {told}: look at the columns of the table and at their units",
     },
 )
-
-
-# ----------------------------------------------------------------------------------------------------
-# A free decay against itself: was it free, was it whole, does the model say it all.
-
 
 KINDS_DECAY = table(
     "decay",
@@ -195,11 +176,6 @@ KINDS_DECAY = table(
     },
 )
 
-
-# ----------------------------------------------------------------------------------------------------
-# A recording's file against itself: times that contradict each other, pictures that were not kept as taken.
-
-
 LOSSY_ERROR = 0.15
 """Standard error [px] of an edge in a video that throws detail away; measured 0.06 to 0.14 px."""
 
@@ -227,11 +203,6 @@ KINDS_RECORDING = table(
     },
 )
 
-
-# ----------------------------------------------------------------------------------------------------
-# A frequency response against the length of its record and the noise.
-
-
 KINDS_RESPONSE = table(
     "response",
     warning={
@@ -245,11 +216,6 @@ KINDS_RESPONSE = table(
     },
 )
 
-
-# ----------------------------------------------------------------------------------------------------
-# A file of a time series against its own header.
-
-
 KINDS_SIGNAL = table(
     "signal",
     warning={
@@ -260,11 +226,6 @@ KINDS_SIGNAL = table(
         "records were appended, which need not follow the first without a gap; save each record to a file of its own",
     },
 )
-
-
-# ----------------------------------------------------------------------------------------------------
-# A vibrometer's record against itself and against what was set.
-
 
 KINDS_VIBROMETER = table(
     "vibrometer",

@@ -333,12 +333,7 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         time = is_time(split_unit(last)[0])
         for _, values in () if time else around[1:]:
             _refuse_scales(name, data, values)
-        rates = {
-            f"{place}/{key}".lstrip("/"): rate
-            for place, values in (() if time else around)
-            for key, value in values.items()
-            if (rate := _rate_of(key, value)) is not None
-        }
+        rates = _stated_rates(() if time else around)
         rows = np.atleast_2d(_unpacked(name, data, item.attributes))
         rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
         for k, row in enumerate(rows):
@@ -912,10 +907,20 @@ def header_rate(
 
     *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
     """
-    found = {
-        key: rate for key, value in values.items() if (rate := _rate_of(key, value, decimal_comma, known)) is not None
-    }
+    found = _stated_rates([("", values)], decimal_comma, known)
     return _one_rate(found, f"{where}: the header") if found else None
+
+
+def _stated_rates(
+    levels: Iterable[tuple[str, Mapping[str, Any]]], decimal_comma: bool = False, known: float | None = None
+) -> dict[str, float]:
+    """Sampling rates [Hz] that the named values of some places state, by their places and names."""
+    return {
+        f"{place}/{key}".lstrip("/"): rate
+        for place, values in levels
+        for key, value in values.items()
+        if (rate := _rate_of(key, value, decimal_comma, known)) is not None
+    }
 
 
 def _one_rate(found: Mapping[str, float], where: str) -> float:
@@ -1132,12 +1137,8 @@ def read_tdms(path: Path, _told: Told) -> list[Channel]:
                 continue
             unit = next((str(entry.properties[k]) for k in UNIT_NAMES if entry.properties.get(k)), None)
             channel: Channel = {"data": data, "name": f"{group.name}/{entry.name}", "unit_str": unit}
-            rates = {
-                f"{place}{key}": rate
-                for place, level in (("", entry), (f"{group.name}/", group), ("file/", file))
-                for key, value in level.properties.items()
-                if (rate := _rate_of(key, value)) is not None
-            }
+            levels = (("", entry), (group.name, group), ("file", file))
+            rates = _stated_rates((place, level.properties) for place, level in levels)
             if rates:
                 channel["fs"] = _one_rate(rates, channel["name"])
                 channel["time_offset"] = float(entry.properties.get("wf_start_offset", 0.0))

@@ -220,12 +220,10 @@ def fit_sine(
     t = time - middle
     where, target = t[used], y[used]
     omega = 2.0 * math.pi * guess
-    for _ in range(1 if fixed else 30):
+    for _ in range(0 if fixed else 30):
         design = sines(where, omega / (2.0 * math.pi) * np.arange(1, count + 1))
         solution = solve(design, target)
         slope = _slope(where, design, solution)
-        if fixed:
-            break
         step = solve(np.column_stack((design, slope)), target - design @ solution)[-1]
         limit = math.pi / span
         omega += float(np.clip(step, -limit, limit))

@@ -65,12 +65,6 @@ def found_edges(dataset: xr.Dataset, index: int, shape: tuple[int, int]) -> list
     return lines
 
 
-def flag_words(flags: int) -> str:
-    """The flags of a frame in words."""
-    names = [str(flag.name).lower().replace("_", " ") for flag in FrameFlag if flag and flag in FrameFlag(flags)]
-    return ", ".join(names) or "measured"
-
-
 def _check_pair(recording: Recording, dataset: xr.Dataset, index: int) -> tuple[int, int]:
     """The dataset's index and the recording's for one frame of the dataset."""
     index = integer("frame", index, 0, dataset.sizes["time"] - 1)
@@ -101,7 +95,7 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
             axes.plot(columns, rows, style, color=color, lw=1.2, label=None if name in seen else name)
             seen.add(name)
         flags = int(dataset["flags"][index])
-        axes.set_title(f"frame {index}, {1e3 * float(dataset['time'][index]):.2f} ms: {flag_words(flags)}")
+        axes.set_title(f"frame {index}, {1e3 * float(dataset['time'][index]):.2f} ms: {FrameFlag(flags).words}")
         if seen:
             figure.legend(loc="outside upper center", ncols=2, handlelength=1.8)
     return figure
@@ -291,7 +285,7 @@ class _Canvas:
             first, last = np.rint(ends * 16.0).astype(int).tolist()
             cv2.line(image, first, last, rgb, 2, cv2.LINE_AA, 4)
         time = 1e3 * float(self.dataset["time"][index])
-        words = flag_words(int(self.dataset["flags"][index]))
+        words = FrameFlag(int(self.dataset["flags"][index])).words
         text = f"frame {index}  {time:.2f} ms  {words}"
         cv2.putText(image, text, (4, 17), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
         top = 24 + large.shape[0]

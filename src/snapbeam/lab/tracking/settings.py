@@ -522,6 +522,11 @@ class FrameFlag(IntFlag):
     DISTORTED = 256
 
     @property
+    def words(self) -> str:
+        """The flags in small letters, with commas between; "measured" if there is none."""
+        return ", ".join(str(flag.name).lower().replace("_", " ") for flag in self) or "measured"
+
+    @property
     def advice(self) -> str:
         """Cause and remedy of each flag."""
         return "; ".join(text for flag, text in _ADVICE.items() if flag in self) or "measured"

@@ -78,7 +78,7 @@ def tracked_dataset(
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         located = int(np.isfinite(rows.row).sum())
-        counts = {str(flag.name).lower().replace("_", " "): rows.flagged(flag) for flag in FrameFlag if flag}
+        counts = {flag.words: rows.flagged(flag) for flag in FrameFlag if flag}
         reasons = ", ".join(f"{name}: {number}" for name, number in counts.items() if number)
         raise InputError(
             f"{recording.path}: the beam was found in none of the frames at rest, in {located} of {rows.row.size} at all "
@@ -532,11 +532,7 @@ def tracking_quality(dataset: xr.Dataset) -> dict[str, Any]:
         "frames": int(flags.size),
         "measured_share": float(measured.mean()),
         "flagged_share": float((flags != 0).mean()),
-        "counts": {
-            str(flag.name).lower().replace("_", " "): int(((flags & int(flag)) != 0).sum())
-            for flag in FrameFlag
-            if flag
-        },
+        "counts": {flag.words: int(((flags & int(flag)) != 0).sum()) for flag in FrameFlag if flag},
         "longest_gap": int(runs.max()),
         "beam_stderr_px": _median(dataset["displacement_stderr_mm"].values / pixel),
         "shaker_stderr_px": _median(dataset["shaker_stderr_mm"].values / pixel) if shaker else float("nan"),
