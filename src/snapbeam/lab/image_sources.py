@@ -51,18 +51,10 @@ _LUMA = np.array([0.299, 0.587, 0.114])
 class FrameSource:
     """Frames of one file, folder or pattern.
 
-    Attributes
-    ----------
-    shape, numbers, max_value
-        (height, width); number of each frame; the largest grey level the file can hold.
-    frame_rate, pixel_size, pixel_width, exposure
-        [Hz], [m], [m], [s], or None where the file does not say; ``pixel_size`` is the height of a pixel.
-    frame_rate_question, pixel_size_hint
-        Ambiguous information of the file, for the error message.
-    diagnostics, edge_error
-        What makes measurements doubtful, and the standard error [px] that the format adds to every edge.
-    metadata
-        Other metadata of the file.
+    ``shape`` is (height, width), ``max_value`` the largest grey level the file can hold; ``frame_rate`` [Hz],
+    ``pixel_size`` [m, the height of a pixel], ``pixel_width`` [m] and ``exposure`` [s] are None where the file does not
+    say; ``frame_rate_question`` and ``pixel_size_hint`` what it says ambiguously, for the error message; ``edge_error``
+    is the standard error [px] that the format adds to every edge.
     """
 
     def __init__(self, path: Path) -> None:

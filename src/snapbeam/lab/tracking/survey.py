@@ -660,19 +660,11 @@ def find_sticker(
 def _peaks_sticker(steps: NDArray[np.floating], begin: int, height: float) -> list[tuple[int, float]]:
     """Rows and values of the extremes of each run of *steps* beyond *height*, from *begin* down."""
     peaks: list[tuple[int, float]] = []
-    row = begin
-    while row < steps.size:
-        if abs(steps[row]) > height:
-            stop = row
-            while stop < steps.size and steps[stop] * steps[row] > 0.0 and abs(steps[stop]) > height:
-                stop += 1
+    for row, stop in sorted(stretches(steps > height) + stretches(steps < -height)):
+        if row > begin:  # a run under way at the start belongs to the tip
             part = np.abs(steps[row:stop])
             peak = round(float((part * np.arange(row, stop)).sum() / part.sum()))
-            if row > begin:  # a run under way at the start belongs to the tip
-                peaks.append((peak, float(steps[peak])))
-            row = stop
-        else:
-            row += 1
+            peaks.append((peak, float(steps[peak])))
     return peaks
 
 
