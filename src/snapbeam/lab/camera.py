@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.lab.diagnostics import KINDS_RECORDING
+from snapbeam.lab.diagnostics import KINDS_RECORDING, holding
 from snapbeam.lab.image_sources import FrameSource, open_source
 from snapbeam.lab.photron import frame_bytes, header_text
 from snapbeam.util.diagnostics import Diagnostic
@@ -154,26 +154,19 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
     return (top, bottom, left, integer("region[3]", value[3], left + 1, shape[1]))
 
 
-def _rate_diagnostics(source: FrameSource, given: float | None) -> tuple[Diagnostic, ...]:
-    """Diagnostics for a given frame rate that differs from the file."""
-    if given is None:
-        return ()
-    if source.frame_rate_question:
-        return (KINDS_RECORDING["contradiction"].found(given=given),)
-    stated = source.frame_rate
-    if stated is not None and abs(given / stated - 1.0) > 1e-3:
-        return (KINDS_RECORDING["rate_given"].found(given=given, stated=stated),)
-    return ()
-
-
-def _missing(numbers: NDArray[np.int64]) -> tuple[Diagnostic, ...]:
-    """Diagnostics for frames that are missing by their numbers."""
-    holes = np.flatnonzero(np.diff(numbers) > 1)
-    if not holes.size:
-        return ()
-    lost = float(numbers[-1] + 1 - numbers.size)
-    first = float(numbers[holes[0]])
-    return (KINDS_RECORDING["frames_missing"].found(frames=lost, places=float(holes.size), first=first),)
+def _told_of(source: FrameSource, rate: float) -> tuple[Diagnostic, ...]:
+    """Diagnostics of a file, whose frame rate [Hz] may be another than it states, and which may lack frames."""
+    stated = source.frame_rate or rate
+    numbers = source.numbers
+    before = numbers[:-1][np.diff(numbers) > 1]
+    lost = {"frames": numbers[-1] + 1 - numbers.size, "places": before.size, "first": before[0] if before.size else 0}
+    question = bool(source.frame_rate_question)
+    return *source.diagnostics, *holding(
+        KINDS_RECORDING,
+        ("contradiction", question, {"given": rate}),
+        ("rate_given", not question and abs(rate / stated - 1.0) > 1e-3, {"given": rate, "stated": stated}),
+        ("frames_missing", before.size > 0, lost),
+    )
 
 
 def open_recording(
@@ -236,9 +229,8 @@ def open_recording(
                 f"pixel_size (--pixel-size) = {size:g}: a pixel of {size:g} m; must be at most {_LARGEST_PIXEL:g} m, "
                 "in metres, such as 12e-6 for 12 um"
             )
-        diagnostics = (*source.diagnostics, *_rate_diagnostics(source, given), *_missing(source.numbers))
         width = source.pixel_width if pixel_size is None else None
-        return Recording(path, source, rate, size, _region(region, source.shape), diagnostics, width)
+        return Recording(path, source, rate, size, _region(region, source.shape), _told_of(source, rate), width)
     except BaseException:
         source.close()
         raise

@@ -227,19 +227,15 @@ def never_touching(penetration: np.ndarray, rows: TrackedRows) -> float:
 
 
 def _of_the_beam(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
-    told = []
-    beam = scene.beam
-    if beam.fixtures:
-        told.append(KINDS["fixture"].found(count=len(beam.fixtures), row=beam.fixtures[0][0]))
+    bars, found = scene.beam.fixtures, scene.beam.thickness * seen.scale
     row = seen.rows.row[np.isfinite(seen.rows.row)]
-    if row.size:
-        span = float(np.ptp(np.percentile(row, (0.5, 99.5))))
-        if span < max(0.3, 8.0 * float(np.nanmedian(seen.rows.error))):
-            told.append(KINDS["no_motion"].found(range_px=span))
-    found = beam.thickness * seen.scale
-    if not 0.005 <= found <= 30.0:
-        told.append(KINDS["scale"].found(found_mm=found))
-    return told
+    span = float(np.ptp(np.percentile(row, (0.5, 99.5)))) if row.size else math.inf
+    return holding(
+        KINDS,
+        ("fixture", bool(bars), {"count": len(bars), "row": bars[0][0] if bars else 0}),
+        ("no_motion", span < max(0.3, 8.0 * float(np.nanmedian(seen.rows.error))), {"range_px": span}),
+        ("scale", not 0.005 <= found <= 30.0, {"found_mm": found}),
+    )
 
 
 def _of_the_scale(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
@@ -271,19 +267,14 @@ def _of_the_motion(seen: SeenMotion, settings: TrackingSettings, rate: float) ->
 
 
 def _of_the_order(order: FrameOrder, rate: float) -> list[Diagnostic]:
-    told = []
-    if order.missing:
-        frames = sum(order.many)
-        told.append(
-            KINDS["frames_lost"].found(
-                frames=frames, places=len(order.missing), first=order.missing[0], short_ms=1e3 * frames / rate
-            )
-        )
-    if order.repeated:
-        told.append(KINDS["frames_repeated"].found(frames=len(order.repeated), first=order.repeated[0]))
-    if not order.missing:
-        told += [KINDS[kind].found(None, "", **numbers) for kind, numbers in order.clock]
-    return told
+    lost, repeated, frames = order.missing, order.repeated, sum(order.many)
+    numbers = {"frames": frames, "places": len(lost), "first": min(lost, default=0), "short_ms": 1e3 * frames / rate}
+    return holding(
+        KINDS,
+        ("frames_lost", bool(lost), numbers),
+        ("frames_repeated", bool(repeated), {"frames": len(repeated), "first": min(repeated, default=0)}),
+        *((kind, not lost, told) for kind, told in order.clock),
+    )
 
 
 def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float) -> list[Diagnostic]:

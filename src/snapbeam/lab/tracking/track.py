@@ -481,17 +481,22 @@ class _Background:
 # How well a recording was tracked, in numbers and in words.
 
 
-def check_tracked(dataset: xr.Dataset) -> xr.Dataset:
+_NAMES = ("time", "displacement_mm", "displacement_stderr_mm", "flags", "confidence", "beam_row", "beam_slope")
+
+
+def check_tracked(
+    dataset: xr.Dataset, names: tuple[str, ...] = _NAMES, attrs: tuple[str, ...] = ("pixel_size", "frame_rate", "side")
+) -> xr.Dataset:
     """Return *dataset* if it came from :func:`snapbeam.lab.track`; refuse it if not."""
     from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset):
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
-    names = ("time", "displacement_mm", "displacement_stderr_mm", "flags", "confidence", "beam_row", "beam_slope")
     missing = [name for name in names if name not in dataset.variables]
-    missing += [name for name in ("pixel_size", "frame_rate", "side") if name not in dataset.attrs]
+    missing += [name for name in attrs if name not in dataset.attrs]
     if missing:
-        raise InputError(f"dataset without {', '.join(missing)}: must come from track()")
+        where = " with a shaker" if "penetration_mm" in missing else ""
+        raise InputError(f"dataset without {', '.join(missing)}: must come from track(){where}")
     return dataset
 
 
@@ -637,11 +642,7 @@ def contact_onsets(dataset: xr.Dataset, *, tolerance: float | None = None, minim
     """
     from snapbeam.util.datasets import xr
 
-    if not isinstance(dataset, xr.Dataset):
-        raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
-    missing = [name for name in ("time", "penetration_mm") if name not in dataset.variables]
-    if missing:
-        raise InputError(f"dataset without {', '.join(missing)}: must come from track() with a shaker")
+    check_tracked(dataset, ("time", "penetration_mm"), ())
     minimum_frames = integer("minimum_frames", minimum_frames, 1)
     time, gap = dataset["time"].values, dataset["penetration_mm"].values
     pixel = float(dataset.attrs.get("pixel_size", 0.0)) * 1e3
