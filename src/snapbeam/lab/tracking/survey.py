@@ -754,18 +754,6 @@ _STEEP = 3.0  # rows a column by which the outline of a tip may fall
 _CLEAR = 4.0  # rows from the beam within which a mark that stands alone may be the tip itself
 
 
-class Wanted(NamedTuple):
-    """Settings of the shaker: search for a sticker, tip location [px], fixed column.
-
-    ``head`` counts the frames at the start of the sample that are neighbours.
-    """
-
-    marker: bool
-    tip_distance: float | None
-    fixed_column: bool
-    head: int
-
-
 def find_rod(bands: BeamBands) -> tuple[int, int] | None:
     """Columns in which something stands beyond the beam in most of the sample; None if too few."""
     objects = bands.objects
@@ -781,15 +769,20 @@ def shaker_view(
     smooth: NDArray[np.floating],
     bands: BeamBands,
     rod: tuple[int, int],
-    wanted: Wanted,
+    settings: TrackingSettings,
+    distance: float | None,
+    head: int,
 ) -> tuple[ShakerView, float]:
-    """The shaker, and the column at which its tip comes nearest to the beam."""
+    """The shaker, and the column at which its tip comes nearest to the beam.
+
+    *distance* [px] is that of the tip from the sticker, if given; the first *head* frames are neighbours.
+    """
     beam = measure_beam(view, frames)
     near = beam.row + view.thickness
     middle = rod_middle(rod)
-    isolated = wanted.marker and _stands_alone(bands, middle, near)
+    isolated = settings.marker and _stands_alone(bands, middle, near)
     sticker = None
-    if wanted.marker:
+    if settings.marker:
         begin = _begin(view, bands, middle, isolated)
         sticker = find_sticker(smooth, middle, begin, view.contrast, view.sign if isolated else 0.0)
     isolated = isolated and sticker is not None
@@ -800,23 +793,24 @@ def shaker_view(
         reference = sticker_rows(view, sticker, frames, near).row
     outline, loose = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
     column = view.contact_column
-    certain = _reaches_border(bands, middle) if sticker is None else wanted.tip_distance is not None
+    certain = _reaches_border(bands, middle) if sticker is None else distance is not None
     sides = Rod(math.nan, math.nan, 0.0) if isolated else rod_sides(frames, rod, view.edge_width)
     turned = abs(sides.lean) > _TURNED and abs(sides.lean + float(np.nanmedian(beam.slope))) < _SQUARE
     turn = -sides.lean if turned else 0.0
-    cut = not wanted.fixed_column and (rod[0] < 2) != (rod[1] > frames.shape[2] - 2)
+    free = settings.contact_column is None
+    cut = free and (rod[0] < 2) != (rod[1] > frames.shape[2] - 2)
     shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, sides[:2], loose, turn, cut)
-    if sticker is not None and wanted.tip_distance is not None:
-        offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
+    if sticker is not None and distance is not None:
+        offset = -(distance + 0.5 * sticker.thickness)
         return dataclasses.replace(shown, tip_offset=offset, tip_source="distance to the sticker as given"), column
     upright = dataclasses.replace(outline, profile=outline.profile - turn * (outline.columns - column))
     apex = None if isolated else find_apex(upright, rod, column)
     if apex is not None:
-        column += 0.0 if wanted.fixed_column else apex.column
+        column += apex.column if free else 0.0
         source = "tip seen apart from the beam"
         return dataclasses.replace(shown, tip_offset=apex.row, tip_error=apex.error, tip_source=source), column
     if sticker is not None:
-        offset = _offset_at_rest(beam, near, reference, wanted.head)
+        offset = _offset_at_rest(beam, near, reference, head)
         source = "assumed to touch the beam in the first frames"
         return dataclasses.replace(shown, tip_offset=offset, tip_source=source), column
     raise InputError(
@@ -1022,7 +1016,6 @@ def survey(
     if not settings.shaker or rod is None:
         return Scene(view, None, shape, noise, rod is not None)
     distance = None if settings.tip_distance is None else settings.tip_distance / pixel_size
-    wanted = Wanted(settings.marker, distance, settings.contact_column is not None, head)
-    shaker, column = shaker_view(view, frames, smooth, bands, rod, wanted)
+    shaker, column = shaker_view(view, frames, smooth, bands, rod, settings, distance, head)
     view = dataclasses.replace(view, **placed(width, rod, settings.columns, column))
     return Scene(view, shaker, shape, noise, False)

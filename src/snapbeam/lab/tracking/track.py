@@ -671,15 +671,11 @@ def contact_onsets(dataset: xr.Dataset, *, tolerance: float | None = None, minim
         "closing_speed": ("m/s", "speed at which tip and beam close"),
         "bounded": ("1", "whether both ends of the contact were seen"),
     }
-    data = {
-        name: ("impact", table[:, i].astype(np.int64 if name in ("frames", "bounded") else np.float64), _label(*text))
-        for i, (name, text) in enumerate(names.items())
-    }
-    return xr.Dataset(data, attrs={"tolerance_mm": limit})
-
-
-def _label(units: str, long_name: str) -> dict[str, str]:
-    return {"units": units, "long_name": long_name}
+    found = xr.Dataset(attrs={"tolerance_mm": limit})
+    for column, (name, (units, words)) in zip(table.T, names.items(), strict=True):
+        kind = np.int64 if name in ("frames", "bounded") else np.float64
+        found[name] = "impact", column.astype(kind), {"units": units, "long_name": words}
+    return found
 
 
 def _noise(dataset: xr.Dataset) -> float:
