@@ -21,7 +21,7 @@ from snapbeam.lab.diagnostics import KINDS_RECORDING, LOSSY_ERROR
 from snapbeam.lab.frame_times import cine_times, numbers_of_stamps
 from snapbeam.lab.photron import CameraHeader, check_pixels, read_header, read_mraw
 from snapbeam.lab.signal_formats import is_time, seconds_in, stated_unit
-from snapbeam.lab.signals import si_unit
+from snapbeam.lab.signals import unit_factor
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import refuse_inflated
@@ -258,7 +258,7 @@ class TiffSource(FrameSource):
         """Metres per pixel of a resolution; inches come from printers."""
         if resolution is None or not min(resolution.value) > 0 or _unescaped(unit) in ("in", "inch", "inches"):
             return None
-        metres = _metres(unit)
+        metres = unit_factor("pixel size", _unescaped(unit), "m")
         return None if metres is None else metres * resolution.value[1] / resolution.value[0]
 
     def _ome(self, image: Any) -> None:
@@ -266,7 +266,8 @@ class TiffSource(FrameSource):
         pixels = (image[0] if isinstance(image, list) else image)["Pixels"]
         sizes = {}
         for axis in "YX":
-            size, metres = (pixels.get(f"PhysicalSize{axis}"), _metres(pixels.get(f"PhysicalSize{axis}Unit", "um")))
+            size, unit = pixels.get(f"PhysicalSize{axis}"), _unescaped(pixels.get(f"PhysicalSize{axis}Unit", "um"))
+            metres = unit_factor("pixel size", unit, "m")
             sizes[axis] = None if not size or metres is None else float(size) * metres
         self.pixel_size, self.pixel_width = sizes["Y"] or sizes["X"], sizes["X"] or sizes["Y"]
         rates: dict[str, float] = {}
@@ -307,15 +308,6 @@ class TiffSource(FrameSource):
 def _unescaped(unit: Any) -> str:
     """A unit of ImageJ, which writes letters beyond ASCII by their codes."""
     return re.sub(r"\\u([0-9a-fA-F]{4})", lambda found: chr(int(found[1], 16)), str(unit or "")).strip()
-
-
-def _metres(unit: Any) -> float | None:
-    """Metres in a unit; None if it is not one of length."""
-    try:
-        factor, base = si_unit("pixel size", _unescaped(unit))
-    except InputError:
-        return None
-    return factor if base == "m" else None
 
 
 # Stacks of pictures in arrays: NumPy's .npy and HDF5.

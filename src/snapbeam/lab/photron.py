@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_RECORDING
-from snapbeam.lab.signals import si_unit
+from snapbeam.lab.signals import unit_factor
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.input_files import input_bytes
 from snapbeam.util.validation import InputError, shown
@@ -336,12 +336,9 @@ def _bits(fields: HeaderFields, images: str) -> tuple[int, int, str]:
 
 def _pixel_size(fields: HeaderFields) -> float | None:
     """Metres per pixel from the calibration block, where its unit is a length."""
-    try:
-        factor, base = si_unit("pixel", fields.text("unit", "").lower() if fields.xml else "")
-    except InputError:
-        return None
-    size = fields.positive("pixel") if base == "m" else None
-    return None if size is None else size * factor
+    factor = unit_factor("pixel", fields.text("unit", "").lower() if fields.xml else "", "m")
+    size = None if factor is None else fields.positive("pixel")
+    return None if factor is None or size is None else size * factor
 
 
 def _scale_hint(fields: HeaderFields) -> str:

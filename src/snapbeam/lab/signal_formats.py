@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.matlab_file import read_version_5
-from snapbeam.lab.signals import check_signal, even_sampling, si_unit
+from snapbeam.lab.signals import check_signal, even_sampling, si_unit, unit_factor
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import decoded, refuse_inflated
@@ -129,15 +129,6 @@ def seconds_in(name: str, unit: str | None) -> float:
     if base != "s":
         raise InputError(f"{name} is in {unit!r}, not in seconds")
     return factor
-
-
-def _time_unit(name: str, unit: str) -> float | None:
-    """Seconds in a unit; None if it is not one of time."""
-    try:
-        factor, base = si_unit(name, unit)
-    except InputError:
-        return None
-    return factor if base == "s" else None
 
 
 def stated_unit(attributes: Mapping[str, Any]) -> str:
@@ -937,14 +928,14 @@ def _rate_of(name: str, value: Any, decimal_comma: bool = False, known: float | 
     for key in (_key(name), _key(word)):
         of_name = max((one for one in _RATES + _STEPS if key.startswith(one)), key=len, default="")
         suffix = suffix or key[len(of_name) :]
-        if of_name and (key == of_name or suffix in _PER_SECOND or _time_unit(name, suffix)):
+        if of_name and (key == of_name or suffix in _PER_SECOND or unit_factor(name, suffix, "s")):
             break
     else:
         return None
     numbers, unit = _quantity(_text(value), decimal_comma)
     step = of_name in _STEPS
     unit = unit or ("" if suffix == "s" and not step else suffix) or ""
-    factor = _time_unit(name, unit or "s") if step else _PER_SECOND.get(unit.lower())
+    factor = unit_factor(name, unit or "s", "s") if step else _PER_SECOND.get(unit.lower())
     if factor is None or not numbers or 0.0 in numbers:
         return None
     rates = [1.0 / (number * factor) if step else number * factor for number in numbers]
@@ -1039,7 +1030,7 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
     columns = {name: split_unit(name) for name in table.columns}
     times = [name for name, (word, unit) in columns.items() if _is_time(word, unit)]
     if not times:  # a row of units only, as "[ s ]"
-        times = [name for name, (_, unit) in columns.items() if unit and _time_unit(name, unit)]
+        times = [name for name, (_, unit) in columns.items() if unit and unit_factor(name, unit, "s")]
     if len(times) > 1:
         raise InputError(f"{path}: columns {times}: only one may be the time")
     values = header_values(table.block.header)

@@ -507,16 +507,13 @@ def saturation_level(frames: NDArray[np.integer], max_value: float, noise: float
     here = np.count_nonzero(frames == top)
     if here < LEAST * frames.size or here < 16:
         return float(max_value)
-    if top >= max_value or _whole_bits(int(top)):
+    # full scale of 10, 12 or 14 bits, at either end of 16
+    scales = [(2**bits - 1) << shift for bits in (10, 12, 14) for shift in (0, 16 - bits)]
+    if top >= max_value or int(top) in scales:
         return top
     reach = max(3.0 * noise, 3.0)
     below = np.count_nonzero((frames >= top - reach) & (frames < top)) / reach
     return top if noise > 0.5 and here > PILE * below else float(max_value)
-
-
-def _whole_bits(level: int) -> bool:
-    """Return whether a level is full scale of 10, 12 or 14 bits, at either end of 16."""
-    return any(level in (2**bits - 1, (2**bits - 1) << (16 - bits)) for bits in (10, 12, 14))
 
 
 # ----------------------------------------------------------------------------------------------------
