@@ -301,9 +301,9 @@ def test_header_fields_are_read_from_both_kinds(tmp_path):
     for suffix in (".cih", ".cihx"):
         path = write_photron(tmp_path / f"a{suffix}", frames(), exposure=1.25e-6, comment="run 7", **SCALES)
         header = read_header(path)
-        assert header.timing.exposure == pytest.approx(1.25e-6)
+        assert header.exposure == pytest.approx(1.25e-6)
         assert header.comment == "run 7"
-        assert header.timing.frame_rate == pytest.approx(1e4)
+        assert header.frame_rate == pytest.approx(1e4)
 
 
 def test_a_missing_library_is_named_with_its_cure(tmp_path, monkeypatch):

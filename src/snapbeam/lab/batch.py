@@ -31,7 +31,7 @@ from snapbeam.lab.vibrometer import DriveMeasurement, measure_drive, shaker_sign
 from snapbeam.lab.waveform_comparison import LEAST_CYCLES, TOO_SHORT, measure_response
 from snapbeam.util.diagnostics import Diagnostic, Severity, diagnostics_of
 from snapbeam.util.files import atomic_path, check_writable
-from snapbeam.util.input_files import decoded, read_toml, rows_of_table
+from snapbeam.util.input_files import decoded, input_bytes, read_toml, rows_of_table
 from snapbeam.util.netcdf import write_netcdf
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, instance, integer, positive, require_texts, shown, within
@@ -133,24 +133,14 @@ def _put(known: dict[str, Path], path: Path, stem: str) -> None:
 
 
 def _from_table(folder: Path, table: Path) -> list[Test]:
-    try:
-        text = decoded(table.read_bytes(), table.name)
-    except OSError as error:
-        raise InputError(f"table (--table) = {str(table)!r}: cannot be read, {error.strerror}") from error
-    mark, header, rows = rows_of_table(text, table.name)
-    for name in header:
-        if name not in _COLUMNS:
-            raise InputError(f"{table.name}: unknown column {name!r}; must be among {', '.join(_COLUMNS)}")
-        if header.count(name) > 1:
-            raise InputError(f"{table.name}: column {name!r} occurs twice")
+    text = decoded(input_bytes("table (--table)", table), table.name)
+    mark, header, rows = rows_of_table(text, table.name, _COLUMNS)
     for name in ("test", "recording"):
         if name not in header:
             raise InputError(f"{table.name}: must have a column {name!r}")
     tests = []
     for number, cells in rows:
         where = f"{table.name}, line {number}"
-        if len(cells) != len(header):
-            raise InputError(f"{where}: has {len(cells)} cells, the header names {len(header)}")
         row = dict(zip(header, cells, strict=True))
         for name in ("test", "recording"):
             if not row[name]:
@@ -188,19 +178,9 @@ def _number(cell: str | None, mark: str, where: str, column: str) -> float | Non
 class SeriesSettings:
     """Settings of every test.
 
-    Attributes
-    ----------
-    camera
-        ``frame_rate`` [Hz], ``pixel_size`` [m] and ``region`` as for :func:`snapbeam.lab.open_recording`.
-    tracking
-        How to track; the buckling level is needed for the response.
-    signal
-        ``channel``, ``units``, ``sensitivity``, ``sampling_frequency`` and ``columns`` as for
-        :func:`snapbeam.lab.read_signal`.
-    cycles
-        Number of cycles for the response class; the rule needs 20.
-    operator
-        Name of the person who measured, for the results.
+    ``camera`` and ``signal`` are arguments of :func:`snapbeam.lab.open_recording` and :func:`snapbeam.lab.read_signal`;
+    ``tracking`` must have the buckling level, for the response; ``cycles`` is the number of cycles for its class, of
+    which the rule needs 20; ``operator`` the name of the person who measured.
     """
 
     camera: Mapping[str, Any] = field(default_factory=dict)

@@ -388,24 +388,12 @@ class Calibration:
 
     def summary(self) -> dict[str, Any]:
         """The figures as plain numbers and words, in SI, for a JSON file."""
-        return {
-            "values": dict(self.values),
-            "standard_errors": dict(self.standard_errors),
-            "undetermined": list(self.undetermined),
+        plain = {name: value for name, value in vars(self).items() if name not in ("beam", "start", "modes")}
+        plain |= {name: list(value) for name, value in plain.items() if isinstance(value, tuple)}
+        return plain | {
             "correlation": self.correlation.tolist(),
             "residuals": [{**dataclasses.asdict(r), "deviation": r.deviation} for r in self.residuals],
-            "scatter": self.scatter,
-            "degrees_of_freedom": self.degrees_of_freedom,
-            "damping_ratio": self.damping_ratio,
-            "damping_ratio_se": self.damping_ratio_se,
-            "contact_stiffness": self.contact_stiffness,
-            "contact_stiffness_se": self.contact_stiffness_se,
-            "well_frequency": self.well_frequency,
-            "start_well_frequency": self.start_well_frequency,
-            "gauge_well_frequency": self.gauge_well_frequency,
-            "either_well": list(self.either_well),
             "imperfection": imperfection_section(self.imperfection),
-            "remarks": list(self.remarks),
             "diagnostics": [one.plain() for one in self.diagnostics],
         }
 

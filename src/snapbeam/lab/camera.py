@@ -6,13 +6,12 @@ from collections.abc import Iterable, Iterator
 from datetime import date
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.lab.diagnostics import KINDS_RECORDING
+from snapbeam.lab.diagnostics import KINDS_RECORDING, holding
 from snapbeam.lab.image_sources import FrameSource, open_source
 from snapbeam.lab.photron import frame_bytes, header_text
 from snapbeam.util.diagnostics import Diagnostic
@@ -57,15 +56,10 @@ class Recording:
     --------
     >>> import numpy as np
     >>> from snapbeam import lab
-    >>> time = np.arange(60) / 10e3  # s
-    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
-    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
-    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
-    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
-    >>> recording.frame_rate
-    10000.0
+    >>> np.save("frames.npy", np.zeros((5, 64, 64), dtype=np.uint8))
+    >>> with lab.open_recording("frames.npy", frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     print(len(recording), recording.shape)
+    5 (64, 64)
     """
 
     def __init__(
@@ -136,9 +130,7 @@ class Recording:
     def __enter__(self) -> Recording:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *ended: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -159,26 +151,19 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
     return (top, bottom, left, integer("region[3]", value[3], left + 1, shape[1]))
 
 
-def _rate_diagnostics(source: FrameSource, given: float | None) -> tuple[Diagnostic, ...]:
-    """Diagnostics for a given frame rate that differs from the file."""
-    if given is None:
-        return ()
-    if source.frame_rate_question:
-        return (KINDS_RECORDING["contradiction"].found(given=given),)
-    stated = source.frame_rate
-    if stated is not None and abs(given / stated - 1.0) > 1e-3:
-        return (KINDS_RECORDING["rate_given"].found(given=given, stated=stated),)
-    return ()
-
-
-def _missing(numbers: NDArray[np.int64]) -> tuple[Diagnostic, ...]:
-    """Diagnostics for frames that are missing by their numbers."""
-    holes = np.flatnonzero(np.diff(numbers) > 1)
-    if not holes.size:
-        return ()
-    lost = float(numbers[-1] + 1 - numbers.size)
-    first = float(numbers[holes[0]])
-    return (KINDS_RECORDING["frames_missing"].found(frames=lost, places=float(holes.size), first=first),)
+def _told_of(source: FrameSource, rate: float) -> tuple[Diagnostic, ...]:
+    """Diagnostics of a file, whose frame rate [Hz] may be another than it states, and which may lack frames."""
+    stated = source.frame_rate or rate
+    numbers = source.numbers
+    before = numbers[:-1][np.diff(numbers) > 1]
+    lost = {"frames": numbers[-1] + 1 - numbers.size, "places": before.size, "first": before[0] if before.size else 0}
+    question = bool(source.frame_rate_question)
+    return *source.diagnostics, *holding(
+        KINDS_RECORDING,
+        ("contradiction", question, {"given": rate}),
+        ("rate_given", not question and abs(rate / stated - 1.0) > 1e-3, {"given": rate, "stated": stated}),
+        ("frames_missing", before.size > 0, lost),
+    )
 
 
 def open_recording(
@@ -215,15 +200,10 @@ def open_recording(
     --------
     >>> import numpy as np
     >>> from snapbeam import lab
-    >>> time = np.arange(60) / 10e3  # s
-    >>> beam = -0.335e-3 * np.ones(60)  # m: at rest in the lower well
-    >>> tip = -0.6e-3 + 0.1e-3 * np.sin(2 * np.pi * 100 * time)
-    >>> camera, stage = lab.SyntheticCamera(shape=(160, 64)), lab.SyntheticStage(shaker_width=0.4e-3)
-    >>> synthetic = lab.render_recording(time, beam, tip, camera=camera, stage=stage)
-    >>> with lab.open_recording(synthetic.write("test.cihx"), frame_rate=10e3, pixel_size=12e-6) as recording:
-    ...     tracked = lab.track(recording, buckling_level=0.335e-3)
-    >>> recording.pixel_size
-    1.2e-05
+    >>> np.save("frames.npy", np.zeros((5, 64, 64), dtype=np.uint8))
+    >>> with lab.open_recording("frames.npy", frame_rate=10e3, pixel_size=12e-6) as recording:
+    ...     print(recording.frame(4).max())
+    0
     """
     path = file_path("path", path)
     source = open_source(path)
@@ -246,9 +226,8 @@ def open_recording(
                 f"pixel_size (--pixel-size) = {size:g}: a pixel of {size:g} m; must be at most {_LARGEST_PIXEL:g} m, "
                 "in metres, such as 12e-6 for 12 um"
             )
-        diagnostics = (*source.diagnostics, *_rate_diagnostics(source, given), *_missing(source.numbers))
         width = source.pixel_width if pixel_size is None else None
-        return Recording(path, source, rate, size, _region(region, source.shape), diagnostics, width)
+        return Recording(path, source, rate, size, _region(region, source.shape), _told_of(source, rate), width)
     except BaseException:
         source.close()
         raise

@@ -134,7 +134,7 @@ def frequency_response(
     mode = _peak_mode(found, ratio)
     bias = np.zeros(frequency.size)
     if mode is not None:
-        found.attrs |= mode.attributes()
+        found.attrs |= mode.attributes
         bias[mode.lines] = mode.bias
     words = {"units": "1", "long_name": "relative bias of the magnitude by the window"}
     found["window_bias"] = "frequency", bias, words
@@ -168,12 +168,7 @@ class _Mode(NamedTuple):
 
     lines: slice
     bias: _Array
-    numbers: dict[str, tuple[float, float]]
-
-    def attributes(self) -> dict[str, float]:
-        """Numbers and standard errors by the names of attributes."""
-        values = {f"peak_{name}": value for name, (value, _) in self.numbers.items()}
-        return values | {f"peak_{name}_se": error for name, (_, error) in self.numbers.items()}
+    attributes: dict[str, float]
 
 
 def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None:
@@ -239,11 +234,9 @@ def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None
     errors = np.sqrt(np.diag(slope @ (covariance / np.outer(scale, scale)) @ slope.T))
     other = p[4] + 1j * p[5]
     through, true = ((p[2] + 1j * p[3]) * pole + other for pole in poles(p[0], p[1]))
-    names = ("frequency", "magnitude", "damping_ratio")
-    return _Mode(
-        lines, np.abs(through) / np.abs(true) - 1.0,
-        {name: (float(a), float(b)) for name, a, b in zip(names, value, errors, strict=True)},
-    )  # fmt: skip
+    names = [f"peak_{name}{more}" for more in ("", "_se") for name in ("frequency", "magnitude", "damping_ratio")]
+    told = dict(zip(names, [*value.tolist(), *errors.tolist()], strict=True))
+    return _Mode(lines, np.abs(through) / np.abs(true) - 1.0, told)
 
 
 def _common(x: SignalSamples, y: SignalSamples) -> tuple[SignalSamples, SignalSamples]:

@@ -1,29 +1,19 @@
-"""The kinds of diagnostics of the lab part: code, severity, criterion and message."""
+"""The kinds of diagnostics of the lab part: code, severity and message."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from snapbeam.util.diagnostics import Diagnostic, Severity
 
-INFO, WARNING, ERROR = Severity.INFO, Severity.WARNING, Severity.ERROR
 
-
-@dataclass(frozen=True)
-class Kind:
-    """One kind of diagnostic.
-
-    ``sees`` is what gives it away, for the table in the documentation; ``says`` its words, with the numbers in
-    braces and the way out; ``options`` the arguments that are the way out, each also an option of the command
-    line.
-    """
+class Kind(NamedTuple):
+    """One kind of diagnostic; ``says`` are its words, with the numbers in braces and the way out."""
 
     code: str
     severity: Severity
-    sees: str
     says: str
-    options: tuple[str, ...] = ()
 
     def found(self, severity: Severity | None = None, told: str = "", **numbers: float) -> Diagnostic:
         """The diagnostic with its numbers, in words; *told* stands for ``{told}`` in them."""
@@ -31,692 +21,305 @@ class Kind:
         return Diagnostic(self.code, words, numbers, severity or self.severity)
 
 
-def table(*kinds: Kind) -> Mapping[str, Kind]:
-    """Kinds by the part of their code after the dot."""
-    return {one.code.partition(".")[2]: one for one in kinds}
+def holding(kinds: Mapping[str, Kind], *checks: tuple[str, bool, Mapping[str, float]]) -> list[Diagnostic]:
+    """The diagnostics whose condition holds, of names, conditions and numbers."""
+    return [kinds[name].found(None, "", **numbers) for name, holds, numbers in checks if holds]
 
 
-# ----------------------------------------------------------------------------------------------------
-# Camera and vibrometer against each other: direction, amplitude, clocks.
+def table(group: str, **words: dict[str, str]) -> dict[str, Kind]:
+    """Kinds of a group by name, from their words by severity."""
+    return {
+        name: Kind(f"{group}.{name}", Severity(severity), says)
+        for severity, kinds in words.items()
+        for name, says in kinds.items()
+    }
 
 
 KINDS_ALIGNMENT = table(
-    Kind(
-        "alignment.polarity", INFO,
-        "the start of the motion in both records",
-        "the vibrometer counts as negative what is positive for the camera; a drive made with this alignment is turned "
-        "over (polarity, --polarity, says otherwise)",
-        ("polarity",),
-    ),
-    Kind(
-        "alignment.polarity_open", WARNING,
-        "the start of the motion in both records",
-        "whether the vibrometer counts the camera's direction as positive cannot be told, for the start of the motion "
-        "is not in both records, or fits both ways; give polarity (--polarity) 1 or -1",
-        ("polarity",),
-    ),
-    Kind(
-        "alignment.cycle_open", WARNING,
-        "the start of the motion in both records",
-        "whole cycles of {period_ms:.5g} ms remain open: the start of the motion is not in both records, or does not "
-        "tell them apart; give near (--near), a delay known to half a cycle",
-        ("near",),
-    ),
-    Kind(
-        "alignment.amplitude", WARNING,
-        "the amplitude seen by the camera, against the vibrometer's",
-        "the camera sees {gain:.4f} +- {error:.4f} times the vibrometer's amplitude: pixel_size (--pixel-size), "
-        "sensitivity (--sensitivity) or the plane of focus is wrong; amplitude_from (--amplitude-from) camera takes "
-        "the camera's",
-        ("pixel_size", "sensitivity", "amplitude_from"),
-    ),
-    Kind(
-        "alignment.clocks", INFO,
-        "the frequency of the same motion on both clocks",
-        "the clocks differ by {difference:.1e}",
-    ),
-)  # fmt: skip
-
-
-# ----------------------------------------------------------------------------------------------------
-# A calibrated beam against its data: what they determine, where they contradict each other or the model.
-
+    "alignment",
+    info={
+        "polarity": "the vibrometer counts as negative what is positive for the camera; a drive made with this "
+        "alignment is turned over (polarity, --polarity, says otherwise)",
+        "clocks": "the clocks differ by {difference:.1e}",
+    },
+    warning={
+        "polarity_open": "whether the vibrometer counts the camera's direction as positive cannot be told, for the "
+        "start of the motion is not in both records, or fits both ways; give polarity (--polarity) 1 or -1",
+        "cycle_open": "whole cycles of {period_ms:.5g} ms remain open: the start of the motion is not in both "
+        "records, or does not tell them apart; give near (--near), a delay known to half a cycle",
+        "amplitude": "the camera sees {gain:.4f} +- {error:.4f} times the vibrometer's amplitude: pixel_size "
+        "(--pixel-size), sensitivity (--sensitivity) or the plane of focus is wrong; amplitude_from "
+        "(--amplitude-from) camera takes the camera's",
+    },
+)
 
 KINDS_CALIBRATION = table(
-    Kind(
-        "calibration.antisymmetric", WARNING,
-        "parity of the model's modes, where the data tell modes apart by their order only",
-        "the first frequency about a well of this beam, {frequency:.1f} Hz, belongs to the antisymmetric mode, which "
-        "does not depend on the buckling level (above b/r = 6.2, b the buckling level, r the radius of gyration): "
-        "say which measured frequencies are symmetric, lower_well_shape (--lower-well 159a,165s), or measure the "
-        "symmetric one",
-        ("lower_well_shape",),
-    ),
-    Kind(
-        "calibration.crossing", WARNING,
-        "distance of the model's first symmetric and antisymmetric frequency",
-        "the first two frequencies about a well, {symmetric:.1f} Hz symmetric and {antisymmetric:.1f} Hz "
-        "antisymmetric, lie so close that their order may be the other one: "
-        "say which measured frequencies are symmetric, lower_well_shape (--lower-well 159a,165s)",
-        ("lower_well_shape",),
-    ),
-    Kind(
-        "calibration.undetermined", WARNING,
-        "singular values of the sensitivities of all frequencies to all parameters",
-        "{told}",
-    ),
-    Kind("calibration.linked", WARNING, "correlation of the fitted parameters", "{told}"),
-    Kind("calibration.vague", WARNING, "standard errors of the fitted parameters", "{told}"),
-    Kind(
-        "calibration.no_check", INFO,
-        "number of data against number of parameters",
-        "as many parameters as measured values: nothing is left to check the model with",
-    ),
-    Kind(
-        "calibration.unequal_wells", INFO,
-        "frequencies of one mode about the two wells",
-        "{told}",
-    ),
-    Kind("calibration.assumed_errors", INFO, "whether standard errors were given", "{told}"),
-    Kind(
-        "calibration.outlier", WARNING,
-        "each measured frequency against the model's, in standard errors",
-        "{told}: model {model:.4g} Hz, measured {measured:.4g} Hz, {apart:.1f} standard errors apart",
-    ),
-    Kind(
-        "calibration.scatter", WARNING,
-        "chi-square per degree of freedom",
-        "the data scatter {scatter:.2f} times as much as their standard errors allow; the uncertainties are raised by "
-        "it",
-    ),
-    Kind(
-        "calibration.damping_differs", INFO,
-        "damping ratios of different modes",
-        "damping ratios from {low:.4g} to {high:.4g}: the model takes one for every mode",
-    ),
-    Kind(
-        "contact.exponent", ERROR,
-        "durations of impacts over their closing speed, against the law of Hertz",
-        "durations go with the closing speed to the power {exponent:+.2f} +- {error:.2f}, not -0.20: these are no "
-        "collisions of two rigid bodies (the beam bends while it is in touch), so they tell no contact stiffness",
-    ),
-    Kind(
-        "contact.coarse", WARNING,
-        "durations of impacts in frames",
-        "the impacts last {frames:.1f} frames only: record faster for a contact stiffness",
-    ),
-    Kind(
-        "contact.few", WARNING,
-        "number and spread of the impacts",
-        "{count:.0f} impact(s) of speeds within a factor {span:.2f}: the law of Hertz cannot be checked on them",
-    ),
-)  # fmt: skip
-
-
-# ----------------------------------------------------------------------------------------------------
-# A measured run beside a simulated one: do the two shakers do the same.
-
+    "calibration",
+    info={
+        "no_check": "as many parameters as measured values: nothing is left to check the model with",
+        "unequal_wells": "{told}",
+        "assumed_errors": "{told}",
+        "damping_differs": "damping ratios from {low:.4g} to {high:.4g}: the model takes one for every mode",
+    },
+    warning={
+        "antisymmetric": "the first frequency about a well of this beam, {frequency:.1f} Hz, belongs to the "
+        "antisymmetric mode, which does not depend on the buckling level (above b/r = 6.2, b the buckling level, r "
+        "the radius of gyration): say which measured frequencies are symmetric, lower_well_shape (--lower-well "
+        "159a,165s), or measure the symmetric one",
+        "crossing": "the first two frequencies about a well, {symmetric:.1f} Hz symmetric and {antisymmetric:.1f} Hz "
+        "antisymmetric, lie so close that their order may be the other one: say which measured frequencies are "
+        "symmetric, lower_well_shape (--lower-well 159a,165s)",
+        "undetermined": "{told}",
+        "linked": "{told}",
+        "vague": "{told}",
+        "outlier": "{told}: model {model:.4g} Hz, measured {measured:.4g} Hz, {apart:.1f} standard errors apart",
+        "scatter": "the data scatter {scatter:.2f} times as much as their standard errors allow; the uncertainties "
+        "are raised by it",
+    },
+)
+KINDS_CALIBRATION |= table(
+    "contact",
+    warning={
+        "coarse": "the impacts last {frames:.1f} frames only: record faster for a contact stiffness",
+        "few": "{count:.0f} impact(s) of speeds within a factor {span:.2f}: the law of Hertz cannot be checked on them",
+    },
+    error={
+        "exponent": "durations go with the closing speed to the power {exponent:+.2f} +- {error:.2f}, not -0.20: "
+        "these are no collisions of two rigid bodies (the beam bends while it is in touch), so they tell no contact "
+        "stiffness"
+    },
+)
 
 KINDS_COMPARISON = table(
-    Kind(
-        "comparison.turned_over", ERROR,
-        "the motion of both shakers from the start on, with either sign",
-        "the simulated shaker moves down where the measured one moves up (correlation {correlation:.2f} from the start "
-        "on): the drive was recorded by a vibrometer that is upside down against the camera; make it again with "
-        "camera (--camera) or polarity (--polarity) -1",
-        ("camera", "polarity"),
-    ),
-    Kind(
-        "comparison.shifted", WARNING,
-        "the phase of both shakers, where the start of the excitation is known",
-        "the shakers are {shift:+.2f} cycles apart counted from the start of each: start (--start) is wrong, or the "
-        "drive is of another test; the measured clock was shifted by as much",
-        ("start",),
-    ),
-    Kind(
-        "comparison.no_start", INFO,
-        "whether the start of the excitation was given, or seen in the shaker",
-        "without start (--start), and with a shaker that moves from the first sample on, it is not known which cycle "
-        "is the first: the runs are aligned within a cycle only",
-        ("start",),
-    ),
-    Kind(
-        "comparison.no_shaker", INFO,
-        "whether the measured run has the displacement of the shaker",
-        "the shaker was not recorded: start (--start) alone aligns the runs, and its error shifts them; amplitude and phase "
-        "of the drive are not compared",
-        ("start",),
-    ),
-    Kind(
-        "comparison.amplitude", WARNING,
-        "the amplitude of both shakers",
-        "the measured shaker moves {ratio:.3f} times as far as the simulated one: another test, or another scale",
-    ),
-    Kind(
-        "comparison.units", ERROR,
-        "measured points on the map, against the same points in another unit or with columns exchanged",
-        "{inside:.0f} of {points:.0f} measured points lie on the map; {fitting:.0f} would, and with its classes, if "
-        "{told}: look at the columns of the table and at their units",
-    ),
-    Kind(
-        "comparison.contradicting", WARNING,
-        "classes of measured points with the same coordinates",
-        "{points:.0f} measured points have the coordinates of another point and a different class: they do not "
-        "count; correct the table",
-    ),
-    Kind(
-        "comparison.gaps", INFO,
-        "share of the cycles that were measured",
-        "{share_percent:.0f} % of the compared cycles were not measured",
-    ),
-)  # fmt: skip
-
-
-# ----------------------------------------------------------------------------------------------------
-# A free decay against itself: was it free, was it whole, does the model say it all.
-
+    "comparison",
+    info={
+        "no_start": "without start (--start), and with a shaker that moves from the first sample on, it is not known "
+        "which cycle is the first: the runs are aligned within a cycle only",
+        "no_shaker": "the shaker was not recorded: start (--start) alone aligns the runs, and its error shifts them; "
+        "amplitude and phase of the drive are not compared",
+        "gaps": "{share_percent:.0f} % of the compared cycles were not measured",
+    },
+    warning={
+        "shifted": "the shakers are {shift:+.2f} cycles apart counted from the start of each: start (--start) is "
+        "wrong, or the drive is of another test; the measured clock was shifted by as much",
+        "amplitude": "the measured shaker moves {ratio:.3f} times as far as the simulated one: another test, or "
+        "another scale",
+        "contradicting": "{points:.0f} measured points have the coordinates of another point and a different class: "
+        "they do not count; correct the table",
+    },
+    error={
+        "turned_over": "the simulated shaker moves down where the measured one moves up (correlation "
+        "{correlation:.2f} from the start on): the drive was recorded by a vibrometer that is upside down against the "
+        "camera; make it again with camera (--camera) or polarity (--polarity) -1",
+        "units": "{inside:.0f} of {points:.0f} measured points lie on the map; {fitting:.0f} would, and with its "
+        "classes, if {told}: look at the columns of the table and at their units",
+    },
+)
 
 KINDS_DECAY = table(
-    Kind(
-        "decay.release", INFO,
-        "where the motion sets in",
-        "the free decay begins at {start:.6g} s; what lies before is left out (start, --start, says otherwise)",
-        ("start",),
-    ),
-    Kind(
-        "decay.clipped", WARNING,
-        "levels hit exactly again and again, or first maxima that do not fall",
-        "tops are cut off until {until:.6g} s: the decay is taken from there; choose a larger range",
-    ),
-    Kind(
-        "decay.clipped_throughout", ERROR,
-        "levels hit exactly again and again, or first maxima that do not fall",
-        "tops are cut off over nearly the whole decay, so that its damping is not in it; choose a larger range",
-    ),
-    Kind(
-        "decay.disturbed", WARNING,
-        "amplitude and phase of the mode, cycle by cycle",
-        "at {at:.6g} s the motion jumps by {jump_percent:.0f} % of its amplitude: a second hit, or a dropout; only the "
-        "decay {told} that is used (start, --start, and stop, --stop, choose)",
-        ("start", "stop"),
-    ),
-    Kind(
-        "decay.drift", INFO,
-        "the mean over each cycle",
-        "the zero drifts by {drift_percent:.0f} % of the amplitude; taken out as a polynomial of degree {degree:.0f}",
-    ),
-    Kind(
-        "decay.hum", INFO,
-        "lines that do not decay",
-        "a line of {frequency:.3f} Hz with {amplitude_percent:.1f} % of the amplitude does not decay (mains or a "
-        "machine); taken out",
-    ),
-    Kind(
-        "decay.hum_asked", ERROR,
-        "lines that do not decay, near a frequency that was asked for",
-        "near frequencies (--frequencies) {asked:.5g} Hz there is only a line of {frequency:.4f} Hz that does not "
-        "decay",
-        ("frequencies",),
-    ),
-    Kind(
-        "decay.close_modes", INFO,
-        "poles of the matrix pencil, and what one mode leaves",
-        "two modes lie close together, {first:.3f} and {second:.3f} Hz: both are fitted (modes, --modes, shows both)",
-        ("modes",),
-    ),
-    Kind(
-        "decay.damping_law", INFO,
-        "the amplitude cycle by cycle, against viscous, dry and quadratic damping",
-        "beside viscous damping there is {told} damping, {strength:.2f} +- {error:.1g} times as strong at the start: "
-        "the damping ratio is that of the viscous part, of vanishing amplitude",
-    ),
-    Kind(
-        "decay.damping_curve", INFO,
-        "the amplitude cycle by cycle, against viscous, dry and quadratic damping and monotone curves of amplitude",
-        "damping depends on amplitude in a free form, {times:.3g} times that of zero amplitude at the start; no amplitude "
-        "below {lowest_percent:.2g} % of the first stands out of the noise: the damping ratio is extrapolated to zero, and "
-        "its standard error holds the curves that fit",
-    ),
-    Kind(
-        "decay.misfit", WARNING,
-        "what the fit leaves near the mode, against the noise about it",
-        "the fit leaves {ratio:.1f} times as much near the mode as the noise explains ({share_percent:.1f} % of the "
-        "amplitude): something else is in the record; standard errors are raised to what parts of the decay differ by",
-    ),
-    Kind(
-        "decay.parts_differ", WARNING,
-        "frequency and damping of the early and the late half of the decay",
-        "the early and the late half of the decay differ by {frequency_se:.1f} standard errors in frequency and "
-        "{damping_se:.1f} in damping; standard errors are raised by that",
-    ),
-    Kind(
-        "decay.frequency_drift", WARNING,
-        "the phase cycle by cycle, against softening and a stop that the beam touches",
-        "the frequency changes by {share_percent:+.2f} % over the decay in a way that its amplitude does not: the "
-        "temperature, or a clamp that creeps; the frequency is that of the start, and the change is in its standard "
-        "error",
-    ),
-    Kind(
-        "decay.touches", WARNING,
-        "amplitude and phase cycle by cycle, against softening, drag, dry friction and a creeping frequency",
-        "above {level_percent:.2g} % of the first amplitude the beam touches a stop on one side, as a shaker not yet drawn "
-        "back (both the frequency and the damping are higher there): the decay is taken from {until:.6g} s where enough "
-        "is left after it, else the difference is in the standard errors",
-    ),
-    Kind(
-        "decay.window", WARNING,
-        "the noise of the sensor in each eighth of the record, which does not decay",
-        "the noise falls with the decay, {factor:.1f} times over the record, as under an exponential window of "
-        "{constant:.3g} s: such a window adds {added_percent:.3g} % to the damping ratio, which is in its standard "
+    "decay",
+    info={
+        "release": "the free decay begins at {start:.6g} s; what lies before is left out (start, --start, says "
+        "otherwise)",
+        "drift": "the zero drifts by {drift_percent:.0f} % of the amplitude; taken out as a polynomial of degree "
+        "{degree:.0f}",
+        "hum": "a line of {frequency:.3f} Hz with {amplitude_percent:.1f} % of the amplitude does not decay (mains or "
+        "a machine); taken out",
+        "close_modes": "two modes lie close together, {first:.3f} and {second:.3f} Hz: both are fitted (modes, "
+        "--modes, shows both)",
+        "damping_law": "beside viscous damping there is {told} damping, {strength:.2f} +- {error:.1g} times as strong "
+        "at the start: the damping ratio is that of the viscous part, of vanishing amplitude",
+        "damping_curve": "damping depends on amplitude in a free form, {times:.3g} times that of zero amplitude at "
+        "the start; no amplitude below {lowest_percent:.2g} % of the first stands out of the noise: the damping ratio "
+        "is extrapolated to zero, and its standard error holds the curves that fit",
+    },
+    warning={
+        "clipped": "tops are cut off until {until:.6g} s: the decay is taken from there; choose a larger range",
+        "disturbed": "at {at:.6g} s the motion jumps by {jump_percent:.0f} % of its amplitude: a second hit, or a "
+        "dropout; only the decay {told} that is used (start, --start, and stop, --stop, choose)",
+        "misfit": "the fit leaves {ratio:.1f} times as much near the mode as the noise explains ({share_percent:.1f} "
+        "% of the amplitude): something else is in the record; standard errors are raised to what parts of the decay "
+        "differ by",
+        "parts_differ": "the early and the late half of the decay differ by {frequency_se:.1f} standard errors in "
+        "frequency and {damping_se:.1f} in damping; standard errors are raised by that",
+        "frequency_drift": "the frequency changes by {share_percent:+.2f} % over the decay in a way that its "
+        "amplitude does not: the temperature, or a clamp that creeps; the frequency is that of the start, and the "
+        "change is in its standard error",
+        "touches": "above {level_percent:.2g} % of the first amplitude the beam touches a stop on one side, as a "
+        "shaker not yet drawn back (both the frequency and the damping are higher there): the decay is taken from "
+        "{until:.6g} s where enough is left after it, else the difference is in the standard errors",
+        "window": "the noise falls with the decay, {factor:.1f} times over the record, as under an exponential window "
+        "of {constant:.3g} s: such a window adds {added_percent:.3g} % to the damping ratio, which is in its standard "
         "error; save the record without a window, or give its exponential_window (--exponential-window)",
-        ("exponential_window",),
-    ),
-    Kind(
-        "decay.fade", WARNING,
-        "the noise of the sensor in each eighth of the record, which does not decay",
-        "the noise falls faster and faster, {factor:.1f} times over the record, as under a fade-out: it adds about "
-        "{added_percent:.3g} % to the damping ratio, which is in its standard error; save the record without a window "
-        "or fade-out, or end it before that (stop, --stop)",
-        ("stop",),
-    ),
-    Kind(
-        "decay.one_sided", ERROR,
-        "the least values of the first cycles and of the last, while the greatest ones fall",
-        "the tops fall towards bottoms that stay level: the signal was rectified or squared, and the mode has half the "
-        "frequency, {half_hz:.5g} Hz; record the signal itself",
-    ),
-    Kind(
-        "decay.hardening", WARNING,
-        "the sign of the change of the frequency with amplitude",
-        "the frequency rises with amplitude, by {rise_percent:.2g} % at the start ({certain:.0f} standard errors); "
-        "about a well a buckled beam softens: the beam is not buckled, or the mode lies above half the sampling "
-        "frequency, {half_hz:.5g} Hz, and is seen folded",
-    ),
-    Kind(
-        "decay.above_band", WARNING,
-        "the frequency of a mode against the sampling frequency",
-        "a mode at {frequency:.5g} Hz lies above {limit_hz:.5g} Hz, the sampling frequency over 2.56, where filters "
-        "against aliasing still let pass what lies above half of it: it may be {folded:.5g} Hz; record faster",
-    ),
-    Kind(
-        "decay.short", WARNING,
-        "the amplitude left at the end",
-        "the record ends with {left_percent:.0f} % of the amplitude left: damping is read from little decay",
-    ),
-    Kind(
-        "decay.large", WARNING,
-        "change of the frequency with amplitude",
-        "the frequency changes by {change_percent:.0f} %: leave out the first cycles with start (--start)",
-        ("start",),
-    ),
-    Kind(
-        "decay.faint", WARNING,
-        "the amplitude at the start against the noise",
-        "the first mode starts less than 5 times above the noise",
-    ),
-    Kind(
-        "decay.undamped", WARNING,
-        "the damping ratio against its standard error",
-        "the damping ratio is not told from zero",
-    ),
-    Kind(
-        "decay.off_asked", WARNING,
-        "the frequency found, against the one asked for",
-        "frequencies (--frequencies) {asked:.5g} Hz was asked for, the nearest mode is at {found:.5g} Hz",
-        ("frequencies",),
-    ),
-)  # fmt: skip
-
-
-# ----------------------------------------------------------------------------------------------------
-# A recording's file against itself: times that contradict each other, pictures that were not kept as taken.
-
+        "fade": "the noise falls faster and faster, {factor:.1f} times over the record, as under a fade-out: it adds "
+        "about {added_percent:.3g} % to the damping ratio, which is in its standard error; save the record without a "
+        "window or fade-out, or end it before that (stop, --stop)",
+        "hardening": "the frequency rises with amplitude, by {rise_percent:.2g} % at the start ({certain:.0f} "
+        "standard errors); about a well a buckled beam softens: the beam is not buckled, or the mode lies above half "
+        "the sampling frequency, {half_hz:.5g} Hz, and is seen folded",
+        "above_band": "a mode at {frequency:.5g} Hz lies above {limit_hz:.5g} Hz, the sampling frequency over 2.56, "
+        "where filters against aliasing still let pass what lies above half of it: it may be {folded:.5g} Hz; record "
+        "faster",
+        "short": "the record ends with {left_percent:.0f} % of the amplitude left: damping is read from little decay",
+        "large": "the frequency changes by {change_percent:.0f} %: leave out the first cycles with start (--start)",
+        "faint": "the first mode starts less than 5 times above the noise",
+        "undamped": "the damping ratio is not told from zero",
+        "off_asked": "frequencies (--frequencies) {asked:.5g} Hz was asked for, the nearest mode is at {found:.5g} Hz",
+    },
+    error={
+        "clipped_throughout": "tops are cut off over nearly the whole decay, so that its damping is not in it; choose "
+        "a larger range",
+        "hum_asked": "near frequencies (--frequencies) {asked:.5g} Hz there is only a line of {frequency:.4f} Hz that "
+        "does not decay",
+        "one_sided": "the tops fall towards bottoms that stay level: the signal was rectified or squared, and the "
+        "mode has half the frequency, {half_hz:.5g} Hz; record the signal itself",
+    },
+)
 
 LOSSY_ERROR = 0.15
 """Standard error [px] of an edge in a video that throws detail away; measured 0.06 to 0.14 px."""
 
 KINDS_RECORDING = table(
-    Kind(
-        "recording.lossy", WARNING,
-        "the compression of a video or of images",
-        "the file's compression throws detail away: edges lie 0.06 to 0.14 px off however little they scatter; "
-        "standard errors are raised to {error_px:.2f} px; save the recording uncompressed",
-    ),
-    Kind(
-        "recording.rate_given", INFO,
-        "the frame rate that was given, against the header's",
-        "frame_rate (--frame-rate) = {given:g} Hz is taken, the file says {stated:g} Hz",
-        ("frame_rate",),
-    ),
-    Kind(
-        "recording.contradiction", INFO,
-        "frames saved, frames recorded and the step between them, against each other",
-        "the header contradicts itself about the step between frames; frame_rate (--frame-rate) = {given:g} Hz is "
-        "taken as given",
-        ("frame_rate",),
-    ),
-    Kind(
-        "recording.shutter", INFO,
-        "the exposure against the time between frames",
-        "a shutter of {stated:g} s cannot be: read as its reciprocal, {exposure_us:.4g} us",
-    ),
-    Kind(
-        "recording.no_exposure", INFO,
-        "the exposure against the time between frames",
-        "a shutter of {stated:g} s cannot be within a frame of {frame_us:.4g} us: the exposure is not known",
-    ),
-    Kind(
-        "recording.two_exposures", INFO,
-        "two fields of the exposure, against each other",
-        "the header gives exposures of {first_us:.4g} and {second_us:.4g} us; the second is taken",
-    ),
-    Kind(
-        "recording.frames_missing", WARNING,
-        "numbers or time stamps of the frames",
-        "{frames:.0f} frame(s) are missing at {places:.0f} place(s), the first after frame {first:.0f}, by the numbers or "
-        "time stamps in the file; there the result is NaN, and later times are right",
-    ),
-    Kind(
-        "recording.curve", WARNING,
-        "the camera's curve and edge enhancement in the header",
-        "the camera's settings bend edges (curve of gamma {gamma:g}, edge enhancement {enhance:g}): switch both "
-        "off, or undo the curve with gamma (--gamma)",
-        ("gamma",),
-    ),
-    Kind(
-        "recording.colour", INFO,
-        "pictures in colour",
-        "pictures in {channels:.0f} colours are turned to grey",
-    ),
-    Kind(
-        "recording.mosaic", WARNING,
-        "grey levels of every other pixel, against their neighbours",
-        "pixels lie under a mosaic of colour filters (levels {spread_percent:.0f} % apart): each kind is "
+    "recording",
+    info={
+        "rate_given": "frame_rate (--frame-rate) = {given:g} Hz is taken, the file says {stated:g} Hz",
+        "contradiction": "the header contradicts itself about the step between frames; frame_rate (--frame-rate) = "
+        "{given:g} Hz is taken as given",
+        "shutter": "a shutter of {stated:g} s cannot be: read as its reciprocal, {exposure_us:.4g} us",
+        "no_exposure": "a shutter of {stated:g} s cannot be within a frame of {frame_us:.4g} us: the exposure is not "
+        "known",
+        "two_exposures": "the header gives exposures of {first_us:.4g} and {second_us:.4g} us; the second is taken",
+        "colour": "pictures in {channels:.0f} colours are turned to grey",
+    },
+    warning={
+        "lossy": "the file's compression throws detail away: edges lie 0.06 to 0.14 px off however little they "
+        "scatter; standard errors are raised to {error_px:.2f} px; save the recording uncompressed",
+        "frames_missing": "{frames:.0f} frame(s) are missing at {places:.0f} place(s), the first after frame "
+        "{first:.0f}, by the numbers or time stamps in the file; there the result is NaN, and later times are right",
+        "curve": "the camera's settings bend edges (curve of gamma {gamma:g}, edge enhancement {enhance:g}): switch "
+        "both off, or undo the curve with gamma (--gamma)",
+        "mosaic": "pixels lie under a mosaic of colour filters (levels {spread_percent:.0f} % apart): each kind is "
         "brought to the same mean, which is right for grey things in white light only",
-    ),
-)  # fmt: skip
-
-
-# ----------------------------------------------------------------------------------------------------
-# A frequency response against the length of its record and the noise.
-
+    },
+)
 
 KINDS_RESPONSE = table(
-    Kind(
-        "response.incoherent", WARNING,
-        "coherence of both signals, line by line",
-        "no more than {lines:.0f} neighbouring lines are coherent: the excitation is narrow, or the response is noise; excite "
-        "by random vibration, an impact or a sweep, or record longer",
-    ),
-    Kind(
-        "response.no_mode", WARNING,
-        "lines about the highest peak",
-        "no mode can be fitted to the peak at {frequency:.5g} Hz: its height may be too small by the window, and its "
-        "standard error is that of the noise alone; choose another resolution (--resolution)",
-        ("resolution",),
-    ),
-    Kind(
-        "response.coarse", WARNING,
-        "bias of the highest peak by the window, of the mode fitted to it",
-        "the line at the peak of {frequency:.5g} Hz is {bias_percent:.2g} % off by the window, which is in its standard "
-        "error; the fitted mode has {magnitude:.4g}; choose a smaller resolution (--resolution), or record longer",
-        ("resolution",),
-    ),
-)  # fmt: skip
-
-
-# ----------------------------------------------------------------------------------------------------
-# A file of a time series against its own header.
-
+    "response",
+    warning={
+        "incoherent": "no more than {lines:.0f} neighbouring lines are coherent: the excitation is narrow, or the "
+        "response is noise; excite by random vibration, an impact or a sweep, or record longer",
+        "no_mode": "no mode can be fitted to the peak at {frequency:.5g} Hz: its height may be too small by the "
+        "window, and its standard error is that of the noise alone; choose another resolution (--resolution)",
+        "coarse": "the line at the peak of {frequency:.5g} Hz is {bias_percent:.2g} % off by the window, which is in "
+        "its standard error; the fitted mode has {magnitude:.4g}; choose a smaller resolution (--resolution), or "
+        "record longer",
+    },
+)
 
 KINDS_SIGNAL = table(
-    Kind(
-        "signal.cut_in_number", WARNING,
-        "digits of the last number of a text table, against those above it",
-        "{told}, as a copy that was broken off does",
-    ),
-    Kind(
-        "signal.cut", WARNING,
-        "samples in the file, against the number in its header",
-        "{told}: the header promises {promised:.0f} samples and the file contains {found:.0f}: the file was cut; copy it again",
-    ),
-    Kind(
-        "signal.appended", WARNING,
-        "samples in the file, against the number in its header",
-        "{told}: the header promises {promised:.0f} samples and the file contains {found:.0f}: later records were appended, "
-        "which need not follow the first without a gap; save each record to a file of its own",
-    ),
-)  # fmt: skip
-
-
-# ----------------------------------------------------------------------------------------------------
-# A vibrometer's record against itself and against what was set.
-
+    "signal",
+    warning={
+        "cut_in_number": "{told}, as a copy that was broken off does",
+        "cut": "{told}: the header promises {promised:.0f} samples and the file contains {found:.0f}: the file was "
+        "cut; copy it again",
+        "appended": "{told}: the header promises {promised:.0f} samples and the file contains {found:.0f}: later "
+        "records were appended, which need not follow the first without a gap; save each record to a file of its own",
+    },
+)
 
 KINDS_VIBROMETER = table(
-    Kind(
-        "vibrometer.noisy", WARNING,
-        "the sine against noise and distortion together",
-        "sine to noise and distortion {sinad_db:.1f} dB, not above {limit_db:g} dB: noise",
-    ),
-    Kind(
-        "vibrometer.distorted", WARNING,
-        "the sine against noise and distortion together",
-        "sine to noise and distortion {sinad_db:.1f} dB, not above {limit_db:g} dB: distortion",
-    ),
-    Kind(
-        "vibrometer.dropout", WARNING,
-        "stretches in which the record leaves its steady sine by far more than its noise",
-        "{count:.0f} dropout(s) or spike(s), {total_ms:.3g} ms together, the first at {at:.6g} s: left out of the "
-        "fit, and bridged by the steady motion in displacement and drive",
-    ),
-    Kind(
-        "vibrometer.dropout_in_start", ERROR,
-        "values that stand still, or jump, while the shaker starts",
-        "a dropout of {total_ms:.3g} ms in the start-up at {at:.6g} s: what the shaker did there is not known, so no "
-        "drive can be made of this record",
-    ),
-    Kind(
-        "vibrometer.clipped", WARNING,
-        "tops of the mean cycle flatter than a sine's, or levels hit exactly again and again",
-        "the tops are cut off over {share_percent:.0f} % of the cycle: the amplitude is taken from the rest of it, "
-        "with a wider standard error; choose a larger range on the vibrometer",
-    ),
-    Kind(
-        "vibrometer.unsteady", WARNING,
-        "amplitude and phase cycle by cycle after the start-up",
-        "the motion does not stay steady (cycles stray by {stray_percent:.1f} %): the standard error of the amplitude "
-        "is that of its parts",
-    ),
-    Kind(
-        "vibrometer.hum", INFO,
-        "lines that are in the rest before the start as they are in the motion",
-        "a line of {frequency:.3f} Hz with {share_percent:.1f} % of the amplitude is there at rest too (mains); taken "
-        "out",
-    ),
-    Kind(
-        "vibrometer.second_line", WARNING,
-        "lines beside the drive and its harmonics that are not in the rest before the start",
-        "beside the drive there is a line of {frequency:.4g} Hz with {share_percent:.1f} % of its amplitude: the "
-        "shaker moves at two frequencies, or the record holds hum and no rest to tell it by; what it may pull is in "
-        "the standard errors",
-    ),
-    Kind(
-        "vibrometer.interrupted", ERROR,
-        "motion at the same frequency before or after the longest stretch of it",
-        "the motion stops and begins again: {outside_ms:.3g} ms of it lie outside the longest stretch, and are not in "
-        "its start-up or its displacement; cut the record, or record again",
-    ),
-    Kind(
-        "vibrometer.frequency", WARNING,
-        "the frequency found, against the one set",
-        "the shaker moves at {found:.6g} Hz, not at the frequency (--frequency) of {stated:g} Hz that was set",
-        ("frequency",),
-    ),
-    Kind(
-        "vibrometer.amplitude", WARNING,
-        "the amplitude found, against the one set",
-        "the amplitude is {found:.5g}, {share_percent:+.1f} % off the amplitude (--amplitude) of {stated:.5g} that was "
-        "set: check range and sensitivity (--sensitivity)",
-        ("amplitude", "sensitivity"),
-    ),
-    Kind(
-        "vibrometer.low_pass", WARNING,
-        "spectrum of the noise and start of the motion, against coloured noise, low-pass, high-pass and notch filters",
-        "the noise falls steeply from {corner:.3g} Hz on, as behind a low-pass filter: at the drive's frequency it takes "
-        "up to {loss_percent:.2g} % of the amplitude, and delays the start by up to {delay_ms:.2g} ms, which is in the "
-        "standard errors; switch the filter off, or set it above {wanted:.3g} Hz",
-    ),
-    Kind(
-        "vibrometer.crosstalk", WARNING,
-        "a line at the drive's own frequency in the rest before the start",
-        "{share_percent:.2g} % of the amplitude is there at the drive's frequency before the start (crosstalk, or a floor "
-        "that moves): taken out for the start, and in the standard error of the amplitude; look at cables and supports",
-    ),
-    Kind(
-        "vibrometer.saturated", WARNING,
-        "odd harmonics, against a shaker's own third, saturation, a limited slew rate, a dead zone and play",
-        "the tops are pressed flat as by an amplifier near its limit (third harmonic {third_percent:.2g} %): the amplitude "
-        "may be {loss_percent:.2g} % too small, which is in its standard error; choose a larger range",
-    ),
-    Kind(
-        "vibrometer.slew", WARNING,
-        "odd harmonics, against a shaker's own third, saturation, a limited slew rate, a dead zone and play",
-        "the flanks are straight as of electronics with a limited slew rate (third harmonic {third_percent:.2g} %): the "
-        "amplitude may be {loss_percent:.2g} % too small, which is in its standard error; choose a larger range, or a "
-        "decoder for faster motion",
-    ),
-    Kind(
-        "vibrometer.crossover", WARNING,
-        "odd harmonics, against a shaker's own third, saturation, a limited slew rate, a dead zone and play",
-        "small values are suppressed as by an amplifier with a dead zone about zero (third harmonic "
+    "vibrometer",
+    info={
+        "hum": "a line of {frequency:.3f} Hz with {share_percent:.1f} % of the amplitude is there at rest too "
+        "(mains); taken out",
+        "high_pass_possible": "noise and start do not exclude a high-pass filter (AC coupling) of up to {corner:.3g} "
+        "Hz, which would take {loss_percent:.2g} % of the amplitude: {taken_percent:.2g} % is in the standard error; "
+        "a sudden start after a longer rest, a longer record or less noise excludes it, and DC coupling or a corner "
+        "below {limit:.2g} Hz",
+        "slow_start": "the shaker starts so gently that its start is known to {uncertainty_ms:.2g} ms only",
+        "no_rest": "the record begins in motion: its start-up is not in it, and a filter of the electronics shows in "
+        "the noise alone",
+    },
+    warning={
+        "noisy": "sine to noise and distortion {sinad_db:.1f} dB, not above {limit_db:g} dB: noise",
+        "distorted": "sine to noise and distortion {sinad_db:.1f} dB, not above {limit_db:g} dB: distortion",
+        "dropout": "{count:.0f} dropout(s) or spike(s), {total_ms:.3g} ms together, the first at {at:.6g} s: left out "
+        "of the fit, and bridged by the steady motion in displacement and drive",
+        "clipped": "the tops are cut off over {share_percent:.0f} % of the cycle: the amplitude is taken from the "
+        "rest of it, with a wider standard error; choose a larger range on the vibrometer",
+        "unsteady": "the motion does not stay steady (cycles stray by {stray_percent:.1f} %): the standard error of "
+        "the amplitude is that of its parts",
+        "second_line": "beside the drive there is a line of {frequency:.4g} Hz with {share_percent:.1f} % of its "
+        "amplitude: the shaker moves at two frequencies, or the record holds hum and no rest to tell it by; what it "
+        "may pull is in the standard errors",
+        "frequency": "the shaker moves at {found:.6g} Hz, not at the frequency (--frequency) of {stated:g} Hz that "
+        "was set",
+        "amplitude": "the amplitude is {found:.5g}, {share_percent:+.1f} % off the amplitude (--amplitude) of "
+        "{stated:.5g} that was set: check range and sensitivity (--sensitivity)",
+        "low_pass": "the noise falls steeply from {corner:.3g} Hz on, as behind a low-pass filter: at the drive's "
+        "frequency it takes up to {loss_percent:.2g} % of the amplitude, and delays the start by up to {delay_ms:.2g} "
+        "ms, which is in the standard errors; switch the filter off, or set it above {wanted:.3g} Hz",
+        "crosstalk": "{share_percent:.2g} % of the amplitude is there at the drive's frequency before the start "
+        "(crosstalk, or a floor that moves): taken out for the start, and in the standard error of the amplitude; "
+        "look at cables and supports",
+        "saturated": "the tops are pressed flat as by an amplifier near its limit (third harmonic {third_percent:.2g} "
+        "%): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; choose a larger "
+        "range",
+        "slew": "the flanks are straight as of electronics with a limited slew rate (third harmonic "
+        "{third_percent:.2g} %): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; "
+        "choose a larger range, or a decoder for faster motion",
+        "crossover": "small values are suppressed as by an amplifier with a dead zone about zero (third harmonic "
         "{third_percent:.2g} %): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; "
         "look at the power supply of the amplifier, or record without it",
-    ),
-    Kind(
-        "vibrometer.high_pass", WARNING,
-        "spectrum of the noise and start of the motion, against coloured noise, low-pass, high-pass and notch filters",
-        "the noise falls below {corner:.3g} Hz as behind a high-pass filter (AC coupling): at the drive's frequency it may "
-        "take {loss_percent:.2g} % of the amplitude, which is in its standard error; switch to DC coupling, or to a "
-        "corner below {limit:.2g} Hz",
-    ),
-    Kind(
-        "vibrometer.high_pass_possible", INFO,
-        "noise and start of the motion, against a high-pass filter of the first order",
-        "noise and start do not exclude a high-pass filter (AC coupling) of up to {corner:.3g} Hz, which would take "
-        "{loss_percent:.2g} % of the amplitude: {taken_percent:.2g} % is in the standard error; a sudden start after a longer rest, a longer "
-        "record or less noise excludes it, and DC coupling or a corner below {limit:.2g} Hz",
-    ),
-    Kind(
-        "vibrometer.notch", WARNING,
-        "spectrum of the noise and start of the motion, against coloured noise, low-pass, high-pass and notch filters",
-        "the noise has a hole at {centre:g} Hz as behind a notch filter: at the drive's frequency it may take "
-        "{loss_percent:.2g} % of the amplitude, which is in its standard error; switch the filter off",
-    ),
-    Kind(
-        "vibrometer.samples_lost", ERROR,
-        "phase within the record, against jumps by whole samples at even distances and a single line",
-        "{lost:.0f} of every {every:.0f} samples are lost: the time axis is too short, and the frequency "
-        "{share_percent:.2g} % too high, which is in its standard error; record with a slower rate or a faster disk",
-    ),
-    Kind(
-        "vibrometer.drifts", WARNING,
-        "amplitude and phase cycle by cycle, against constant ones, drifts of either and two close lines",
-        "the amplitude drifts by {change_percent:.2g} % over the steady part (temperature of shaker or amplifier, or a start "
-        "that is not over): half of that is in its standard error; let the shaker warm up, record longer, or cut the record",
-    ),
-    Kind(
-        "vibrometer.beat", WARNING,
-        "amplitude and phase cycle by cycle, against constant ones, drifts of either and two close lines",
-        "the amplitude changes by {change_percent:.2g} % and the phase bends by {bend:.2g} rad over the steady part, as "
-        "where two lines beat that lie closer than one over the length of the record: which is in the standard errors; "
-        "record longer",
-    ),
-    Kind(
-        "vibrometer.clock_drifts", WARNING,
-        "amplitude and phase cycle by cycle, against constant ones, drifts of either and two close lines",
-        "the frequency changes by {share_percent:.2g} % over the steady part at a constant amplitude (the generator, or the "
-        "clock of the record): half of that is in its standard error; let both warm up, or record with one clock",
-    ),
-    Kind(
-        "vibrometer.gain", ERROR,
-        "amplitude and phase of four cycles on either side of each cycle, against a start-up",
-        "at {at:.6g} s the amplitude changes {ratio:.3g} times from one constant to another (a range that was switched): "
-        "which of them is right is not in the record, and the difference is in the standard error; cut the record there "
-        "or record again with one range",
-    ),
-    Kind(
-        "vibrometer.sign", ERROR,
-        "amplitude and phase of four cycles on either side of each cycle, against a start-up",
-        "at {at:.6g} s the sign of the signal changes: which of them is right is not in the record; cut the record there",
-    ),
-    Kind(
-        "vibrometer.hysteresis", WARNING,
-        "odd harmonics, against a shaker's own third, saturation, a limited slew rate, a dead zone and play",
-        "the signal stays behind at every turning point as with play or hysteresis (third harmonic {third_percent:.2g} %): "
-        "the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; look at the mount of the "
-        "sensor and its amplifier",
-    ),
-    Kind(
-        "vibrometer.jitter", WARNING,
-        "noise where the motion is fast, against noise where it is slow",
-        "the noise is strongest where the motion is fastest, as with a sampling clock that jitters by {jitter_us:.3g} us: "
-        "it takes {loss_percent:.2g} % of the amplitude, which is in its standard error; use the clock of the converter",
-    ),
-    Kind(
-        "vibrometer.few_bits", WARNING,
-        "distinct values of the record",
-        "the record has {levels:.0f} levels only, {steps:.2g} of them to the amplitude: their rounding is in the standard "
-        "error; choose a smaller range",
-    ),
-    Kind(
-        "vibrometer.interpolated", WARNING,
-        "samples that lie exactly on the line through their neighbours",
-        "the samples were put in between others, {each:.2g} of them to a cycle: straight lines or steps take "
-        "{loss_percent:.2g} % of the amplitude, which is in its standard error; take the samples as they were recorded",
-    ),
-    Kind(
-        "vibrometer.one_sided", ERROR,
-        "the mean of the motion against the level at rest",
-        "the mean moves by {share:.2g} times the amplitude when the motion starts, so this is no velocity or displacement "
-        "of a shaker: rectified or squared, with half its frequency; record the signal itself",
-    ),
-    Kind(
-        "vibrometer.not_there", ERROR,
-        "the sine at the frequency that was set, against the highest line of the spectrum",
-        "at the frequency (--frequency) of {stated:g} Hz there is hardly any motion; the highest line is at {found:.6g} Hz: "
-        "another frequency, another channel (--channel), or a rectified or squared signal",
-        ("frequency", "channel"),
-    ),
-    Kind(
-        "vibrometer.beyond_shakers", ERROR,
-        "velocity, acceleration and travel against those of electrodynamic shakers",
-        "{told}, more than electrodynamic shakers can do (the motion has {speed:.3g} m/s, {acceleration_g:.3g} g, "
-        "{travel_mm:.3g} mm): check the unit (units, --units; mm/s may have been read as m/s) and sensitivity "
-        "(--sensitivity)",
-        ("units", "sensitivity"),
-    ),
-    Kind(
-        "vibrometer.clocks", ERROR,
-        "frequency of the motion, against that of the acceleration of the same shaker",
-        "the shaker moves at {own:.6g} Hz, its acceleration (--acceleration) at {other:.6g} Hz, {ratio:.4g} times as "
-        "fast: another test, or a sampling frequency (sampling_frequency, --sampling-frequency) of one record is wrong",
-        ("acceleration", "sampling_frequency"),
-    ),
-    Kind(
-        "vibrometer.acceleration", ERROR,
-        "amplitude of the motion, against that of the acceleration of the same shaker, and factors of mistaken units",
-        "acceleration (--acceleration) is {ratio:.4g} times what belongs to this motion: {told}",
-        ("acceleration",),
-    ),
-    Kind(
-        "vibrometer.slow_start", INFO,
-        "how well the start of the motion is told",
-        "the shaker starts so gently that its start is known to {uncertainty_ms:.2g} ms only",
-    ),
-    Kind(
-        "vibrometer.no_rest", INFO,
-        "rest before the motion",
-        "the record begins in motion: its start-up is not in it, and a filter of the electronics shows in the noise alone",
-    ),
-)  # fmt: skip
+        "high_pass": "the noise falls below {corner:.3g} Hz as behind a high-pass filter (AC coupling): at the "
+        "drive's frequency it may take {loss_percent:.2g} % of the amplitude, which is in its standard error; switch "
+        "to DC coupling, or to a corner below {limit:.2g} Hz",
+        "notch": "the noise has a hole at {centre:g} Hz as behind a notch filter: at the drive's frequency it may "
+        "take {loss_percent:.2g} % of the amplitude, which is in its standard error; switch the filter off",
+        "drifts": "the amplitude drifts by {change_percent:.2g} % over the steady part (temperature of shaker or "
+        "amplifier, or a start that is not over): half of that is in its standard error; let the shaker warm up, "
+        "record longer, or cut the record",
+        "beat": "the amplitude changes by {change_percent:.2g} % and the phase bends by {bend:.2g} rad over the "
+        "steady part, as where two lines beat that lie closer than one over the length of the record: which is in the "
+        "standard errors; record longer",
+        "clock_drifts": "the frequency changes by {share_percent:.2g} % over the steady part at a constant amplitude "
+        "(the generator, or the clock of the record): half of that is in its standard error; let both warm up, or "
+        "record with one clock",
+        "hysteresis": "the signal stays behind at every turning point as with play or hysteresis (third harmonic "
+        "{third_percent:.2g} %): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; "
+        "look at the mount of the sensor and its amplifier",
+        "jitter": "the noise is strongest where the motion is fastest, as with a sampling clock that jitters by "
+        "{jitter_us:.3g} us: it takes {loss_percent:.2g} % of the amplitude, which is in its standard error; use the "
+        "clock of the converter",
+        "few_bits": "the record has {levels:.0f} levels only, {steps:.2g} of them to the amplitude: their rounding is "
+        "in the standard error; choose a smaller range",
+        "interpolated": "the samples were put in between others, {each:.2g} of them to a cycle: straight lines or "
+        "steps take {loss_percent:.2g} % of the amplitude, which is in its standard error; take the samples as they "
+        "were recorded",
+    },
+    error={
+        "dropout_in_start": "a dropout of {total_ms:.3g} ms in the start-up at {at:.6g} s: what the shaker did there "
+        "is not known, so no drive can be made of this record",
+        "interrupted": "the motion stops and begins again: {outside_ms:.3g} ms of it lie outside the longest stretch, "
+        "and are not in its start-up or its displacement; cut the record, or record again",
+        "samples_lost": "{lost:.0f} of every {every:.0f} samples are lost: the time axis is too short, and the "
+        "frequency {share_percent:.2g} % too high, which is in its standard error; record with a slower rate or a "
+        "faster disk",
+        "gain": "at {at:.6g} s the amplitude changes {ratio:.3g} times from one constant to another (a range that was "
+        "switched): which of them is right is not in the record, and the difference is in the standard error; cut the "
+        "record there or record again with one range",
+        "sign": "at {at:.6g} s the sign of the signal changes: which of them is right is not in the record; cut the "
+        "record there",
+        "one_sided": "the mean moves by {share:.2g} times the amplitude when the motion starts, so this is no "
+        "velocity or displacement of a shaker: rectified or squared, with half its frequency; record the signal itself",
+        "not_there": "at the frequency (--frequency) of {stated:g} Hz there is hardly any motion; the highest line is "
+        "at {found:.6g} Hz: another frequency, another channel (--channel), or a rectified or squared signal",
+        "beyond_shakers": "{told}, more than electrodynamic shakers can do (the motion has {speed:.3g} m/s, "
+        "{acceleration_g:.3g} g, {travel_mm:.3g} mm): check the unit (units, --units; mm/s may have been read as m/s) "
+        "and sensitivity (--sensitivity)",
+        "clocks": "the shaker moves at {own:.6g} Hz, its acceleration (--acceleration) at {other:.6g} Hz, {ratio:.4g} "
+        "times as fast: another test, or a sampling frequency (sampling_frequency, --sampling-frequency) of one "
+        "record is wrong",
+        "acceleration": "acceleration (--acceleration) is {ratio:.4g} times what belongs to this motion: {told}",
+    },
+)

@@ -43,7 +43,6 @@ class Alignment:
     --------
     >>> from snapbeam import lab
     >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
-    >>> drive = lab.measure_drive(velocity, 100.0)
     >>> import numpy as np
     >>> time = np.arange(4000) / 10e3  # s; the camera starts 0.05 s after the vibrometer
     >>> onset = np.clip(time - 0.05, 0.0, None)
@@ -106,7 +105,6 @@ def align(
     --------
     >>> from snapbeam import lab
     >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
-    >>> drive = lab.measure_drive(velocity, 100.0)
     >>> import numpy as np
     >>> time = np.arange(4000) / 10e3  # s; the camera starts 0.05 s after the vibrometer
     >>> onset = np.clip(time - 0.05, 0.0, None)

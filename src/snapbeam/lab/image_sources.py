@@ -21,7 +21,7 @@ from snapbeam.lab.diagnostics import KINDS_RECORDING, LOSSY_ERROR
 from snapbeam.lab.frame_times import cine_times, numbers_of_stamps
 from snapbeam.lab.photron import CameraHeader, check_pixels, read_header, read_mraw
 from snapbeam.lab.signal_formats import is_time, seconds_in, stated_unit
-from snapbeam.lab.signals import si_unit
+from snapbeam.lab.signals import unit_factor
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import refuse_inflated
@@ -51,18 +51,10 @@ _LUMA = np.array([0.299, 0.587, 0.114])
 class FrameSource:
     """Frames of one file, folder or pattern.
 
-    Attributes
-    ----------
-    shape, numbers, max_value
-        (height, width); number of each frame; the largest grey level the file can hold.
-    frame_rate, pixel_size, pixel_width, exposure
-        [Hz], [m], [m], [s], or None where the file does not say; ``pixel_size`` is the height of a pixel.
-    frame_rate_question, pixel_size_hint
-        Ambiguous information of the file, for the error message.
-    diagnostics, edge_error
-        What makes measurements doubtful, and the standard error [px] that the format adds to every edge.
-    metadata
-        Other metadata of the file.
+    ``shape`` is (height, width), ``max_value`` the largest grey level the file can hold; ``frame_rate`` [Hz],
+    ``pixel_size`` [m, the height of a pixel], ``pixel_width`` [m] and ``exposure`` [s] are None where the file does not
+    say; ``frame_rate_question`` and ``pixel_size_hint`` what it says ambiguously, for the error message; ``edge_error``
+    is the standard error [px] that the format adds to every edge.
     """
 
     def __init__(self, path: Path) -> None:
@@ -80,12 +72,48 @@ class FrameSource:
         self.edge_error = 0.0
         self.metadata: dict[str, Any] = {}
 
+        self._dtype: Any = np.uint8
+        self._full = 0.0
+
+    def _page(self, index: int) -> NDArray[Any]:
+        """One picture in the numbers of the file, grey, of the shape and type of the first."""
+        raise NotImplementedError
+
     def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
         """Frames *start* to *stop* of the rows from the first up to the second, integers (n, rows, width)."""
-        raise NotImplementedError
+        out = np.empty((stop - start, rows[1] - rows[0], self.shape[1]), dtype=np.uint16 if self._full else self._dtype)
+        for index in range(start, stop):
+            out[index - start] = self._levels(self._page(index)[rows[0] : rows[1]], index)
+        return out
+
+    def _levels(self, values: NDArray[Any], index: int) -> NDArray[Any]:
+        """Grey levels as they are; floating point numbers from 0 to the full scale as whole levels up to 65535."""
+        if not self._full:
+            return values
+        if not np.isfinite(values).all() or values.min() < 0.0 or values.max() > self._full * (1.0 + 1e-9):
+            raise InputError(f"{self.path}: picture {index} or one after it holds numbers outside 0 to {self._full:g}")
+        return np.rint(values * (65535.0 / self._full)).clip(0, 65535).astype(np.uint16)
 
     def close(self) -> None:
         """Close open files."""
+
+    def take_type(self, dtype: Any) -> None:
+        """Take the type of the numbers; the full scale of floats is that of the first, middle and last picture."""
+        self._dtype, count = dtype, self.numbers.size
+        if dtype.kind == "f":
+            self._full = float_range([self._page(k) for k in {0, count // 2, count - 1}], self.path)
+        self.max_value = 65535 if self._full else int(np.iinfo(dtype).max)
+
+    def tell_lossy(self) -> None:
+        """Add the diagnostic of a lossy compression, and its error."""
+        self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
+        self.edge_error = LOSSY_ERROR
+
+    def tell_colour(self, channels: int) -> None:
+        """Add the diagnostic of pictures in colour, once."""
+        found = KINDS_RECORDING["colour"].found(channels=channels)
+        if found not in self.diagnostics:
+            self.diagnostics += (found,)
 
     def state_rate(self, rates: Mapping[str, float]) -> None:
         """Take the frame rate [Hz] from what the file states, in words; statements that differ become a question."""
@@ -104,20 +132,12 @@ def grey_of(colors: NDArray[Any]) -> NDArray[Any]:
     return np.rint(grey).astype(colors.dtype) if colors.dtype.kind in "iu" else grey.astype(colors.dtype)
 
 
-def scaled_floats(values: NDArray[np.floating], full: float) -> NDArray[np.uint16] | None:
-    """Pictures of floating point numbers from 0 to *full* as whole levels up to 65535; None if outside."""
-    if not np.isfinite(values).all() or values.min() < 0.0 or values.max() > full * (1.0 + 1e-9):
-        return None
-    levels: NDArray[np.uint16] = np.rint(values * (65535.0 / full)).clip(0, 65535).astype(np.uint16)
-    return levels
-
-
 # TIFF files of many pages.
 
 
-def _is_picture(shape: tuple[int, ...], dtype: Any) -> bool:
-    """Return whether an array is a grey or colour image (last axis) of a supported type."""
-    size = len(shape) == 2 or (len(shape) == 3 and shape[-1] in (3, 4))
+def _are_pictures(shape: tuple[int, ...], dtype: Any, frames: int = 0) -> bool:
+    """Return whether an array is a grey or colour image (last axis) of a supported type, after so many other axes."""
+    size = len(shape) == frames + 2 or (len(shape) == frames + 3 and shape[-1] in (3, 4))
     return size and all(shape) and (dtype.kind == "f" or (dtype.kind == "u" and dtype.itemsize <= 2))
 
 
@@ -154,7 +174,7 @@ class TiffSource(FrameSource):
             pages = self._file.pages
             count = len(pages)
             first = pages[0] if count else None
-            if first is None or first.dtype is None or not _is_picture(first.shape, first.dtype):
+            if first is None or first.dtype is None or not _are_pictures(first.shape, first.dtype):
                 kind = "no page" if first is None else f"pages of shape {first.shape} and type {first.dtype}"
                 raise InputError(
                     f"{path}: holds {kind}; a recording has pages of grey levels or red, green and blue, unsigned "
@@ -162,25 +182,18 @@ class TiffSource(FrameSource):
                 )
             _refuse_picture(path, first.shape)
             self.shape = (int(first.shape[0]), int(first.shape[1]))
-            self._dtype = first.dtype
             self._colors = first.ndim == 3
             if self._colors:
-                self.diagnostics += (KINDS_RECORDING["colour"].found(channels=first.shape[2]),)
+                self.tell_colour(first.shape[2])
             if str(getattr(first.compression, "name", "NONE")).upper() in ("JPEG", "OJPEG", "JPEG2000", "WEBP"):
-                self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
-                self.edge_error = LOSSY_ERROR
+                self.tell_lossy()
             self.metadata = {"format": "TIFF stack"}
             count = self._lay_out(self._file.imagej_metadata or {}, count, first)
             self.numbers = np.arange(count)
             self._imagej(self._file.imagej_metadata or {}, first)
             if self._file.is_ome:
                 self._ome(tifffile.xml2dict(self._file.ome_metadata)["OME"]["Image"])
-            self._full = 0.0
-            if self._dtype.kind == "f":
-                self._full = float_range([self._page(k) for k in {0, count // 2, count - 1}], path)
-                self.max_value = 65535
-            else:
-                self.max_value = int(np.iinfo(self._dtype).max)
+            self.take_type(first.dtype)
         except Exception as error:  # a damaged file makes tifffile raise many kinds
             if self._file is not None:
                 self.close()
@@ -245,7 +258,7 @@ class TiffSource(FrameSource):
         """Metres per pixel of a resolution; inches come from printers."""
         if resolution is None or not min(resolution.value) > 0 or _unescaped(unit) in ("in", "inch", "inches"):
             return None
-        metres = _metres(unit)
+        metres = unit_factor("pixel size", _unescaped(unit), "m")
         return None if metres is None else metres * resolution.value[1] / resolution.value[0]
 
     def _ome(self, image: Any) -> None:
@@ -253,7 +266,8 @@ class TiffSource(FrameSource):
         pixels = (image[0] if isinstance(image, list) else image)["Pixels"]
         sizes = {}
         for axis in "YX":
-            size, metres = (pixels.get(f"PhysicalSize{axis}"), _metres(pixels.get(f"PhysicalSize{axis}Unit", "um")))
+            size, unit = pixels.get(f"PhysicalSize{axis}"), _unescaped(pixels.get(f"PhysicalSize{axis}Unit", "um"))
+            metres = unit_factor("pixel size", unit, "m")
             sizes[axis] = None if not size or metres is None else float(size) * metres
         self.pixel_size, self.pixel_width = sizes["Y"] or sizes["X"], sizes["X"] or sizes["Y"]
         rates: dict[str, float] = {}
@@ -285,20 +299,6 @@ class TiffSource(FrameSource):
             raise InputError(f"{self.path}: page {index} is of shape {image.shape}, not {self.shape}")
         return grey_of(image) if self._colors else image
 
-    def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
-        """Return some frames, in some rows."""
-        kind = np.uint16 if self._full else self._dtype
-        out = np.empty((stop - start, rows[1] - rows[0], self.shape[1]), dtype=kind)
-        for index in range(start, stop):
-            image = self._page(index)[rows[0] : rows[1]]
-            levels = scaled_floats(image, self._full) if self._full else image
-            if levels is None:
-                raise InputError(
-                    f"{self.path}: page {index} holds numbers outside 0 to {self._full:g}, the range of the others"
-                )
-            out[index - start] = levels
-        return out
-
     def close(self) -> None:
         """Close the file."""
         self._stack = None
@@ -308,15 +308,6 @@ class TiffSource(FrameSource):
 def _unescaped(unit: Any) -> str:
     """A unit of ImageJ, which writes letters beyond ASCII by their codes."""
     return re.sub(r"\\u([0-9a-fA-F]{4})", lambda found: chr(int(found[1], 16)), str(unit or "")).strip()
-
-
-def _metres(unit: Any) -> float | None:
-    """Metres in a unit; None if it is not one of length."""
-    try:
-        factor, base = si_unit("pixel size", _unescaped(unit))
-    except InputError:
-        return None
-    return factor if base == "m" else None
 
 
 # Stacks of pictures in arrays: NumPy's .npy and HDF5.
@@ -343,7 +334,7 @@ class ArraySource(FrameSource):
             self.close()
             raise InputError(f"{path}: cannot be read as a stack of pictures ({error})") from None
         shape, dtype = self._stack.shape, self._stack.dtype
-        if not _is_stack(shape, dtype):
+        if not _are_pictures(shape, dtype, 1):
             self.close()
             raise InputError(
                 f"{path}: an array of shape {shape} and type {dtype}: must be (frames, height, width), or with 3 "
@@ -358,13 +349,8 @@ class ArraySource(FrameSource):
         self.state_rate(self._rates)
         self._colors = len(shape) == 4
         if self._colors:
-            self.diagnostics += (KINDS_RECORDING["colour"].found(channels=shape[3]),)
-        self._full = 0.0
-        if dtype.kind == "f":
-            self._full = float_range([np.asarray(self._stack[k]) for k in {0, shape[0] // 2, shape[0] - 1}], path)
-            self.max_value = 65535
-        else:
-            self.max_value = int(np.iinfo(dtype).max)
+            self.tell_colour(shape[3])
+        self.take_type(dtype)
 
     def _open(self, dataset: str) -> Any:
         if self.path.suffix.lower() == ".npy":
@@ -376,7 +362,7 @@ class ArraySource(FrameSource):
         found: dict[str, Any] = {}
 
         def visit(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset) and _is_stack(item.shape, item.dtype):
+            if isinstance(item, h5py.Dataset) and _are_pictures(item.shape, item.dtype, 1):
                 found[name] = item
 
         self._file.visititems(visit)
@@ -421,17 +407,13 @@ class ArraySource(FrameSource):
                 found[name] = float(value.item())
         return found
 
+    def _page(self, index: Any) -> NDArray[Any]:
+        pictures = np.asarray(self._stack[index])
+        return grey_of(pictures) if self._colors else pictures
+
     def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
-        """Return some frames, in some rows."""
-        part = np.asarray(self._stack[start:stop, rows[0] : rows[1]])
-        if self._colors:
-            part = grey_of(part)
-        if not self._full:
-            return part
-        levels = scaled_floats(part, self._full)
-        if levels is None:
-            raise InputError(f"{self.path}: frames {start} to {stop - 1} hold numbers outside 0 to {self._full:g}")
-        return levels
+        """Return some frames, in some rows, in one access."""
+        return self._levels(self._page((slice(start, stop), slice(*rows))), start)
 
     def close(self) -> None:
         """Close the file."""
@@ -440,31 +422,22 @@ class ArraySource(FrameSource):
             self._file = None
 
 
-def _is_stack(shape: tuple[int, ...], dtype: Any) -> bool:
-    size = len(shape) == 3 or (len(shape) == 4 and shape[-1] in (3, 4))
-    return size and all(shape) and (dtype.kind == "f" or (dtype.kind == "u" and dtype.itemsize <= 2))
-
-
 # Photron recordings: a header with its .mraw.
 
 
 def take_header(source: FrameSource, header: CameraHeader) -> None:
     """Copy times and scales of a header to a source."""
-    source.frame_rate = header.timing.frame_rate
-    source.frame_rate_question = header.timing.question
-    source.pixel_size = header.pixel_size
-    source.pixel_size_hint = header.scale_hint
-    source.exposure = header.timing.exposure
-    source.diagnostics = header.diagnostics
+    source.frame_rate, source.frame_rate_question = header.frame_rate, header.question
+    source.pixel_size, source.pixel_size_hint = header.pixel_size, header.scale_hint
+    source.exposure = header.exposure
+    source.diagnostics = (*header.diagnostics, *source.diagnostics)
     source.metadata = {
         "format": "Photron mraw" if not header.image_suffix else f"Photron header of {header.image_suffix} images",
-        "camera": header.camera,
-        "comment": header.comment,
         "date": header.recorded,
-        "record_rate": header.timing.record_rate,
-        "skip": header.timing.skip,
-        "stored_bits": header.stored_bits,
-        "effective_bits": header.effective_bits,
+        **{
+            name: getattr(header, name)
+            for name in ("camera", "comment", "record_rate", "skip", "stored_bits", "effective_bits")
+        },
     }
 
 
@@ -567,9 +540,7 @@ def images_of_header(header: CameraHeader) -> FrameSource:
             f"{header.path}: says {header.frame_count} frames of {header.height} x {header.width} pixels; beside it "
             f"are {len(own)} {header.image_suffix} images of {source.shape[0]} x {source.shape[1]}"
         )
-    found = source.diagnostics
     take_header(source, header)
-    source.diagnostics += found
     if source.max_value > header.max_value and header.effective_side == "lower":
         source.max_value = header.max_value
     return source
@@ -608,46 +579,28 @@ class ImageSource(FrameSource):
             )
         self._files = [numbered[number] for number in order]
         self.numbers = np.array(order, dtype=np.int64) - order[0]
-        self._full = 0.0
         first = self._load(0)
-        self.shape = (first.shape[0], first.shape[1])
-        self._dtype = first.dtype
-        if first.dtype.kind == "f":
-            count = len(self._files)
-            self._full = float_range([self._load(k) for k in {0, count // 2, count - 1}], path)
-            self.max_value = 65535
-        else:
-            self.max_value = int(np.iinfo(first.dtype).max)
+        self.shape, self._dtype = (first.shape[0], first.shape[1]), first.dtype
+        self.take_type(first.dtype)
         self.metadata = {"format": "numbered images", "first_number": order[0]}
         if any(one.suffix.lower() in (".jpg", ".jpeg") for one in self._files):
-            self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
-            self.edge_error = LOSSY_ERROR
+            self.tell_lossy()
 
     def _load(self, index: int) -> NDArray[Any]:
         image = load_image(self._files[index], grey=False)
         if image.ndim == 3:
-            if not any(one.code == KINDS_RECORDING["colour"].code for one in self.diagnostics):
-                self.diagnostics += (KINDS_RECORDING["colour"].found(channels=image.shape[2]),)
+            self.tell_colour(image.shape[2])
             image = grey_of(image)
         return image
 
-    def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
-        """Return some frames, in some rows."""
-        kind = np.uint16 if self._full else self._dtype
-        out = np.empty((stop - start, rows[1] - rows[0], self.shape[1]), dtype=kind)
-        for index in range(start, stop):
-            image = self._load(index)
-            if image.shape != self.shape or image.dtype != self._dtype:
-                raise InputError(
-                    f"{self._files[index]}: shape {image.shape} and type {image.dtype} differ from the first "
-                    f"frame's {self.shape} and {self._dtype}"
-                )
-            part = image[rows[0] : rows[1]]
-            levels = scaled_floats(part, self._full) if self._full else part
-            if levels is None:
-                raise InputError(f"{self._files[index]}: holds numbers outside 0 to {self._full:g}")
-            out[index - start] = levels
-        return out
+    def _page(self, index: int) -> NDArray[Any]:
+        image = self._load(index)
+        if image.shape != self.shape or image.dtype != self._dtype:
+            raise InputError(
+                f"{self._files[index]}: shape {image.shape} and type {image.dtype} differ from the first "
+                f"frame's {self.shape} and {self._dtype}"
+            )
+        return image
 
 
 # Video files and Phantom's .cine, decoded by PyAV.
@@ -723,8 +676,7 @@ class VideoSource(FrameSource):
                         self.numbers, _ = numbers_of_stamps(path, tick * np.array(known), tick, step)
                     self.metadata = {"format": f"video ({codec})", "playback_rate": rate}
                 if codec not in LOSSLESS and not _lossless_h264(stream.codec_context):
-                    self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
-                    self.edge_error = LOSSY_ERROR
+                    self.tell_lossy()
                 name = stream.codec_context.pix_fmt or ""
                 self.shape = (stream.codec_context.height, stream.codec_context.width)
         except (av.error.FFmpegError, OSError) as error:
@@ -738,7 +690,7 @@ class VideoSource(FrameSource):
             raise InputError(f"{path}: the video holds no frame")
         _refuse_picture(path, self.shape)
         if name not in ("gray", "gray8") and re.search(r"rgb|bgr|bayer|gbr|pal8", name):
-            self.diagnostics += (KINDS_RECORDING["colour"].found(channels=3),)
+            self.tell_colour(3)
         deep = re.search(r"(9|10|12|14|16|48)(le|be)", name)
         self._format = "gray16le" if deep else "gray"
         self.max_value = 65535 if deep else 255

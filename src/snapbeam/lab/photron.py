@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_RECORDING
-from snapbeam.lab.signals import si_unit
+from snapbeam.lab.signals import unit_factor
 from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.input_files import input_bytes
 from snapbeam.util.validation import InputError, shown
-
-_MAX_HEADER_BYTES = 64 * 1024 * 1024
 
 # Name in a .cih file and path of tags in a .cihx file, for each field used here.
 NAMES: dict[str, tuple[tuple[str, ...], str]] = {
@@ -121,14 +120,7 @@ def read_fields(path: Path) -> HeaderFields:
     kind = path.suffix.lower()
     if kind not in (".cih", ".cihx"):
         raise InputError(f"{path}: a Photron header ends in .cih or .cihx")
-    try:
-        if path.exists() and not path.is_file():
-            raise InputError(f"{path}: must be a regular file, not a device or a pipe")
-        if path.stat().st_size > _MAX_HEADER_BYTES:
-            raise InputError(f"{path}: is larger than 64 MiB, so it is no Photron header")
-        raw = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    raw = input_bytes("path", path)
     if kind == ".cih":
         return HeaderFields(path, _lines(path, raw), xml=False)
     return HeaderFields(path, _tags(path, raw), xml=True)
@@ -167,25 +159,8 @@ def _tags(path: Path, raw: bytes) -> dict[str, str]:
 # When the frames of a Photron recording were taken: every field that says something, held against the others.
 
 
-@dataclass(frozen=True)
-class Timing:
-    """The rates of a recording.
-
-    ``record_rate`` [Hz] is the camera's, ``skip`` the step between saved frames as the header has it;
-    ``frame_rate`` [Hz] that of the saved frames, None where it is missing or the header contradicts itself,
-    and then ``question`` says what it says.  ``exposure`` [s] or None.
-    """
-
-    record_rate: float | None
-    skip: int
-    frame_rate: float | None
-    question: str
-    exposure: float | None
-    diagnostics: tuple[Diagnostic, ...]
-
-
-def read_timing(fields: HeaderFields, frames: int) -> Timing:
-    """The timing of a recording that holds *frames* frames.
+def read_timing(fields: HeaderFields, frames: int) -> dict[str, Any]:
+    """The rates of a recording that holds *frames* frames, as the fields of a :class:`CameraHeader`.
 
     A step between saved frames must agree with how many were recorded and how many are left: every
     ``skip``-th of ``recorded`` frames makes recorded/skip.  The shutter is a time in seconds, or its
@@ -214,7 +189,10 @@ def read_timing(fields: HeaderFields, frames: int) -> Timing:
         )
         frame_rate = None
     exposure, diagnostics = _exposure(fields, rate)
-    return Timing(rate, skip, frame_rate, question, exposure, diagnostics)
+    return {
+        "record_rate": rate, "skip": skip, "frame_rate": frame_rate, "question": question, "exposure": exposure,
+        "diagnostics": (*diagnostics, *_curve(fields)),
+    }  # fmt: skip
 
 
 def _exposure(fields: HeaderFields, rate: float | None) -> tuple[float | None, tuple[Diagnostic, ...]]:
@@ -253,8 +231,9 @@ _IMAGES = {"png": ".png", "tiff": ".tif", "tif": ".tif", "bmp": ".bmp", "jpeg": 
 class CameraHeader:
     """Content of a .cih or .cihx header.
 
-    ``timing`` holds the rates and the exposure; ``pixel_size`` [m] is ``None`` where the header does not hold
-    it, and ``scale_hint`` says what it holds instead.  ``stored_bits`` is the size of a pixel in the file and
+    ``record_rate`` [Hz] is the camera's, ``skip`` the step between saved frames; ``frame_rate`` [Hz] that of the saved
+    frames, None where it is missing or the header contradicts itself, which ``question`` then tells; ``exposure`` [s]
+    or None.  ``pixel_size`` [m] is None where the header does not hold it, and ``scale_hint`` says what it holds instead.  ``stored_bits`` is the size of a pixel in the file and
     ``effective_bits`` how many of them carry the image, on the ``effective_side`` of the stored number;
     ``raw_colors`` says that the pixels may lie under a mosaic of colour filters.  ``image_suffix`` is that of
     the numbered images that hold the pixels, empty for a .mraw file.
@@ -265,7 +244,11 @@ class CameraHeader:
     width: int
     height: int
     frame_count: int
-    timing: Timing
+    record_rate: float | None
+    skip: int
+    frame_rate: float | None
+    question: str
+    exposure: float | None
     pixel_size: float | None
     scale_hint: str
     stored_bits: int
@@ -273,7 +256,6 @@ class CameraHeader:
     effective_side: str
     raw_colors: bool
     image_suffix: str
-    start_frame: int
     camera: str
     comment: str
     recorded: str
@@ -295,13 +277,7 @@ class CameraHeader:
 
 
 def read_header(path: str | Path) -> CameraHeader:
-    """Read and check a Photron header.
-
-    Parameters
-    ----------
-    path
-        A ``.cih`` or ``.cihx`` file.
-    """
+    """Read and check a Photron header, ``.cih`` or ``.cihx``."""
     fields = read_fields(Path(path))
     kind = fields.text("format", "mraw").lower()
     if kind != "mraw" and kind not in _IMAGES:
@@ -315,13 +291,11 @@ def read_header(path: str | Path) -> CameraHeader:
         )
     stored, effective, side = _bits(fields, "" if kind == "mraw" else kind)
     frames = fields.integer("frame_count", 1, 2**40)
-    timing = read_timing(fields, frames)
     header = CameraHeader(
         path=fields.path,
         width=fields.integer("width", 1, _MAX_SIDE),
         height=fields.integer("height", 1, _MAX_SIDE),
         frame_count=frames,
-        timing=timing,
         pixel_size=_pixel_size(fields),
         scale_hint=_scale_hint(fields),
         stored_bits=stored,
@@ -329,11 +303,10 @@ def read_header(path: str | Path) -> CameraHeader:
         effective_side=side,
         raw_colors=color == "raw",
         image_suffix=_IMAGES.get(kind, ""),
-        start_frame=fields.integer("start", -(2**40), 2**40, default=0),
         camera=fields.text("camera", ""),
         comment=fields.text("comment", ""),
         recorded=f"{fields.text('date', '')} {fields.text('time', '')}".strip(),
-        diagnostics=(*timing.diagnostics, *_curve(fields)),
+        **read_timing(fields, frames),
     )
     if stored == 12 and not header.image_suffix and header.width * header.height % 2:
         raise fields.error("width", f"= {header.width}: 12-bit frames hold an even number of pixels")
@@ -363,12 +336,9 @@ def _bits(fields: HeaderFields, images: str) -> tuple[int, int, str]:
 
 def _pixel_size(fields: HeaderFields) -> float | None:
     """Metres per pixel from the calibration block, where its unit is a length."""
-    try:
-        factor, base = si_unit("pixel", fields.text("unit", "").lower() if fields.xml else "")
-    except InputError:
-        return None
-    size = fields.positive("pixel") if base == "m" else None
-    return None if size is None else size * factor
+    factor = unit_factor("pixel", fields.text("unit", "").lower() if fields.xml else "", "m")
+    size = None if factor is None else fields.positive("pixel")
+    return None if factor is None or size is None else size * factor
 
 
 def _scale_hint(fields: HeaderFields) -> str:

@@ -330,6 +330,15 @@ class _Filter(NamedTuple):
         turn = 1j * np.asarray(frequency) / self.centre
         return np.asarray(np.polyval(self.above, turn) / np.polyval(self.below, turn))
 
+    def passed(self, waves: _Array, rate: float) -> _Array:
+        """What it makes of columns sampled at a rate [Hz]."""
+        speed = rate / (math.pi * self.centre)
+        above, below = (
+            np.pad(side, (3 - len(side), 0)) * np.array([speed**2, speed, 1.0]) @ _BILINEAR
+            for side in (self.above, self.below)
+        )
+        return np.asarray(lfilter(above, below, waves, axis=0))
+
 
 def _candidates(drive: float) -> Iterator[_Filter]:
     """Filters that may lie in the chain: high-pass of first order, low-pass of the first four, notch at mains."""
@@ -442,10 +451,7 @@ def _free_start(record: Record, filters: list[_Filter]) -> tuple[_Array, float, 
         return np.zeros(len(filters)), 0.0, 1
 
     def left(values: _Array, one: _Filter | None) -> float:
-        passed = columns
-        if one is not None:
-            speed = rate / (math.pi * one.centre)
-            passed = lfilter([speed, -speed], [speed + 1.0, 1.0 - speed], columns, axis=0)
+        passed = columns if one is None else one.passed(columns, rate)
         own = np.linalg.qr(np.hstack([passed, np.ones((size, 1))]))[0]
         rest = (values - own @ (own.T @ values))[1:]
         return float(rest @ rest)
@@ -524,18 +530,8 @@ def _start_gains(record: Record, filters: list[_Filter]) -> tuple[list[float], f
     columns = np.column_stack([part for wave in waves for part in (wave.real, wave.imag)])
     rate, slow = moving.sampling_frequency / every, np.column_stack([np.ones_like(time), time])
 
-    def behind(one: _Filter | None, waves: _Array) -> _Array:
-        if one is None:
-            return waves
-        speed = rate / (math.pi * one.centre)
-        above, below = (
-            np.pad(side, (3 - len(side), 0)) * np.array([speed**2, speed, 1.0]) @ _BILINEAR
-            for side in (one.above, one.below)
-        )
-        return np.asarray(lfilter(above, below, waves, axis=0))
-
     def residual(one: _Filter | None) -> tuple[_Array, _Array]:
-        design = np.hstack([behind(one, columns), slow])
+        design = np.hstack([columns if one is None else one.passed(columns, rate), slow])
         return design, aim - design @ solve(design, aim, 1e-10)
 
     def left(one: _Filter | None) -> float:
@@ -547,7 +543,8 @@ def _start_gains(record: Record, filters: list[_Filter]) -> tuple[list[float], f
         design, rest = residual(one)
         base = np.linalg.qr(design)[0]
         waves = _envelopes(fit.frequency * time)[..., None] * np.stack([turn.real, turn.imag], -1)[:, None]
-        waves = behind(one, waves.reshape(time.size, -1))
+        waves = waves.reshape(time.size, -1)
+        waves = waves.copy() if one is None else one.passed(waves, rate)
         waves -= base @ (base.T @ waves)
         pairs = waves.reshape(time.size, -1, 2)
         gram, along = np.einsum("tki,tkj->kij", pairs, pairs), np.einsum("tki,t->ki", pairs, rest)

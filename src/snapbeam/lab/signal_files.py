@@ -20,7 +20,7 @@ from snapbeam.lab.signals import check_signal, make_signal, parse_sensitivity, s
 from snapbeam.util.diagnostics import DiagnosticWarning, to_json
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.packages import needs
-from snapbeam.util.validation import InputError, InputTypeError, positive, shown
+from snapbeam.util.validation import InputError, file_path, positive, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,9 +54,7 @@ def read_channels(
     >>> len(lab.read_channels(path))
     1
     """
-    if not isinstance(path, (str, os.PathLike)):
-        raise InputTypeError(f"path = {shown(path)}: must be a path, not {type(path).__name__}")
-    source = Path(path)
+    source = file_path("path", path)
     reader = READERS.get(source.suffix.lower())
     if reader is None:
         raise InputError(f"{source}: unknown kind of file; a signal is one of {', '.join(sorted(READERS))}")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.matlab_file import read_version_5
-from snapbeam.lab.signals import check_signal, even_sampling, si_unit
+from snapbeam.lab.signals import check_signal, even_sampling, si_unit, unit_factor
 from snapbeam.util.diagnostics import Diagnostic, tell
 from snapbeam.util.hdf5 import open_hdf5
 from snapbeam.util.input_files import decoded, refuse_inflated
@@ -129,15 +129,6 @@ def seconds_in(name: str, unit: str | None) -> float:
     if base != "s":
         raise InputError(f"{name} is in {unit!r}, not in seconds")
     return factor
-
-
-def _time_unit(name: str, unit: str) -> float | None:
-    """Seconds in a unit; None if it is not one of time."""
-    try:
-        factor, base = si_unit(name, unit)
-    except InputError:
-        return None
-    return factor if base == "s" else None
 
 
 def stated_unit(attributes: Mapping[str, Any]) -> str:
@@ -333,12 +324,7 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         time = is_time(split_unit(last)[0])
         for _, values in () if time else around[1:]:
             _refuse_scales(name, data, values)
-        rates = {
-            f"{place}/{key}".lstrip("/"): rate
-            for place, values in (() if time else around)
-            for key, value in values.items()
-            if (rate := _rate_of(key, value)) is not None
-        }
+        rates = _stated_rates(() if time else around)
         rows = np.atleast_2d(_unpacked(name, data, item.attributes))
         rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
         for k, row in enumerate(rows):
@@ -912,10 +898,20 @@ def header_rate(
 
     *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
     """
-    found = {
-        key: rate for key, value in values.items() if (rate := _rate_of(key, value, decimal_comma, known)) is not None
-    }
+    found = _stated_rates([("", values)], decimal_comma, known)
     return _one_rate(found, f"{where}: the header") if found else None
+
+
+def _stated_rates(
+    levels: Iterable[tuple[str, Mapping[str, Any]]], decimal_comma: bool = False, known: float | None = None
+) -> dict[str, float]:
+    """Sampling rates [Hz] that the named values of some places state, by their places and names."""
+    return {
+        f"{place}/{key}".lstrip("/"): rate
+        for place, values in levels
+        for key, value in values.items()
+        if (rate := _rate_of(key, value, decimal_comma, known)) is not None
+    }
 
 
 def _one_rate(found: Mapping[str, float], where: str) -> float:
@@ -932,14 +928,14 @@ def _rate_of(name: str, value: Any, decimal_comma: bool = False, known: float | 
     for key in (_key(name), _key(word)):
         of_name = max((one for one in _RATES + _STEPS if key.startswith(one)), key=len, default="")
         suffix = suffix or key[len(of_name) :]
-        if of_name and (key == of_name or suffix in _PER_SECOND or _time_unit(name, suffix)):
+        if of_name and (key == of_name or suffix in _PER_SECOND or unit_factor(name, suffix, "s")):
             break
     else:
         return None
     numbers, unit = _quantity(_text(value), decimal_comma)
     step = of_name in _STEPS
     unit = unit or ("" if suffix == "s" and not step else suffix) or ""
-    factor = _time_unit(name, unit or "s") if step else _PER_SECOND.get(unit.lower())
+    factor = unit_factor(name, unit or "s", "s") if step else _PER_SECOND.get(unit.lower())
     if factor is None or not numbers or 0.0 in numbers:
         return None
     rates = [1.0 / (number * factor) if step else number * factor for number in numbers]
@@ -1034,7 +1030,7 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
     columns = {name: split_unit(name) for name in table.columns}
     times = [name for name, (word, unit) in columns.items() if _is_time(word, unit)]
     if not times:  # a row of units only, as "[ s ]"
-        times = [name for name, (_, unit) in columns.items() if unit and _time_unit(name, unit)]
+        times = [name for name, (_, unit) in columns.items() if unit and unit_factor(name, unit, "s")]
     if len(times) > 1:
         raise InputError(f"{path}: columns {times}: only one may be the time")
     values = header_values(table.block.header)
@@ -1132,12 +1128,8 @@ def read_tdms(path: Path, _told: Told) -> list[Channel]:
                 continue
             unit = next((str(entry.properties[k]) for k in UNIT_NAMES if entry.properties.get(k)), None)
             channel: Channel = {"data": data, "name": f"{group.name}/{entry.name}", "unit_str": unit}
-            rates = {
-                f"{place}{key}": rate
-                for place, level in (("", entry), (f"{group.name}/", group), ("file/", file))
-                for key, value in level.properties.items()
-                if (rate := _rate_of(key, value)) is not None
-            }
+            levels = (("", entry), (group.name, group), ("file", file))
+            rates = _stated_rates((place, level.properties) for place, level in levels)
             if rates:
                 channel["fs"] = _one_rate(rates, channel["name"])
                 channel["time_offset"] = float(entry.properties.get("wf_start_offset", 0.0))

@@ -76,6 +76,15 @@ def si_unit(name: str, unit: str) -> tuple[float, str]:
     return _TO_SI[word]
 
 
+def unit_factor(name: str, unit: str, base: str) -> float | None:
+    """The factor from *unit* to an SI unit; None if it is none of that kind."""
+    try:
+        factor, own = si_unit(name, unit)
+    except InputError:
+        return None
+    return factor if own == base else None
+
+
 def parse_sensitivity(name: str, text: str) -> tuple[float, str, str]:
     """Read a sensitivity: return the factor, the SI unit, and V or FS.
 

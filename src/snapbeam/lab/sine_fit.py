@@ -220,12 +220,10 @@ def fit_sine(
     t = time - middle
     where, target = t[used], y[used]
     omega = 2.0 * math.pi * guess
-    for _ in range(1 if fixed else 30):
+    for _ in range(0 if fixed else 30):
         design = sines(where, omega / (2.0 * math.pi) * np.arange(1, count + 1))
         solution = solve(design, target)
         slope = _slope(where, design, solution)
-        if fixed:
-            break
         step = solve(np.column_stack((design, slope)), target - design @ solution)[-1]
         limit = math.pi / span
         omega += float(np.clip(step, -limit, limit))
@@ -357,19 +355,18 @@ def sound_samples(size: int, flaws: list[Flaw]) -> NDArray[np.bool_]:
 
 def find_clipping(samples: SignalSamples, fit: SineFit) -> Clipping:
     """Find clipped tops: flatter than those of a sine in the mean cycle, or levels that are hit exactly many times."""
-    none = Clipping(-math.inf, math.inf, 0.0, 0.0)
     turn = np.mod(fit.frequency * samples.time + fit.phase / (2.0 * math.pi), 1.0)
     bins = int(np.clip(samples.values.size // 20, 16, 128))
     index = np.minimum((turn * bins).astype(int), bins - 1)
     count = np.bincount(index, minlength=bins)
     if count.min() < 4:
-        return _exact(samples.values, none)
+        return _exact(samples.values)
     mean = np.bincount(index, samples.values, minlength=bins) / count
     low, high = (float(level) for level in np.quantile(mean, (0.01, 0.99)))
     half = 0.5 * (high - low)
     noise = fit.noise_rms / math.sqrt(float(count.min()))
     if noise > 0.01 * half:
-        return _exact(samples.values, none)
+        return _exact(samples.values)
     near = _NEAR * half + 1.5 * noise
     variance = np.bincount(index, samples.values**2, minlength=bins) / count - mean**2
     single = math.sqrt(max(float(np.median(variance)), 0.0))  # noise of a sample, behind the cut or before it
@@ -381,27 +378,18 @@ def find_clipping(samples: SignalSamples, fit: SineFit) -> Clipping:
         sum(one for one in share if one > flat),
         0.04 * half + 3.0 * single,
     )
-    return cut if cut.found else _exact(samples.values, none)
+    return cut if cut.found else _exact(samples.values)
 
 
-def _exact(values: _Array, none: Clipping) -> Clipping:
+def _exact(values: _Array) -> Clipping:
     """Levels that many neighbouring samples share to the last digit with the extreme."""
-    levels = []
-    shares = []
-    for extreme in (float(values.min()), float(values.max())):
+    found = []
+    for extreme, nothing in ((float(values.min()), -math.inf), (float(values.max()), math.inf)):
         hit = values == extreme
-        run = hit[1:] & hit[:-1]
-        told = run.mean() > 0.01 and np.ptp(values) > 0.0
-        levels.append(extreme if told else None)
-        shares.append(float(hit.mean()) if told else 0.0)
-    if levels[0] is None and levels[1] is None:
-        return none
-    return Clipping(
-        -math.inf if levels[0] is None else levels[0],
-        math.inf if levels[1] is None else levels[1],
-        sum(shares),
-        0.02 * float(np.ptp(values)),
-    )
+        told = (hit[1:] & hit[:-1]).mean() > 0.01 and np.ptp(values) > 0.0
+        found.append((extreme, float(hit.mean())) if told else (nothing, 0.0))
+    (low, below), (high, above) = found
+    return Clipping(low, high, below + above, 0.02 * float(np.ptp(values)))
 
 
 def stuck_runs(values: _Array, least: int) -> list[Flaw]:

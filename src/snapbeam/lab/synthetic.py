@@ -10,6 +10,7 @@ samples.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.lab.camera import write_photron, write_video
 from snapbeam.lab.signals import make_signal
-from snapbeam.lab.tracking.edges import Floats, edge_profile
+from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.settings import SIDES, Orientation
 from snapbeam.simulation.dataset import check_trajectory, trajectory_dataset
 from snapbeam.util.packages import needing
@@ -44,22 +45,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-TABLE_ENTRIES_PER_PIXEL = 256  # table entries per pixel
 CELLS_PER_PIXEL = 4  # cells to a pixel, each way
 FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frames", "hidden_frames")
 _FINE = 8  # rows of light drawn for a row of pixels
-_BLOCK = 200_000  # numbers of edges that are drawn together
-
-
-def step_table(blur: float) -> NDArray[np.float64]:
-    """Change of an edge's light from one row to the next, tabulated over the row's offset from the edge.
-
-    The first and last offsets are -reach and +reach with reach = (entries - 1)/(2 FINE).
-    """
-    reach = int(np.ceil(5.0 * blur)) + 2
-    last = reach * TABLE_ENTRIES_PER_PIXEL
-    offsets = np.arange(-last, last + 1) / TABLE_ENTRIES_PER_PIXEL
-    return edge_profile(offsets, blur) - edge_profile(offsets - 1.0, blur)
 
 
 def _summed(at: NDArray[np.int64], values: Floats, rows: int) -> Floats:
@@ -68,26 +56,6 @@ def _summed(at: NDArray[np.int64], values: Floats, rows: int) -> Floats:
     place = np.clip(at, 0, rows) * columns + np.arange(columns)
     sums = np.bincount(place.ravel(), values.ravel(), minlength=(rows + 1) * columns)
     return np.asarray(sums.reshape(rows + 1, columns)[:rows], dtype=np.float64)
-
-
-def edge_light(rows: Floats, height: int, table: Floats) -> Floats:
-    """Change of light by row, shape (height, columns), of edges at *rows* (instants, columns), of size 1 together."""
-    reach = (table.size - 1) // (2 * TABLE_ENTRIES_PER_PIXEL)
-    offsets = np.arange(1, 2 * reach + 1)[:, None, None]
-    ended = np.append(table, 0.0)  # nothing from the last entry on
-    ended[table.size - 1] = 0.0
-    slopes = np.diff(np.append(table, table[-1]), append=0.0)
-    slopes[table.size - 1] = 0.0
-    total = np.zeros((height, rows.shape[1]))
-    together = max(1, _BLOCK // (offsets.size * rows.shape[1]))
-    for begin in range(0, len(rows), together):
-        own = rows[begin : begin + together]
-        first = np.floor(own)
-        at = (offsets - (own - first)) * TABLE_ENTRIES_PER_PIXEL
-        entry = at.astype(np.int64)
-        values = ended[entry] + slopes[entry] * (at - entry)
-        total += _summed(first.astype(np.int64) + (offsets - reach), values, height)
-    return total / len(rows)
 
 
 @dataclass(frozen=True)
@@ -190,25 +158,6 @@ class SyntheticStage:
             raise InputError(f"beam = {self.beam!r}: must differ from background = {self.background!r}")
 
 
-class Outline:
-    """The scene's shapes in turned pixels, columns counted from the contact at ``centre``."""
-
-    def __init__(self, camera: SyntheticCamera, stage: SyntheticStage) -> None:
-        upright = stage.side in ("below", "above")
-        self.height, self.width = camera.shape if upright else camera.shape[::-1]
-        size = camera.pixel_size
-        self.stage = stage
-        self.thickness = stage.beam_thickness / size
-        self.centre = (self.width - 1) / 2.0
-        self.radius, self.half = stage.tip_radius / size, 0.5 * stage.shaker_width / size
-        self.marker = (stage.marker_distance / size, (stage.marker_distance + stage.marker_thickness) / size)
-
-    def profile(self, x: Floats) -> Floats:
-        """Rows of the tip's outline below its apex at columns *x* from the contact."""
-        reach = np.minimum(np.abs(x), self.radius)
-        return self.radius - np.sqrt(self.radius * self.radius - reach * reach)
-
-
 def lamp_light(camera: SyntheticCamera, height: int, width: int) -> NDArray[np.float32]:
     """The lamp's unevenness over a turned picture."""
     across = 1.0 + camera.light[0] * ((np.arange(width) - (width - 1) / 2.0) / width)
@@ -223,45 +172,8 @@ def glare_light(height: int, width: int, row: float, strength: float, wide: bool
     return np.asarray(strength * np.exp(-(rows[:, None] ** 2) - columns[None, :] ** 2), dtype=np.float32)
 
 
-class GaussianPicture:
-    """Draws the turned scene, shaker below, with edges blurred by a Gaussian."""
-
-    def __init__(self, camera: SyntheticCamera, stage: SyntheticStage) -> None:
-        self.outline = Outline(camera, stage)
-        x = np.arange(self.outline.width) - self.outline.centre
-        self.slope = stage.slope * x
-        self.profile = self.outline.profile(x)
-        half = self.outline.half
-        self.cover = edge_profile(x + half, camera.blur) - edge_profile(x - half, camera.blur)
-        self.cover[self.cover < 1e-6] = 0.0
-        self.tables = {False: step_table(camera.blur), True: step_table(camera.blur + 4.0)}
-
-    def draw(self, beam: Floats, tip: Floats, *, blurred: bool) -> NDArray[np.float32]:
-        """Light of one exposure without noise; ``beam`` and ``tip`` as for :func:`render_recording`."""
-        shape = self.outline
-        stage, thickness = shape.stage, shape.thickness
-        steps = np.zeros((shape.height, shape.width))
-        steps[0] = stage.background
-        table = self.tables[blurred]
-        across = self.slope if stage.slope else self.slope[:1]  # a level edge is the same in all columns
-        far, top = beam[:, None] - 0.5 * thickness + across, tip[:, None] + 0.5 * thickness
-        near = far + thickness
-        steps += (stage.beam - stage.background) * (
-            edge_light(far, shape.height, table) - edge_light(near, shape.height, table)
-        )
-        seen = np.flatnonzero(self.cover)
-        if seen.size:
-            apex = np.maximum(top + self.profile[seen], near[:, seen] if stage.slope else near)
-            change = (stage.shaker - stage.background) * edge_light(apex, shape.height, table)
-            if stage.marker_thickness > 0.0:
-                upper, lower = (edge_light(top + border, shape.height, table) for border in shape.marker)
-                change += (stage.marker - stage.shaker) * (upper - lower)
-            steps[:, seen] += self.cover[seen] * change
-        return np.asarray(np.cumsum(steps, axis=0), dtype=np.float32)
-
-
 # Every shape covers an exact share of each cell of a grid four times finer than the pixels, averaged over the
-# exposure; the cells are spread over the lens's disk of confusion and summed into pixels.  Nothing here knows
+# exposure; the cells are spread by the lens and summed into pixels.  Nothing here knows
 # of error functions, so a tracker that fits them is not tested against itself.
 
 
@@ -274,6 +186,7 @@ def covered(rows: Floats, height: int) -> Floats:
     return (_summed(at, share, height) + _summed(at + 1, 1.0 - share, height)) / len(rows)
 
 
+@functools.cache
 def disk_kernel(radius: float) -> NDArray[np.float32]:
     """A disk of *radius* cells, each cell weighted by the part of it inside, of sum 1."""
     reach = int(np.ceil(radius + 0.5))
@@ -285,56 +198,57 @@ def disk_kernel(radius: float) -> NDArray[np.float32]:
     return np.asarray(kernel / kernel.sum(), dtype=np.float32)
 
 
-class AreaPicture:
-    """Draws the turned scene, shaker below, area by area through a lens out of focus.
+class Picture:
+    """Draws the turned scene, shaker below, in turned pixels; columns are counted from the contact in the middle.
 
-    The disk of confusion has a standard deviation of the camera's ``blur`` along each axis, so its radius is
+    The lens has a standard deviation of the camera's ``blur`` along each axis; so the radius of a disk of confusion is
     twice that.
     """
 
     def __init__(self, camera: SyntheticCamera, stage: SyntheticStage, texture: float = 0.0, seed: int = 0) -> None:
-        self.outline = shape = Outline(camera, stage)
+        with needing("a synthetic recording", "lab"):
+            import cv2
+
+        self.camera, self.stage = camera, stage
+        self.height, self.width = camera.shape if stage.side in ("below", "above") else camera.shape[::-1]
+        cell = camera.pixel_size / CELLS_PER_PIXEL
+        self.thickness, self.upper = stage.beam_thickness / cell, stage.marker_distance / cell
+        self.lower, radius = self.upper + stage.marker_thickness / cell, stage.tip_radius / cell
         self.margin = int(np.ceil(2.0 * camera.blur)) + 1
-        cells = (shape.width + 2 * self.margin) * CELLS_PER_PIXEL
-        x = (np.arange(cells) + 0.5) / CELLS_PER_PIXEL - 0.5 - self.margin - shape.centre
-        self.slope = CELLS_PER_PIXEL * stage.slope * x
-        self.profile = CELLS_PER_PIXEL * shape.profile(x)
-        self.rod = np.clip((shape.half - np.abs(x)) * CELLS_PER_PIXEL + 0.5, 0.0, 1.0)
-        self.kernels = {False: disk_kernel(2.0 * CELLS_PER_PIXEL * camera.blur)}
-        self.kernels[True] = disk_kernel(2.0 * CELLS_PER_PIXEL * (camera.blur + 4.0))
+        columns, self.rows = ((size + 2 * self.margin) * CELLS_PER_PIXEL for size in (self.width, self.height))
+        x = np.arange(columns) - 0.5 * (columns - 1)
+        self.slope = stage.slope * x
+        # of the rounded tip, below its apex
+        self.profile = radius - np.sqrt(radius * radius - np.minimum(np.abs(x), radius) ** 2)
+        self.rod = np.clip(0.5 * stage.shaker_width / cell - np.abs(x) + 0.5, 0.0, 1.0)
         self.grain: NDArray[np.float32] | None = None
         if texture:
-            with needing("a surface with texture", "lab"):
-                import cv2
-
-            rows = (shape.height + 2 * self.margin) * CELLS_PER_PIXEL
-            raw = np.random.default_rng([seed, 7]).standard_normal((2 * rows, cells)).astype(np.float32)
+            raw = np.random.default_rng([seed, 7]).standard_normal((2 * self.rows, columns)).astype(np.float32)
             self.grain = 1.0 + 3.0 * CELLS_PER_PIXEL * texture * cv2.blur(
                 raw, (3 * CELLS_PER_PIXEL, 3 * CELLS_PER_PIXEL)
             )
 
     def draw(self, beam: Floats, tip: Floats, *, blurred: bool) -> NDArray[np.float32]:
         """Light of one exposure without noise; rows of beam and tip as for :func:`render_recording`."""
-        with needing("a synthetic recording", "lab"):
-            import cv2
+        import cv2
 
-        shape, margin = self.outline, self.margin
-        stage = shape.stage
-        rows = (shape.height + 2 * margin) * CELLS_PER_PIXEL
-        # row r of a pixel's centre is the cell border (r + 1/2 + margin) FINE
-        far = (beam - 0.5 * shape.thickness + 0.5 + margin) * CELLS_PER_PIXEL
-        top = (tip + 0.5 * shape.thickness + 0.5 + margin) * CELLS_PER_PIXEL
-        thickness, upper, lower = (size * CELLS_PER_PIXEL for size in (shape.thickness, *shape.marker))
+        stage, rows = self.stage, self.rows
+        # row r of a pixel's centre is the cell border (r + 1/2 + margin) CELLS_PER_PIXEL
+        far, top = (
+            (row + 0.5 + self.margin) * CELLS_PER_PIXEL + sign * self.thickness
+            for row, sign in ((beam, -0.5), (tip, 0.5))
+        )
         beam_rows = far[:, None] + self.slope
-        light = (stage.beam - stage.background) * (covered(beam_rows, rows) - covered(beam_rows + thickness, rows))
+        light = (stage.beam - stage.background) * (covered(beam_rows, rows) - covered(beam_rows + self.thickness, rows))
         rod = np.zeros_like(light)
         seen = np.flatnonzero(self.rod)
         if seen.size:
-            near, tips = beam_rows[:, seen] + thickness, top[:, None]
+            near, tips = beam_rows[:, seen] + self.thickness, top[:, None]
             change = (stage.shaker - stage.background) * covered(np.maximum(tips + self.profile[seen], near), rows)
             if stage.marker_thickness > 0.0:
                 change += (stage.marker - stage.shaker) * (
-                    covered(np.maximum(tips + upper, near), rows) - covered(np.maximum(tips + lower, near), rows)
+                    covered(np.maximum(tips + self.upper, near), rows)
+                    - covered(np.maximum(tips + self.lower, near), rows)
                 )
             rod[:, seen] = self.rod[seen] * change
         layers = [np.cumsum(layer, axis=0).astype(np.float32) for layer in (light, rod)]
@@ -343,10 +257,14 @@ class AreaPicture:
                 shift = round(float(rows_of.mean())) % rows
                 layer *= self.grain[rows - shift : 2 * rows - shift]
         fine: NDArray[Any] = np.float32(stage.background) + layers[0] + layers[1]
-        fine = cv2.filter2D(fine, -1, self.kernels[blurred], borderType=cv2.BORDER_REPLICATE)
-        edge = margin * CELLS_PER_PIXEL
-        inner = fine[edge : edge + shape.height * CELLS_PER_PIXEL, edge:-edge]
-        cells = inner.reshape(shape.height, CELLS_PER_PIXEL, shape.width, CELLS_PER_PIXEL)
+        spread = CELLS_PER_PIXEL * (self.camera.blur + (4.0 if blurred else 0.0))
+        if self.camera.lens == "disk":
+            fine = cv2.filter2D(fine, -1, disk_kernel(2.0 * spread), borderType=cv2.BORDER_REPLICATE)
+        else:
+            size = 2 * math.ceil(4.0 * spread) + 1
+            fine = cv2.GaussianBlur(fine, (size, size), spread, borderType=cv2.BORDER_REPLICATE)
+        edge = self.margin * CELLS_PER_PIXEL
+        cells = fine[edge:-edge, edge:-edge].reshape(self.height, CELLS_PER_PIXEL, self.width, CELLS_PER_PIXEL)
         return np.asarray(cells.mean((1, 3), dtype=np.float32))
 
 
@@ -493,11 +411,8 @@ class SyntheticRecording:
         self.truth = truth
         self.seed = seed
         self._instants = instants
-        self._picture: GaussianPicture | AreaPicture = GaussianPicture(camera, stage)
-        if camera.lens == "disk":
-            self._picture = AreaPicture(camera, stage, defects.texture, seed)
-        shape = self._picture.outline
-        self._lamp = lamp_light(camera, shape.height, shape.width)
+        self._picture = Picture(camera, stage, defects.texture, seed)
+        self._lamp = lamp_light(camera, self._picture.height, self._picture.width)
         self._spoiled = defects.frames(len(self))
 
     def __len__(self) -> int:
@@ -517,7 +432,7 @@ class SyntheticRecording:
 
     def _light(self, index: int) -> NDArray[np.float32]:
         """Light of one frame on the sensor, shares of full scale, shaker below."""
-        defects, shape = self.defects, self._picture.outline
+        defects, shape = self.defects, self._picture
         beam, tip = self._instants.rows(index)
         shift = defects.drift * index / max(len(self) - 1, 1)
         if index in self._spoiled["hidden"]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.lab.diagnostics import KINDS_COMPARISON
+from snapbeam.lab.diagnostics import KINDS_COMPARISON, holding
 from snapbeam.lab.signals import check_signal, make_signal
 from snapbeam.lab.vibrometer import measure_drive
 from snapbeam.simulation.dataset import check_trajectory
@@ -280,17 +280,15 @@ def _diagnostics(
     columns: dict[str, _Array], grid: _Array, shift: float, ratio: float, started: bool
 ) -> list[Diagnostic]:
     """Diagnostics of a comparison from the two shaker motions; *started*: their first cycle is known."""
-    told = []
     same = _same_way(columns, grid, shift)
-    if not started:
-        told.append(KINDS_COMPARISON["no_start"].found())
-    elif abs(abs(shift) - 0.5) < 0.2 and same < -0.5:
-        told.append(KINDS_COMPARISON["turned_over"].found(correlation=same))
-    elif abs(shift) > _SHIFTED:
-        told.append(KINDS_COMPARISON["shifted"].found(shift=shift))
-    if abs(ratio - 1.0) > _RATIO:
-        told.append(KINDS_COMPARISON["amplitude"].found(ratio=ratio))
-    return told
+    over = abs(abs(shift) - 0.5) < 0.2 and same < -0.5
+    return holding(
+        KINDS_COMPARISON,
+        ("no_start", not started, {}),
+        ("turned_over", started and over, {"correlation": same}),
+        ("shifted", started and not over and abs(shift) > _SHIFTED, {"shift": shift}),
+        ("amplitude", abs(ratio - 1.0) > _RATIO, {"ratio": ratio}),
+    )
 
 
 def _same_way(columns: dict[str, _Array], grid: _Array, shift: float) -> float:

@@ -16,16 +16,14 @@ from snapbeam.plot.axes import wrapped
 from snapbeam.plot.style import (
     BEAM_COLOR,
     CENTER_COLOR,
-    COLUMN_WIDTHS,
     SHAKER_COLOR,
     caption,
     color_bar,
     color_of,
     contains,
-    diagnostics_height,
-    draw_diagnostics,
     extend_title,
     figure_style,
+    figure_with,
     fix_ticks,
     frame,
     new_figure,
@@ -327,9 +325,7 @@ def plot_frequency_response(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
     coherent = dataset["coherence"].values > limit
     with figure_style():
         if ax is None:
-            told = diagnostics_of(dataset)
-            figure = new_figure("single", 110.0 + diagnostics_height(told, COLUMN_WIDTHS["single"]))
-            draw_diagnostics(figure, told)
+            figure = figure_with(diagnostics_of(dataset), "single", 110.0)
             axes = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
         else:
             axes = np.array([ax])

@@ -504,23 +504,19 @@ def _lines(diagnostics: Iterable[Diagnostic], width: float, most: int) -> list[t
     return out
 
 
-def diagnostics_height(diagnostics: Iterable[Diagnostic], width: float, most: int = 6) -> float:
-    """Height [mm] that the diagnostics take below a picture of *width* [mm]; 0 if there are none."""
-    lines = _lines(diagnostics, width, most)
-    return _LINE * len(lines) + 2.0 if lines else 0.0
-
-
-def draw_diagnostics(figure: Figure, diagnostics: Iterable[Diagnostic], most: int = 6) -> None:
-    """Write diagnostics along the lower edge of a figure made *diagnostics_height* taller, and keep axes off it."""
-    width, height = (25.4 * float(size) for size in figure.get_size_inches())
-    lines = _lines(diagnostics, width, most)
-    if not lines:
-        return
-    scale = _scale()
-    share = (_LINE * len(lines) + 2.0) * scale / height
+def figure_with(
+    diagnostics: Iterable[Diagnostic], width: str = "single", height: float = 75.0, most: int = 6
+) -> Figure:
+    """A new figure for a picture of *height* [mm] and, along its lower edge, diagnostics, which axes are kept off."""
+    lines = _lines(diagnostics, COLUMN_WIDTHS[width], most)
+    room = _LINE * len(lines) + 2.0 if lines else 0.0
+    figure = new_figure(width, height + room)
+    size, tall, scale = *(25.4 * float(each) for each in figure.get_size_inches()), _scale()
+    share = room * scale / tall
     engine = figure.get_layout_engine()
-    if engine is not None:
+    if engine is not None and lines:
         engine.set(rect=(0.0, share, 1.0, 1.0 - share))  # type: ignore[call-arg]
     for k, (text, color) in enumerate(lines):
-        y = share - (k + 0.9) * _LINE * scale / height
-        figure.text(1.5 / width, y, text, color=color, fontsize=6.0 * scale, va="baseline")
+        y = share - (k + 0.9) * _LINE * scale / tall
+        figure.text(1.5 / size, y, text, color=color, fontsize=6.0 * scale, va="baseline")
+    return figure

@@ -26,11 +26,11 @@ def input_bytes(name: str, path: str | os.PathLike[str], largest: int = LARGEST_
     """Return the contents of a regular file, *name* in refusals, of at most *largest* bytes."""
     file = file_path(name, path)
     try:
-        kind = file.stat().st_mode
-        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
+        found = file.stat()
+        if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
             raise InputError(f"{name} = {str(path)!r}: must be a regular file, not a device or a pipe")
         with file.open("rb") as stream:
-            data = stream.read(largest + 1)
+            data = stream.read(min(largest, max(found.st_size, 2**16)) + 1)  # which allocates as much
     except OSError as error:
         raise InputError(f"{name} = {str(path)!r}: cannot be read, {error.strerror or error}") from error
     if len(data) > largest:
@@ -81,8 +81,13 @@ def decoded(raw: bytes, where: str) -> str:
     return text
 
 
-def rows_of_table(text: str, where: str) -> tuple[str, list[str], list[tuple[int, list[str]]]]:
-    """The separator of a text table, names of its columns, small, and its rows: numbers of lines, cells."""
+def rows_of_table(
+    text: str, where: str, known: tuple[str, ...], beside: tuple[str, ...] = ()
+) -> tuple[str, list[str], list[tuple[int, list[str]]]]:
+    """The separator of a text table, names of its columns, small, and its rows: numbers of lines, cells.
+
+    Its columns must be among those *known*, or *beside* them, once each, and each row must have a cell for each.
+    """
     first = next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
     mark = next((one for one in (";", "\t") if one in first), ",")
     rows = [
@@ -92,7 +97,16 @@ def rows_of_table(text: str, where: str) -> tuple[str, list[str], list[tuple[int
     ]
     if not rows:
         raise InputError(f"{where}: is empty; its first line must name the columns")
-    return mark, [name.lower() for name in rows[0][1]], rows[1:]
+    header = [name.lower() for name in rows[0][1]]
+    for name in header:
+        if name not in (*known, *beside):
+            raise InputError(f"{where}: unknown column {name!r}; must be among {', '.join(known)}")
+        if header.count(name) > 1:
+            raise InputError(f"{where}: column {name!r} occurs twice")
+    for number, cells in rows[1:]:
+        if len(cells) != len(header):
+            raise InputError(f"{where}, line {number}: has {len(cells)} cells, the header names {len(header)}")
+    return mark, header, rows[1:]
 
 
 # Strings and comments, which may contain any number of full stops.  Each alternative also matches a string without an

@@ -12,7 +12,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from mistakes import decays, drives, others, scenes
-from mistakes.case import KINDS, Case, Outcome, looked
+from mistakes.case import Case, Outcome, looked
+from mistakes.criteria import CRITERIA
 
 FILE = Path(__file__).parents[3] / "docs" / "data" / "mistakes.md"
 CASES = (*scenes.CASES, *drives.CASES, *decays.CASES, *others.CASES)
@@ -21,7 +22,7 @@ HEAD = "| Introduced error | Result | Criterion | Diagnostic |\n|---|---|---|---
 
 def row(case: Case, outcome: Outcome) -> str:
     """One case as a row."""
-    sees = case.sees or KINDS[case.code].sees
+    sees = case.sees or CRITERIA[case.code]
     if case.end == "refused":
         says = outcome.refusal
     else:

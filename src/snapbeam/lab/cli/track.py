@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -137,6 +137,7 @@ def track(
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
     """
+    given = dict(locals())
     from snapbeam.util.netcdf import write_netcdf
     from snapbeam.util.validation import integer
 
@@ -158,16 +159,9 @@ def track(
     from snapbeam.lab.tracking.track import tracking_quality, tracking_report
     from snapbeam.util.diagnostics import diagnostics_of, refuse
 
-    settings = TrackingSettings(
-        buckling_level=buckling_level, location=location, rest_displacement=rest_displacement,
-        rest_frames=_rest(rest_frames), side=side, objects=objects,
-        beam_thickness=beam_thickness, beam_thickness_error=beam_thickness_error, tip_diameter=tip_diameter,
-        tip_diameter_error=tip_diameter_error, drive_amplitude=drive_amplitude,
-        drive_amplitude_error=drive_amplitude_error,
-        threshold=threshold, gamma=gamma, shaker=shaker, marker=marker, tip_distance=tip_distance, columns=columns,
-        contact_column=contact_column, blur_limit=blur_limit,
-        fixed_marks=[lab.whole_numbers("fixed_mark", text, 4) for text in fixed_mark or ()],  # type: ignore[misc]
-    )  # fmt: skip
+    given |= {"background": None, "rest_frames": _rest(rest_frames)}
+    given["fixed_marks"] = [lab.whole_numbers("fixed_mark", text, 4) for text in fixed_mark or ()]
+    settings = TrackingSettings(**{field.name: given[field.name] for field in fields(TrackingSettings)})
     part = None if region is None else lab.whole_numbers("region", region, 4)
     start = time.monotonic()
     look = (settings, frame, picture or output)

@@ -63,8 +63,6 @@ def fit_decay(
     with needing("the fit of a decay", "lab"):
         import lmfit
 
-    t = samples.time - samples.time[0]
-    y = samples.values
     prior = law_priors(units)
     parameters = lmfit.Parameters()
     for i, guess in enumerate(guesses):
@@ -80,13 +78,12 @@ def fit_decay(
     named = law.name in ("dry", "quadratic")
     if named:
         parameters.add("h", law.strength, min=0.0, max=100.0)
-    trifle = 1e-12 * float(np.abs(y).max())
+    trifle = 1e-12 * float(np.abs(samples.values).max())
     sigma = max(explain(samples, guesses, units, soften).noise_near, trifle)
 
     def residual(value: dict[str, float]) -> _Array:
-        design = _design(t, value, len(guesses), soften, law)
-        solution = solve(design, y, 1e-12)
-        parts = [(y - design @ solution) / sigma]
+        _, solution, rest = _solved(samples, value, len(guesses), soften, law)
+        parts = [rest / sigma]
         if soften:
             parts.append(np.array([(value[k] - m) / sd for k, (m, sd) in prior.items()]))
             if known is not None:
@@ -96,9 +93,7 @@ def fit_decay(
 
     search = lmfit.Minimizer(lambda p: residual(p.valuesdict()), parameters, scale_covar=False, calc_covar=False)
     value = dict(search.leastsq(xtol=1e-9, ftol=1e-9).params.valuesdict())
-    design = _design(t, value, len(guesses), soften, law)
-    solution = solve(design, y, 1e-12)
-    rest = y - design @ solution
+    design, solution, rest = _solved(samples, value, len(guesses), soften, law)
     fitted = [value[f"f{i}"] for i in range(len(guesses))]
     free = design.shape[1] + len(parameters)
     near = [noise_near(samples.sampling_frequency, rest, f, fitted, free) for f in fitted]
@@ -127,26 +122,23 @@ def fit_decay(
                 damping=_VISCOUS if i else law._replace(strength=value["h"], strength_se=error["h"]) if named else law,
             )
         )
-    rms = math.sqrt(float(rest @ rest) / max(y.size - free, 1))
+    rms = math.sqrt(float(rest @ rest) / max(rest.size - free, 1))
     alone = _alone(design, solution, rest, columns)
     return FitResult(modes, rest, alone, near[0], rms)
 
 
 def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, soften: bool) -> FitResult:
     """Fit amplitudes and phases of given modes to a signal, with all other parameters fixed."""
-    t = samples.time - samples.time[0]
     first = modes[0].amplitude ** 2
     value = {name: mean for name, (mean, _) in law_priors(units).items()}
     for i, mode in enumerate(modes):
         value |= {f"f{i}": mode.natural_frequency, f"z{i}": mode.damping_ratio, f"s{i}": mode.softening * first}
-    design = _design(t, value, len(modes), soften, modes[0].damping)
-    solution = solve(design, samples.values, 1e-12)
-    rest = samples.values - design @ solution
+    design, solution, rest = _solved(samples, value, len(modes), soften, modes[0].damping)
     free = design.shape[1] + 3 * len(modes)
     frequencies = [mode.natural_frequency for mode in modes]
     near = noise_near(samples.sampling_frequency, rest, frequencies[-1], frequencies, free)
     alone = _alone(design, solution, rest, _columns(len(modes), soften))
-    return FitResult(modes, rest, alone, near, math.sqrt(float(rest @ rest) / max(t.size - free, 1)))
+    return FitResult(modes, rest, alone, near, math.sqrt(float(rest @ rest) / max(rest.size - free, 1)))
 
 
 def noise_near(rate: float, rest: _Array, frequency: float, fitted: list[float], free: int) -> float:
@@ -170,6 +162,15 @@ def _errors(residual: Callable[[dict[str, float]], _Array], value: dict[str, flo
 def _columns(count: int, soften: bool) -> list[int]:
     """First column of each mode in the design: cosine, sine, and for the first the mean shift and 2 theta."""
     return [1 + 2 * i + (3 if soften and i > 0 else 0) for i in range(count)]
+
+
+def _solved(
+    samples: SignalSamples, value: dict[str, float], count: int, soften: bool, law: DampingLaw
+) -> tuple[_Array, _Array, _Array]:
+    """The design of modes, the amplitudes that fit best, and what they leave."""
+    design = _design(samples.time - samples.time[0], value, count, soften, law)
+    solution = solve(design, samples.values, 1e-12)
+    return design, solution, samples.values - design @ solution
 
 
 def _design(t: _Array, value: dict[str, float], count: int, soften: bool, law: DampingLaw) -> _Array:

@@ -162,13 +162,10 @@ def _stage(samples: SignalSamples, low: float, high: float) -> tuple[list[Pole],
 
 def _nearest(pole: tuple[float, float], others: list[tuple[float, float]]) -> int | None:
     """Which of *others* is the same pole, if any."""
-    best, where = math.inf, None
-    for k, other in enumerate(others):
-        apart = abs(other[0] / pole[0] - 1.0)
-        damped = abs(other[1] - pole[1])
-        if apart < _SAME[0] and damped < max(_SAME[1] * abs(pole[1]), _SAME[2]) and apart < best:
-            best, where = apart, k
-    return where
+    damped = max(_SAME[1] * abs(pole[1]), _SAME[2])
+    apart = [(abs(other[0] / pole[0] - 1.0), k) for k, other in enumerate(others) if abs(other[1] - pole[1]) < damped]
+    best, where = min(apart, default=(math.inf, 0))
+    return where if best < _SAME[0] else None
 
 
 def without_poles(samples: SignalSamples, poles: list[Pole], others: list[Pole]) -> SignalSamples:

@@ -13,7 +13,7 @@ from scipy.integrate import cumulative_trapezoid
 from snapbeam.lab.decay.fit import FitResult
 from snapbeam.lab.decay.model import Cycles, ModeEstimate, envelope
 from snapbeam.lab.decay.window import Doubt
-from snapbeam.lab.diagnostics import KINDS_DECAY
+from snapbeam.lab.diagnostics import KINDS_DECAY, holding
 from snapbeam.lab.least_squares import weighted_line, widened
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.util.diagnostics import Diagnostic
@@ -160,22 +160,16 @@ def diagnostics_about(
     samples: SignalSamples, modes: tuple[ModeEstimate, ...], noise: float, soften: bool
 ) -> list[Diagnostic]:
     """Diagnostics from the numbers of one decay alone."""
-    told = []
-    span = samples.duration
     first = modes[0]
-    left = math.exp(-first.damping_ratio * 2.0 * math.pi * first.natural_frequency * span)
-    if left > 0.7:
-        told.append(KINDS_DECAY["short"].found(left_percent=100.0 * left))
-    change = abs(first.softening) * first.amplitude**2
-    if soften and change > 0.1:
-        told.append(KINDS_DECAY["large"].found(change_percent=100.0 * change))
-    rise = -first.softening * first.amplitude**2
+    left = math.exp(-first.damping_ratio * 2.0 * math.pi * first.natural_frequency * samples.duration)
+    rise = -first.softening * first.amplitude**2 if soften else 0.0
     certain = -first.softening / first.softening_se if first.softening_se > 0.0 else 0.0
-    if soften and certain > _HARDENS and rise > _RISE:
-        half = 0.5 * samples.sampling_frequency
-        told.append(KINDS_DECAY["hardening"].found(rise_percent=100.0 * rise, certain=certain, half_hz=half))
-    if first.amplitude < 5.0 * noise:
-        told.append(KINDS_DECAY["faint"].found())
-    if first.damping_ratio < 2.0 * first.damping_ratio_se:
-        told.append(KINDS_DECAY["undamped"].found())
-    return told
+    hard = {"rise_percent": 100.0 * rise, "certain": certain, "half_hz": 0.5 * samples.sampling_frequency}
+    return holding(
+        KINDS_DECAY,
+        ("short", left > 0.7, {"left_percent": 100.0 * left}),
+        ("large", abs(rise) > 0.1, {"change_percent": 100.0 * abs(rise)}),
+        ("hardening", certain > _HARDENS and rise > _RISE, hard),
+        ("faint", first.amplitude < 5.0 * noise, {}),
+        ("undamped", first.damping_ratio < 2.0 * first.damping_ratio_se, {}),
+    )

@@ -10,17 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from snapbeam.plot.map import plot_response_map
-from snapbeam.plot.style import (
-    BEAM_COLOR,
-    CENTER_COLOR,
-    COLUMN_WIDTHS,
-    SHAKER_COLOR,
-    diagnostics_height,
-    draw_diagnostics,
-    figure_style,
-    fix_ticks,
-    new_figure,
-)
+from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, figure_style, figure_with, fix_ticks
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.validation import InputError, finite
 
@@ -44,9 +34,7 @@ def plot_map_comparison(dataset: xr.Dataset, points: MeasuredPoints, result: Map
     and what does not is red and bold, each the darker the greater its share of the measured class is.
     """
     with figure_style():
-        told = result.diagnostics
-        figure = new_figure("double", 92.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
-        draw_diagnostics(figure, told, 3)
+        figure = figure_with(result.diagnostics, "double", 92.0, 3)
         grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
         left = plot_response_map(dataset, figure.add_subplot(grid[0]), measurements=points)
         _mark_disagreeing(left, dataset, result)
@@ -120,9 +108,7 @@ def plot_waveform_comparison(
         ("simulated", "simulated_displacement", "simulated_shaker", result.simulated_impacts),
     )
     with figure_style():
-        told = result.diagnostics
-        figure = new_figure("double", 100.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
-        draw_diagnostics(figure, told, 3)
+        figure = figure_with(result.diagnostics, "double", 100.0, 3)
         axes = figure.subplots(2, 2, sharey="row", height_ratios=(1.5, 1.0))
         for i, (name, beam, shaker, impacts) in enumerate(columns):
             top, bottom = axes[0, i], axes[1, i]
@@ -177,10 +163,8 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
     """
     waveforms = _inside(result, window)
     cycle = waveforms["cycle"].values
-    told = result.diagnostics
     with figure_style():
-        figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
-        draw_diagnostics(figure, told, 3)
+        figure = figure_with(result.diagnostics, "double", 105.0, 3)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
         top.axhline(0.0, color="0.8", linewidth=0.5)
         if "simulated_low" in waveforms:

@@ -12,17 +12,7 @@ from snapbeam.lab.decay.model import noise_level
 from snapbeam.lab.decay.poles import find_poles
 from snapbeam.lab.signals import check_signal
 from snapbeam.lab.sine_fit import falling_window
-from snapbeam.plot.style import (
-    BEAM_COLOR,
-    CENTER_COLOR,
-    COLUMN_WIDTHS,
-    SHAKER_COLOR,
-    diagnostics_height,
-    draw_diagnostics,
-    figure_style,
-    fix_ticks,
-    new_figure,
-)
+from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, figure_style, figure_with, fix_ticks, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,10 +42,8 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
     rate = 2.0 * np.pi * mode.natural_frequency * mode.damping_ratio
     envelope = mode.amplitude * law_envelope(mode.damping, time - fit.start, rate)
     middle = float(values.mean())
-    told = fit.diagnostics
     with figure_style():
-        figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"]))
-        draw_diagnostics(figure, told)
+        figure = figure_with(fit.diagnostics, "double", 105.0)
         grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.1))
         top = figure.add_subplot(grid[0, :])
         top.plot(time, scale * (values - middle), color=BEAM_COLOR, linewidth=0.5, label="measured")

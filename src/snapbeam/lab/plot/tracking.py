@@ -15,15 +15,7 @@ from scipy.ndimage import uniform_filter
 from snapbeam.lab.tracking.settings import FrameFlag, Orientation
 from snapbeam.lab.tracking.track import check_tracked, tracking_quality
 from snapbeam.plot.animation import write_mp4
-from snapbeam.plot.style import (
-    BEAM_COLOR,
-    COLUMN_WIDTHS,
-    SHAKER_COLOR,
-    diagnostics_height,
-    draw_diagnostics,
-    figure_style,
-    new_figure,
-)
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, figure_style, figure_with
 from snapbeam.util.diagnostics import Diagnostic, diagnostics_of, doubtful
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.packages import needing
@@ -73,12 +65,6 @@ def found_edges(dataset: xr.Dataset, index: int, shape: tuple[int, int]) -> list
     return lines
 
 
-def flag_words(flags: int) -> str:
-    """The flags of a frame in words."""
-    names = [str(flag.name).lower().replace("_", " ") for flag in FrameFlag if flag and flag in FrameFlag(flags)]
-    return ", ".join(names) or "measured"
-
-
 def _check_pair(recording: Recording, dataset: xr.Dataset, index: int) -> tuple[int, int]:
     """The dataset's index and the recording's for one frame of the dataset."""
     index = integer("frame", index, 0, dataset.sizes["time"] - 1)
@@ -109,7 +95,7 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
             axes.plot(columns, rows, style, color=color, lw=1.2, label=None if name in seen else name)
             seen.add(name)
         flags = int(dataset["flags"][index])
-        axes.set_title(f"frame {index}, {1e3 * float(dataset['time'][index]):.2f} ms: {flag_words(flags)}")
+        axes.set_title(f"frame {index}, {1e3 * float(dataset['time'][index]):.2f} ms: {FrameFlag(flags).words}")
         if seen:
             figure.legend(loc="outside upper center", ncols=2, handlelength=1.8)
     return figure
@@ -137,8 +123,7 @@ def _frame_axes(
     """A figure of a frame with its scale bar and diagnostics, and its axes."""
     height, width = picture.shape
     size = 77.0 * min(max(height / width, 0.12), 1.4) + 26.0
-    figure = new_figure("single", size + diagnostics_height(told, COLUMN_WIDTHS["single"], 3))
-    draw_diagnostics(figure, told, 3)
+    figure = figure_with(told, "single", size, 3)
     axes = figure.subplots()
     low, high = np.percentile(picture, (0.2, 99.8))
     axes.imshow(picture, cmap="gray", vmin=low, vmax=max(high, low + 1), interpolation="nearest")
@@ -170,10 +155,8 @@ def plot_tracking_quality(dataset: xr.Dataset) -> Figure:
     time = 1e3 * dataset["time"].values
     pixel = dataset.attrs["pixel_size"] * 1e3
     shaker = "shaker_displacement_mm" in dataset
-    told = diagnostics_of(dataset)
     with figure_style():
-        figure = new_figure("double", 120.0 + diagnostics_height(told, COLUMN_WIDTHS["double"]))
-        draw_diagnostics(figure, told)
+        figure = figure_with(diagnostics_of(dataset), "double", 120.0)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.6, 1.8))
         top.plot(time, dataset["displacement_mm"], color=BEAM_COLOR, label="beam at the shaker")
         if shaker:
@@ -302,7 +285,7 @@ class _Canvas:
             first, last = np.rint(ends * 16.0).astype(int).tolist()
             cv2.line(image, first, last, rgb, 2, cv2.LINE_AA, 4)
         time = 1e3 * float(self.dataset["time"][index])
-        words = flag_words(int(self.dataset["flags"][index]))
+        words = FrameFlag(int(self.dataset["flags"][index])).words
         text = f"frame {index}  {time:.2f} ms  {words}"
         cv2.putText(image, text, (4, 17), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
         top = 24 + large.shape[0]

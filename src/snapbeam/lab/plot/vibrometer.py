@@ -8,17 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from snapbeam.lab.signals import check_signal
-from snapbeam.plot.style import (
-    BEAM_COLOR,
-    CENTER_COLOR,
-    COLUMN_WIDTHS,
-    SHAKER_COLOR,
-    diagnostics_height,
-    draw_diagnostics,
-    figure_style,
-    fix_ticks,
-    new_figure,
-)
+from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, figure_style, figure_with, fix_ticks
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,10 +37,8 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
     scale, unit, word = _SCALE[drive.units]
     fit = drive.steady
     begin = fit.start if drive.startup is None else drive.startup.onset
-    told = drive.diagnostics
     with figure_style():
-        figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"]))
-        draw_diagnostics(figure, told)
+        figure = figure_with(drive.diagnostics, "double", 105.0)
         grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))
         top = figure.add_subplot(grid[0, :])
         period = 1.0 / fit.frequency

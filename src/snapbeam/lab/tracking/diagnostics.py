@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from snapbeam.lab.diagnostics import Kind, table
+from snapbeam.lab.diagnostics import holding, table
 from snapbeam.lab.tracking.frame_order import FrameOrder
 from snapbeam.lab.tracking.measure import Rest, Touch, TrackedRows
 from snapbeam.lab.tracking.rulers import Ruler, compare_rulers, option_name, seen_rulers
@@ -15,291 +15,113 @@ from snapbeam.lab.tracking.settings import BeamView, EdgeShape, FrameFlag, Scene
 from snapbeam.lab.tracking.survey import CLIPPED
 from snapbeam.util.diagnostics import Diagnostic, Severity
 
-INFO, WARNING, ERROR = Severity.INFO, Severity.WARNING, Severity.ERROR
-
 KINDS = table(
-    Kind(
-        "camera.no_motion", WARNING,
-        "the range of the tracked beam over the recording, against its standard errors",
-        "what is tracked never moves by more than {range_px:.2f} px: it may be a clamp or a fixture; look at a "
-        "frame (--picture) and narrow region (--region)",
-        ("region",),
-    ),
-    Kind(
-        "camera.fixture", INFO,
-        "bands of light whose edges stand still while another one moves",
-        "{count:.0f} bar(s) that never move cross the picture, the first at row {row:.0f} of the turned picture; "
-        "left out as no beam",
-    ),
-    Kind(
-        "camera.rulers", WARNING,
-        "pixel sizes by the thickness of the beam, the diameter of the striker and the amplitude of the drive, against "
-        "each other, the one given, and factors of mistaken units",
-        "{told}; check these and the planes they were taken in, pixel_size (--pixel-size), beam_thickness "
+    "camera",
+    info={
+        "fixture": "{count:.0f} bar(s) that never move cross the picture, the first at row {row:.0f} of the turned "
+        "picture; left out as no beam",
+        "ruler_unseen": "{told} was given and is not seen in the recording: the pixel size is not checked with it",
+        "turned": "beam and striker lean by {angle:.1f} degrees alike: the camera is turned; taken out",
+        "no_contact": "the tip never comes nearer to the beam than {gap_px:.1f} px: no contact is recorded",
+        "striker_in_view": "a shaker is in view though shaker=False (--no-shaker): its columns are kept out of the "
+        "search for the beam",
+        "drift": "the camera moves by up to {drift_px:.2f} px against its fixed marks; taken out",
+    },
+    warning={
+        "no_motion": "what is tracked never moves by more than {range_px:.2f} px: it may be a clamp or a fixture; "
+        "look at a frame (--picture) and narrow region (--region)",
+        "rulers": "{told}; check these and the planes they were taken in, pixel_size (--pixel-size), beam_thickness "
         "(--beam-thickness), tip_diameter (--tip-diameter), drive_amplitude (--drive-amplitude), and what was tracked "
         "(region, --region)",
-        ("pixel_size", "beam_thickness", "tip_diameter", "drive_amplitude", "region"),
-    ),
-    Kind(
-        "camera.ruler_unseen", INFO,
-        "sides of the striker's rod, and steady cycles of the striker",
-        "{told} was given and is not seen in the recording: the pixel size is not checked with it",
-    ),
-    Kind(
-        "camera.scale", ERROR,
-        "thickness of the beam in millimetres, against what a beam can have",
-        "at this pixel size the beam is {found_mm:.3g} mm thick; pixel_size (--pixel-size) is in metres, such as "
-        "12e-6",
-        ("pixel_size",),
-    ),
-    Kind(
-        "camera.no_rest", ERROR,
-        "how long the beam stays where it is at the start, against the rest of its motion",
-        "the recording begins in motion ({quiet:.0f} quiet frame(s)), so where the beam rests is not known and "
-        "all displacements are shifted by up to {shift_mm:.3g} mm, which is in their standard errors; give "
-        "rest_frames (--rest-frames), such as a range at the end, or record from before the start",
-        ("rest_frames",),
-    ),
-    Kind(
-        "camera.rest_moves", WARNING,
-        "drift of the beam within the frames given as rest",
-        "{told}: all displacements may be shifted by up to {shift_mm:.3g} mm, which is in their standard errors",
-        (),
-    ),
-    Kind(
-        "camera.gamma", WARNING,
-        "asymmetry of the mean edge, finer than a pixel",
-        "edges look as if grey levels were light to the power {gamma:.2f} +- {error:.2f}: shaker and beam shift "
-        "against each other by {shift_px:.2f} px, which is in the shaker's standard errors; switch the camera's "
+        "rest_moves": "{told}: all displacements may be shifted by up to {shift_mm:.3g} mm, which is in their "
+        "standard errors",
+        "gamma": "edges look as if grey levels were light to the power {gamma:.2f} +- {error:.2f}: shaker and beam "
+        "shift against each other by {shift_px:.2f} px, which is in the shaker's standard errors; switch the camera's "
         "curve off, or undo it with gamma (--gamma)",
-        ("gamma",),
-    ),
-    Kind(
-        "camera.overexposed", WARNING,
-        "pixels in the middle of the beam that pile up at the highest grey level",
-        "{share_percent:.0f} % of the beam's pixels are saturated: its edges lie up to {shift_px:.2f} px off, "
-        "which is in the shaker's standard errors; less light, or a shorter exposure",
-    ),
-    Kind(
-        "camera.edge_shape", WARNING,
-        "what a blurred step leaves of the mean edge, finer than a pixel",
-        "edges are no blurred steps (off by {misfit_percent:.1f} % of the contrast): sharpened, doubled or "
-        "structured; switch the camera's edge enhancement off, or choose another contact_column (--contact-column)",
-        ("contact_column",),
-    ),
-    Kind(
-        "camera.averaged", WARNING,
-        "noise of pixels, against that of the same pixels a frame later",
-        "noise of one frame is still there in the next (correlation {correlation:.2f}): frames were averaged, by the "
-        "camera's noise reduction or by a program that changed the frame rate; positions lag by about {lag:.1f} "
-        "frame(s), which is in their standard errors; keep the frames as they were taken",
-    ),
-    Kind(
-        "camera.lag", WARNING,
-        "how the blur of the edge grows with its speed, against what the exposure explains",
-        "a frame still shows about {share_percent:.0f} % of the one before (image lag of the sensor, an afterglow of the "
-        "lamp, or a longer exposure than the file says): positions lag by that share of a frame, which is in their "
-        "standard errors; more light and a shorter exposure, or give the frames as they were taken",
-    ),
-    Kind(
-        "camera.pulse", WARNING,
-        "how the blur of the edge grows with its speed, against what the exposure explains",
-        "edges in motion are sharper than the exposure explains: the lamp pulses, or the exposure of the file is wrong; "
-        "positions are of an instant up to {frames:.2f} frames from the middle of the exposure, which is in their standard "
-        "errors; use steady light, or give the frames as they were taken",
-    ),
-    Kind(
-        "camera.smoothed", WARNING,
-        "noise of pixels, against that of their neighbours",
-        "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, smoothed, "
-        "compressed or made of fields, so that edges are known {factor:.1f} times less well than they seem and lie "
-        "{made_px:.2f} px off, which is in the standard errors; keep the frames as they were taken",
-    ),
-    Kind(
-        "camera.interlaced", WARNING,
-        "the edge in odd rows of fast frames, against that in even ones",
-        "odd and even rows differ by {share:.2f} of the step from frame to frame: interlaced video, whose rows are of "
-        "two instants; positions are of an instant up to half a frame off, which is in their standard errors; record "
-        "progressive frames, or part the fields into frames of their own",
-    ),
-    Kind(
-        "camera.fields", WARNING,
-        "each frame against the mean of its neighbours, with turning sign",
-        "every other frame is shifted by {shift_px:.2f} px: fields of an interlaced video, made frames by repeating "
-        "rows; the shift is in the standard errors; take a program that puts each field's rows where they belong",
-    ),
-    Kind(
-        "camera.few_levels", WARNING,
-        "grey levels between beam and background, and noise that would even out their rounding",
-        "the beam stands out by {levels:.1f} grey levels only: rounding moves edges by up to {shift_px:.2f} px, which "
-        "is in the standard errors; more light, or more bits",
-    ),
-    Kind(
-        "camera.sticker_alone", WARNING,
-        "a band of one height below the beam with nothing beyond it, that never comes near the beam",
-        "all that is seen of the shaker is a band {height_px:.0f} px high that never comes nearer to the beam than "
-        "{gap_px:.0f} px: taken for a sticker on a dark shaker whose tip touches the beam in the first frames; "
-        "give tip_distance (--tip-distance), or marker=False (--no-marker) if the band is the tip",
-        ("tip_distance", "marker"),
-    ),
-    Kind(
-        "camera.turned", INFO,
-        "the sides of the striker's rod and the slope of the beam, against rows and columns",
-        "beam and striker lean by {angle:.1f} degrees alike: the camera is turned; taken out",
-    ),
-    Kind(
-        "camera.rod_cut", WARNING,
-        "columns of the striker, against the border of the region",
-        "the border of the region cuts the striker, so where its tip touches is not seen: its position may be off by as "
-        "much as its tip is round; widen region (--region) or give contact_column (--contact-column)",
-        ("region", "contact_column"),
-    ),
-    Kind(
-        "camera.sticker_loose", WARNING,
-        "the way from the sticker to the tip frame by frame, where both are seen, against their noise",
-        "the sticker moves against the tip by {swing_px:.2f} px (standard deviation), which is in the shaker's standard "
-        "errors: it is loose, or another object; fix it, or follow the tip with marker=False (--no-marker)",
-        ("marker",),
-    ),
-    Kind(
-        "camera.never_touches", WARNING,
-        "the gap between tip and beam over the recording, while the beam moves",
-        "the beam moves though what is taken for the tip never comes nearer to it than {gap_px:.1f} px: it may "
-        "be a sticker; look at a frame (--picture), give tip_distance (--tip-distance)",
-        ("tip_distance",),
-    ),
-    Kind(
-        "camera.no_contact", INFO,
-        "the gap between a tip without doubt and the beam over the recording, while the beam moves",
-        "the tip never comes nearer to the beam than {gap_px:.1f} px: no contact is recorded",
-    ),
-    Kind(
-        "camera.contact_offset", WARNING,
-        "penetration while beam and shaker move together, which is zero",
-        "while beam and shaker move together the tip seems to stand {depth_px:+.2f} +- {error_px:.2f} px inside the "
-        "beam: their edges are shifted against each other, which is in the shaker's standard errors; look for a "
-        "curve of the camera (--gamma), overexposure or a wrong tip_distance (--tip-distance)",
-        ("gamma", "tip_distance"),
-    ),
-    Kind(
-        "camera.inside", WARNING,
-        "penetration of the tip into the beam, against what contact can give",
-        "the tip stands up to {depth_px:.1f} px inside the beam ({frames:.0f} frames): what is "
-        "taken for the tip is not, or beam and shaker are lit differently; give tip_distance (--tip-distance)",
-        ("tip_distance",),
-    ),
-    Kind(
-        "camera.jumps", WARNING,
-        "positions that leave their neighbours for a few frames, as no motion does",
-        "{frames:.0f} frame(s) ({share_percent:.1f} %) left out because the position jumps and comes back",
-    ),
-    Kind(
-        "camera.distorted", WARNING,
-        "thickness of the beam and shape of its edges in each frame, against the usual ones",
-        "{frames:.0f} frame(s) ({share_percent:.1f} %) in which the beam looks thicker or thinner, or its edge is no "
-        "step: light, dust, blur or another object may lie on it; their standard errors are widened, or they are left out",
-    ),
-    Kind(
-        "camera.lost", WARNING,
-        "share of the frames with a measurement",
-        "only {share_percent:.0f} % of the frames were measured; see the flags for the reasons",
-    ),
-    Kind(
-        "camera.striker_lost", WARNING,
-        "share of the frames with a position of the striker",
-        "the striker was found in only {share_percent:.0f} % of the frames; see the flags for the reasons, narrow region "
-        "(--region), or track the beam alone with shaker=False (--no-shaker)",
-        ("region", "shaker"),
-    ),
-    Kind(
-        "camera.frames_lost", ERROR,
-        "the motion of striker and beam over ten frames, with and without a jump of the time between them",
-        "at least {frames:.0f} frame(s) are missing at {places:.0f} place(s), the first before frame {first:.0f}: times after it "
-        "are {short_ms:.3g} ms or more too small; copy the recording again, or keep the frames before",
-    ),
-    Kind(
-        "camera.frames_repeated", WARNING,
-        "the motion of striker and beam over ten frames, with and without a frame in which both stand still",
-        "at least {frames:.0f} frame(s) show the frame before again, the first is frame {first:.0f}: left out; keep the frames as "
-        "they were taken",
-    ),
-    Kind(
-        "camera.frames_exchanged", ERROR,
-        "striker and beam frame by frame, with frames exchanged and with frames shown again",
-        "{frames:.0f} pair(s) of frames are in the wrong order, the first from frame {first:.0f} on: write the images again "
-        "in the order of their numbers",
-    ),
-    Kind(
-        "camera.time_jump", ERROR,
-        "the phase of the striker's drive before and after each frame, against a shift of the picture",
-        "the drive's phase jumps by {size:.2f} frames at about frame {first:.0f}: frames are missing, or two recordings were "
-        "joined; keep the frames before",
-    ),
-    Kind(
-        "camera.knocked", ERROR,
-        "the rows of striker and beam before and after each frame, against jumps of the time and of each alone",
-        "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked (or, where beam and striker "
-        "move alike, frames are missing); keep the frames before, or give a part with a stationary object (fixed_marks, "
-        "--fixed-mark)",
-        ("fixed_marks",),
-    ),
-    Kind(
-        "camera.jump", ERROR,
-        "the rows of striker and beam before and after each frame, against jumps of the time and of each alone",
-        "beam and striker jump by {beam:.2f} and {striker:.2f} px at frame {first:.0f}: frames are missing, two recordings "
-        "were joined, or the camera was knocked; keep the frames before",
-    ),
-    Kind(
-        "camera.off_its_drive", WARNING,
-        "the striker before and after each frame, against a shift of the picture and a jump of the time",
-        "from about frame {first:.0f} on the striker is off its steady sine; a shift of the picture and a jump of the time "
-        "explain it alike: look at the frames about it",
-    ),
-    Kind(
-        "camera.rate_changes", ERROR,
-        "the frequency of the striker's drive, counted in frames, before and after each frame",
-        "from about frame {first:.0f} on the drive has {ratio:.2f} times its frequency before: the frame rate changed within "
-        "the recording; keep the frames before, or give each part its frame_rate (--frame-rate)",
-        ("frame_rate",),
-    ),
-    Kind(
-        "camera.scattered", WARNING,
-        "how the scatter of the striker about its steady sine grows with its speed",
-        "the striker scatters with its speed, by {size:.2f} frames: an uneven trigger, or edges that are found less well "
-        "while they move",
-    ),
-    Kind(
-        "camera.curved", WARNING,
-        "the beam's edge in its columns, against a straight line",
-        "the beam's edge is curved: at the contact it lies {hollow_px:.2f} px off the line through its columns, which is "
-        "in the shaker's standard errors; give fewer columns (--columns) or check the lens",
-        ("columns",),
-    ),
-    Kind(
-        "camera.beyond", ERROR,
-        "displacement in buckling levels, and velocities, against what a beam and a shaker can do",
-        "{told}: check pixel_size (--pixel-size), frame_rate (--frame-rate) and buckling_level (--buckling-level)",
-        ("pixel_size", "frame_rate", "buckling_level"),
-    ),
-    Kind(
-        "camera.striker_in_view", INFO,
-        "something beyond the beam in most frames though no shaker is followed",
-        "a shaker is in view though shaker=False (--no-shaker): its columns are kept out of the search for the beam",
-        ("shaker",),
-    ),
-    Kind(
-        "camera.background_moves", WARNING,
-        "the background beyond the beam in both halves of its columns, frame by frame",
-        "the background moves with the picture, by up to {shift_px:.2f} px: an electronic stabiliser, or a camera that moves; "
-        "it is in the standard errors; record without a stabiliser, or take it out with fixed_marks (--fixed-mark)",
-        ("fixed_marks",),
-    ),
-    Kind(
-        "camera.drift", INFO,
-        "motion of marks that stand still",
-        "the camera moves by up to {drift_px:.2f} px against its fixed marks; taken out",
-    ),
-)  # fmt: skip
+        "overexposed": "{share_percent:.0f} % of the beam's pixels are saturated: its edges lie up to {shift_px:.2f} "
+        "px off, which is in the shaker's standard errors; less light, or a shorter exposure",
+        "edge_shape": "edges are no blurred steps (off by {misfit_percent:.1f} % of the contrast): sharpened, doubled "
+        "or structured; switch the camera's edge enhancement off, or choose another contact_column (--contact-column)",
+        "averaged": "noise of one frame is still there in the next (correlation {correlation:.2f}): frames were "
+        "averaged, by the camera's noise reduction or by a program that changed the frame rate; positions lag by "
+        "about {lag:.1f} frame(s), which is in their standard errors; keep the frames as they were taken",
+        "lag": "a frame still shows about {share_percent:.0f} % of the one before (image lag of the sensor, an "
+        "afterglow of the lamp, or a longer exposure than the file says): positions lag by that share of a frame, "
+        "which is in their standard errors; more light and a shorter exposure, or give the frames as they were taken",
+        "pulse": "edges in motion are sharper than the exposure explains: the lamp pulses, or the exposure of the "
+        "file is wrong; positions are of an instant up to {frames:.2f} frames from the middle of the exposure, which "
+        "is in their standard errors; use steady light, or give the frames as they were taken",
+        "smoothed": "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, "
+        "smoothed, compressed or made of fields, so that edges are known {factor:.1f} times less well than they seem "
+        "and lie {made_px:.2f} px off, which is in the standard errors; keep the frames as they were taken",
+        "interlaced": "odd and even rows differ by {share:.2f} of the step from frame to frame: interlaced video, "
+        "whose rows are of two instants; positions are of an instant up to half a frame off, which is in their "
+        "standard errors; record progressive frames, or part the fields into frames of their own",
+        "fields": "every other frame is shifted by {shift_px:.2f} px: fields of an interlaced video, made frames by "
+        "repeating rows; the shift is in the standard errors; take a program that puts each field's rows where they "
+        "belong",
+        "few_levels": "the beam stands out by {levels:.1f} grey levels only: rounding moves edges by up to "
+        "{shift_px:.2f} px, which is in the standard errors; more light, or more bits",
+        "sticker_alone": "all that is seen of the shaker is a band {height_px:.0f} px high that never comes nearer to "
+        "the beam than {gap_px:.0f} px: taken for a sticker on a dark shaker whose tip touches the beam in the first "
+        "frames; give tip_distance (--tip-distance), or marker=False (--no-marker) if the band is the tip",
+        "rod_cut": "the border of the region cuts the striker, so where its tip touches is not seen: its position may "
+        "be off by as much as its tip is round; widen region (--region) or give contact_column (--contact-column)",
+        "sticker_loose": "the sticker moves against the tip by {swing_px:.2f} px (standard deviation), which is in "
+        "the shaker's standard errors: it is loose, or another object; fix it, or follow the tip with marker=False "
+        "(--no-marker)",
+        "never_touches": "the beam moves though what is taken for the tip never comes nearer to it than {gap_px:.1f} "
+        "px: it may be a sticker; look at a frame (--picture), give tip_distance (--tip-distance)",
+        "contact_offset": "while beam and shaker move together the tip seems to stand {depth_px:+.2f} +- "
+        "{error_px:.2f} px inside the beam: their edges are shifted against each other, which is in the shaker's "
+        "standard errors; look for a curve of the camera (--gamma), overexposure or a wrong tip_distance "
+        "(--tip-distance)",
+        "inside": "the tip stands up to {depth_px:.1f} px inside the beam ({frames:.0f} frames): what is taken for "
+        "the tip is not, or beam and shaker are lit differently; give tip_distance (--tip-distance)",
+        "jumps": "{frames:.0f} frame(s) ({share_percent:.1f} %) left out because the position jumps and comes back",
+        "distorted": "{frames:.0f} frame(s) ({share_percent:.1f} %) in which the beam looks thicker or thinner, or "
+        "its edge is no step: light, dust, blur or another object may lie on it; their standard errors are widened, "
+        "or they are left out",
+        "lost": "only {share_percent:.0f} % of the frames were measured; see the flags for the reasons",
+        "striker_lost": "the striker was found in only {share_percent:.0f} % of the frames; see the flags for the "
+        "reasons, narrow region (--region), or track the beam alone with shaker=False (--no-shaker)",
+        "frames_repeated": "at least {frames:.0f} frame(s) show the frame before again, the first is frame "
+        "{first:.0f}: left out; keep the frames as they were taken",
+        "off_its_drive": "from about frame {first:.0f} on the striker is off its steady sine; a shift of the picture "
+        "and a jump of the time explain it alike: look at the frames about it",
+        "scattered": "the striker scatters with its speed, by {size:.2f} frames: an uneven trigger, or edges that are "
+        "found less well while they move",
+        "curved": "the beam's edge is curved: at the contact it lies {hollow_px:.2f} px off the line through its "
+        "columns, which is in the shaker's standard errors; give fewer columns (--columns) or check the lens",
+        "background_moves": "the background moves with the picture, by up to {shift_px:.2f} px: an electronic "
+        "stabiliser, or a camera that moves; it is in the standard errors; record without a stabiliser, or take it "
+        "out with fixed_marks (--fixed-mark)",
+    },
+    error={
+        "scale": "at this pixel size the beam is {found_mm:.3g} mm thick; pixel_size (--pixel-size) is in metres, "
+        "such as 12e-6",
+        "no_rest": "the recording begins in motion ({quiet:.0f} quiet frame(s)), so where the beam rests is not known "
+        "and all displacements are shifted by up to {shift_mm:.3g} mm, which is in their standard errors; give "
+        "rest_frames (--rest-frames), such as a range at the end, or record from before the start",
+        "frames_lost": "at least {frames:.0f} frame(s) are missing at {places:.0f} place(s), the first before frame "
+        "{first:.0f}: times after it are {short_ms:.3g} ms or more too small; copy the recording again, or keep the "
+        "frames before",
+        "frames_exchanged": "{frames:.0f} pair(s) of frames are in the wrong order, the first from frame {first:.0f} "
+        "on: write the images again in the order of their numbers",
+        "time_jump": "the drive's phase jumps by {size:.2f} frames at about frame {first:.0f}: frames are missing, or "
+        "two recordings were joined; keep the frames before",
+        "knocked": "the picture shifts by {size:.2f} px at about frame {first:.0f}: the camera was knocked (or, where "
+        "beam and striker move alike, frames are missing); keep the frames before, or give a part with a stationary "
+        "object (fixed_marks, --fixed-mark)",
+        "jump": "beam and striker jump by {beam:.2f} and {striker:.2f} px at frame {first:.0f}: frames are missing, "
+        "two recordings were joined, or the camera was knocked; keep the frames before",
+        "rate_changes": "from about frame {first:.0f} on the drive has {ratio:.2f} times its frequency before: the "
+        "frame rate changed within the recording; keep the frames before, or give each part its frame_rate "
+        "(--frame-rate)",
+        "beyond": "{told}: check pixel_size (--pixel-size), frame_rate (--frame-rate) and buckling_level "
+        "(--buckling-level)",
+    },
+)
 
 _WELLS = 3.0  # buckling levels; a beam that snaps through does not go further
 _FASTEST = (30.0, 3.0)  # m/s of beam and shaker
@@ -347,23 +169,32 @@ def tracking_diagnostics(
     told = [*_of_the_beam(scene, seen), *_of_the_scale(scene, seen, settings)]
     told += [*_of_the_rest(seen, settings, offset_mm)]
     told += [*_of_the_motion(seen, settings, rate), *_of_the_order(seen.order, rate)]
-    if seen.trail > 0.0:
-        told.append(KINDS["lag"].found(share_percent=100.0 * seen.trail))
-    if seen.pulse > 0.0:
-        told.append(KINDS["pulse"].found(frames=seen.pulse))
-    if seen.rows.hollow > 0.0:
-        told.append(KINDS["curved"].found(hollow_px=seen.rows.hollow))
+    told += holding(
+        KINDS,
+        ("lag", seen.trail > 0.0, {"share_percent": 100.0 * seen.trail}),
+        ("pulse", seen.pulse > 0.0, {"frames": seen.pulse}),
+        ("curved", seen.rows.hollow > 0.0, {"hollow_px": seen.rows.hollow}),
+    )
     told += _of_the_edges(scene.shape, settings)
-    told += _of_the_pixels(scene, seen.fields)
+    noise, shift = scene.noise, rounding_shift(scene.beam)
+    alike = {"correlation": max(noise.along, noise.across), "factor": noise.factor, "made_px": noise.made_up}
+    told += holding(
+        KINDS,
+        ("interlaced", seen.fields.apart > 0.0, {"share": seen.fields.apart}),
+        ("fields", seen.fields.shift > 0.0, {"shift_px": seen.fields.shift}),
+        ("averaged", noise.lag > 0.0, {"correlation": noise.in_time, "lag": noise.lag}),
+        ("smoothed", noise.factor > 1.0 or noise.across > 0.0, alike),
+        ("few_levels", shift > 0.0, {"levels": scene.beam.contrast, "shift_px": shift}),
+    )
     told += _of_the_frames(seen.rows)
     if scene.shaker is not None:
         told += _of_the_tip(scene, seen)
-    if scene.striker_in_view:
-        told.append(KINDS["striker_in_view"].found())
-    if seen.moves > 0.0:
-        told.append(KINDS["background_moves"].found(shift_px=seen.moves))
-    if seen.drift > 0.05:
-        told.append(KINDS["drift"].found(drift_px=seen.drift))
+    told += holding(
+        KINDS,
+        ("striker_in_view", scene.striker_in_view, {}),
+        ("background_moves", seen.moves > 0.0, {"shift_px": seen.moves}),
+        ("drift", seen.drift > 0.05, {"drift_px": seen.drift}),
+    )
     return tuple(told)
 
 
@@ -396,19 +227,15 @@ def never_touching(penetration: np.ndarray, rows: TrackedRows) -> float:
 
 
 def _of_the_beam(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
-    told = []
-    beam = scene.beam
-    if beam.fixtures:
-        told.append(KINDS["fixture"].found(count=len(beam.fixtures), row=beam.fixtures[0][0]))
+    bars, found = scene.beam.fixtures, scene.beam.thickness * seen.scale
     row = seen.rows.row[np.isfinite(seen.rows.row)]
-    if row.size:
-        span = float(np.ptp(np.percentile(row, (0.5, 99.5))))
-        if span < max(0.3, 8.0 * float(np.nanmedian(seen.rows.error))):
-            told.append(KINDS["no_motion"].found(range_px=span))
-    found = beam.thickness * seen.scale
-    if not 0.005 <= found <= 30.0:
-        told.append(KINDS["scale"].found(found_mm=found))
-    return told
+    span = float(np.ptp(np.percentile(row, (0.5, 99.5)))) if row.size else math.inf
+    return holding(
+        KINDS,
+        ("fixture", bool(bars), {"count": len(bars), "row": bars[0][0] if bars else 0}),
+        ("no_motion", span < max(0.3, 8.0 * float(np.nanmedian(seen.rows.error))), {"range_px": span}),
+        ("scale", not 0.005 <= found <= 30.0, {"found_mm": found}),
+    )
 
 
 def _of_the_scale(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
@@ -440,19 +267,14 @@ def _of_the_motion(seen: SeenMotion, settings: TrackingSettings, rate: float) ->
 
 
 def _of_the_order(order: FrameOrder, rate: float) -> list[Diagnostic]:
-    told = []
-    if order.missing:
-        frames = sum(order.many)
-        told.append(
-            KINDS["frames_lost"].found(
-                frames=frames, places=len(order.missing), first=order.missing[0], short_ms=1e3 * frames / rate
-            )
-        )
-    if order.repeated:
-        told.append(KINDS["frames_repeated"].found(frames=len(order.repeated), first=order.repeated[0]))
-    if not order.missing:
-        told += [KINDS[kind].found(None, "", **numbers) for kind, numbers in order.clock]
-    return told
+    lost, repeated, frames = order.missing, order.repeated, sum(order.many)
+    numbers = {"frames": frames, "places": len(lost), "first": min(lost, default=0), "short_ms": 1e3 * frames / rate}
+    return holding(
+        KINDS,
+        ("frames_lost", bool(lost), numbers),
+        ("frames_repeated", bool(repeated), {"frames": len(repeated), "first": min(repeated, default=0)}),
+        *((kind, not lost, told) for kind, told in order.clock),
+    )
 
 
 def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float) -> list[Diagnostic]:
@@ -478,27 +300,7 @@ def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Diagnost
         gamma = settings.gamma * shape.gamma
         error = settings.gamma * shape.gamma_se
         return [KINDS["gamma"].found(gamma=gamma, error=error, shift_px=2.0 * abs(shape.shift))]
-    if shape.misfit > 0.03:
-        return [KINDS["edge_shape"].found(misfit_percent=100.0 * shape.misfit)]
-    return []
-
-
-def _of_the_pixels(scene: Scene, fields: VideoFields) -> list[Diagnostic]:
-    told = []
-    if fields.apart > 0.0:
-        told.append(KINDS["interlaced"].found(share=fields.apart))
-    if fields.shift > 0.0:
-        told.append(KINDS["fields"].found(shift_px=fields.shift))
-    noise = scene.noise
-    if noise.lag > 0.0:
-        told.append(KINDS["averaged"].found(correlation=noise.in_time, lag=noise.lag))
-    if noise.factor > 1.0 or noise.across > 0.0:
-        alike = max(noise.along, noise.across)
-        told.append(KINDS["smoothed"].found(correlation=alike, factor=noise.factor, made_px=noise.made_up))
-    shift = rounding_shift(scene.beam)
-    if shift > 0.0:
-        told.append(KINDS["few_levels"].found(levels=scene.beam.contrast, shift_px=shift))
-    return told
+    return holding(KINDS, ("edge_shape", shape.misfit > 0.03, {"misfit_percent": 100.0 * shape.misfit}))
 
 
 def _of_the_frames(rows: TrackedRows) -> list[Diagnostic]:
@@ -508,7 +310,7 @@ def _of_the_frames(rows: TrackedRows) -> list[Diagnostic]:
         frames = rows.flagged(flag)
         if frames:
             share = frames / count
-            severity = WARNING if share > _RARE else INFO
+            severity = Severity.WARNING if share > _RARE else Severity.INFO
             told.append(KINDS[name].found(severity, frames=frames, share_percent=100.0 * share))
     share = float(np.isfinite(rows.row).mean())
     if share < 0.9:
@@ -533,20 +335,16 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
         # the sticker's own upper edge over the beam
         nearest = float(np.nanmin(gap)) - shaker.tip_offset - 0.5 * shaker.sticker.thickness
         told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
-    if shaker.turn:
-        told.append(KINDS["turned"].found(angle=math.degrees(math.atan(shaker.turn))))
-    if shaker.cut:
-        told.append(KINDS["rod_cut"].found())
-    if shaker.loose > 0.0:
-        told.append(KINDS["sticker_loose"].found(swing_px=shaker.loose))
     closest = never_touching(seen.penetration, seen.rows)
-    if closest > 0.0:
-        told.append(KINDS["no_contact" if shaker.certain else "never_touches"].found(gap_px=closest))
-    if contact_shift(seen.touch, scene.placed_error) > 0.0:
-        told.append(KINDS["contact_offset"].found(depth_px=seen.touch.penetration, error_px=seen.touch.error))
+    offset = {"depth_px": seen.touch.penetration, "error_px": seen.touch.error}
     with np.errstate(invalid="ignore"):
-        deep = seen.penetration - 5.0 * error > 1.0
-    if np.count_nonzero(deep) >= 3:
-        depth = float(np.nanmax(np.where(deep, seen.penetration, np.nan)))
-        told.append(KINDS["inside"].found(depth_px=depth, frames=int(np.count_nonzero(deep))))
-    return told
+        deep = seen.penetration[seen.penetration - 5.0 * error > 1.0]
+    return told + holding(
+        KINDS,
+        ("turned", shaker.turn != 0.0, {"angle": math.degrees(math.atan(shaker.turn))}),
+        ("rod_cut", shaker.cut, {}),
+        ("sticker_loose", shaker.loose > 0.0, {"swing_px": shaker.loose}),
+        ("no_contact" if shaker.certain else "never_touches", closest > 0.0, {"gap_px": closest}),
+        ("contact_offset", contact_shift(seen.touch, scene.placed_error) > 0.0, offset),
+        ("inside", deep.size >= 3, {"depth_px": float(deep.max(initial=0.0)), "frames": deep.size}),
+    )

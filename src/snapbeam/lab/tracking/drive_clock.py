@@ -35,13 +35,20 @@ _SAME = 0.08  # by which their frequencies may differ
 _BLOCK = 8  # frames, for noise that is alike in neighbours
 
 
-def steady_striker(shaker: Floats) -> tuple[SignalSamples, SineFit] | None:
-    """The steady part of the striker's rows [px], over the numbers of frames, and its sine; None if it is too short."""
+def _filled(shaker: Floats) -> SignalSamples | None:
+    """The striker's rows over the numbers of frames, gaps by straight lines; None if there are too few."""
     known = np.flatnonzero(np.isfinite(shaker))
     if known.size < 64 or known.size < 0.8 * shaker.size:
         return None
     frames = np.arange(shaker.size, dtype=np.float64)
-    samples = SignalSamples(np.interp(frames, frames[known], shaker[known]), frames, 1.0)
+    return SignalSamples(np.interp(frames, frames[known], shaker[known]), frames, 1.0)
+
+
+def steady_striker(shaker: Floats) -> tuple[SignalSamples, SineFit] | None:
+    """The steady part of the striker's rows [px], over the numbers of frames, and its sine; None if it is too short."""
+    samples = _filled(shaker)
+    if samples is None:
+        return None
     try:
         guess = spectral_peak(samples)
         first, last = moving_part(samples, guess)
@@ -49,7 +56,7 @@ def steady_striker(shaker: Floats) -> tuple[SignalSamples, SineFit] | None:
         last = min(last, first + _MOST)
         if (last - first) * guess < _CYCLES:
             return None
-        part = SignalSamples(samples.values[first:last], frames[first:last], 1.0)
+        part = samples.part(slice(first, last))
         return part, fit_sine(part, guess, 5, keep=np.isfinite(shaker[first:last]))
     except InputError:
         return None
@@ -74,13 +81,12 @@ def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
 
 def _rate_change(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
     """A frequency of the drive, counted in frames, that is another multiple from some frame on: the frame rate changed."""
-    known = np.flatnonzero(np.isfinite(shaker))
-    if known.size < 64 or known.size < 0.8 * shaker.size:
+    samples = _filled(shaker)
+    if samples is None:
         return []
-    frames = np.arange(shaker.size, dtype=np.float64)
-    values = np.interp(frames, frames[known], shaker[known])
+    values, frames, _ = samples
     try:
-        guess = spectral_peak(SignalSamples(values, frames, 1.0))
+        guess = spectral_peak(samples)
     except InputError:
         return []
     width = max(round(_WINDOW / guess), _LEAST_WINDOW)

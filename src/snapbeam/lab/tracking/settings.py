@@ -270,26 +270,12 @@ _MADE_UP = 0.15  # px; rows made between two of one field have a correlation of 
 class BeamView:
     """The beam and the light on it.
 
-    Attributes
-    ----------
-    threshold, bright
-        Grey level that parts objects from the background, and which side of it objects are on.
-    contrast, noise
-        Step of grey levels at the beam's edge, and standard deviation of a pixel.
-    saturated, hot_share
-        Grey level at which pixels are saturated (infinite if none is), and the usual share of such pixels
-        about the edges.
-    edge_width, width_table
-        Blur of the edges [px], and the table that turns fitted widths into true ones.
-    thickness, thickness_error
-        Rows from the far to the near edge, and the standard error.
-    columns, contact_column
-        Where the edge is fitted, and the column it is wanted at.
-    groups, merged
-        Columns that see the beam alone; if there are none, the columns about the contact, and ``merged`` says
-        that the shaker may grow out of the beam there.
-    fixtures
-        (first row, one past the last) of bars that cross the picture and never move.
+    Objects are on the ``bright`` or dark side of the grey level ``threshold``; ``contrast`` is the step at the beam's
+    edge, ``noise`` the standard deviation of a pixel, ``saturated`` the level at which pixels are (infinite if none is)
+    and ``hot_share`` the usual share of such pixels about the edges.  ``width_table`` turns fitted widths of edges into
+    true ones, ``thickness`` is in rows.  The edge is fitted in ``columns`` and wanted at ``contact_column``; ``groups``
+    of columns see the beam alone, or are those about the contact, and ``merged`` says that the shaker may grow out of
+    the beam there.  ``fixtures`` are rows (first, one past the last) of bars that never move.
     """
 
     threshold: float
@@ -383,17 +369,9 @@ class ShakerView:
 class EdgeShape:
     """The mean shape of the beam's edge over the sample, against what a linear camera would show.
 
-    Attributes
-    ----------
-    misfit
-        Root mean square of what the blurred step leaves of the mean edge, share of the contrast.
-    gamma, gamma_se
-        Exponent of grey level over light that makes the edge symmetric, and its standard error; NaN if the
-        sample was too small to tell.
-    shift
-        Rows by which the fitted edge lies outside the one that is symmetric in light.
-    clipped
-        Share of saturated pixels in the middle of the beam.
+    ``misfit`` is the root mean square of what the blurred step leaves of it, share of the contrast; ``gamma`` the
+    exponent of grey level over light that makes it symmetric, NaN if the sample is too small; ``shift`` the rows by
+    which the fitted edge lies outside that one; ``clipped`` the share of saturated pixels in the middle of the beam.
     """
 
     misfit: float
@@ -520,6 +498,11 @@ class FrameFlag(IntFlag):
     OUT_OF_REGION = 64
     JUMP = 128
     DISTORTED = 256
+
+    @property
+    def words(self) -> str:
+        """The flags in small letters, with commas between; "measured" if there is none."""
+        return ", ".join(str(flag.name).lower().replace("_", " ") for flag in self) or "measured"
 
     @property
     def advice(self) -> str:

@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,19 +192,9 @@ _GAMMAS = np.exp(np.linspace(math.log(0.25), math.log(4.0), 81))
 def edge_shape(
     windows: Floats, centre: Floats, fit: EdgeFit, good: NDArray[np.bool_], width: float, sign: float, clipped: float
 ) -> EdgeShape:
-    """Judge the mean edge of many windows.
+    """Judge the mean edge of the *good* ones of many windows, grey levels (frames, columns, rows) about rows *centre*.
 
-    Parameters
-    ----------
-    windows, centre, fit
-        Grey levels (frames, columns, rows), rows of their middles, and what :func:`fit_edges` made of them with
-        *width* and *sign*.
-    good
-        Which windows to use.
-    width, sign
-        Blur of the edges [px]; +1 for objects brighter than the background.
-    clipped
-        Share of saturated pixels in the middle of the beam.
+    *fit* is what :func:`fit_edges` made of them, *clipped* the share of saturated pixels in the middle of the beam.
     """
     data, position = windows[good], fit.position[good]
     unknown = EdgeShape(math.nan, math.nan, math.nan, _CLIPPED_SHIFT if clipped > CLIPPED else 0.0, clipped)
@@ -347,9 +337,7 @@ def find_bands(objects: ColumnObjects, height: int, level: float, bright: bool) 
     return BeamBands(objects, alone, thickness)
 
 
-def placed(
-    width: int, rod: tuple[int, int] | None, count: int, contact_column: float | None
-) -> tuple[float, NDArray[np.intp], tuple[NDArray[np.intp], ...], bool]:
+def placed(width: int, rod: tuple[int, int] | None, count: int, contact_column: float | None) -> dict[str, Any]:
     """Contact column, columns to measure the beam in, groups that see it alone, and whether there are none."""
     centre = (rod[0] + rod[1] - 1) / 2.0 if rod is not None else (width - 1) / 2.0
     centre = centre if contact_column is None else contact_column
@@ -360,21 +348,23 @@ def placed(
             f"contact_column (--contact-column) = {centre:g}: must leave at least 4 columns on both sides in the region"
         )
     columns = spread_columns(int(np.ceil(centre - half)), int(np.floor(centre + half)), count)
+    view = {"contact_column": centre, "columns": columns, "groups": (columns,), "merged": False}
     if rod is None:
-        return centre, columns, (columns,), False
+        return view
     left = np.arange(max(0, rod[0] - 19), rod[0] - 3)
     right = np.arange(rod[1] + 3, min(width, rod[1] + 19))
     groups = tuple(one for one in (left, right) if one.size >= 4)
-    return centre, columns, groups or (columns,), not groups
+    return view | {"groups": groups or (columns,), "merged": not groups}
 
 
 def beam_view(
-    frames: NDArray[np.floating], smooth: NDArray[np.floating], bands: BeamBands, rough: BeamView
+    frames: NDArray[np.floating], smooth: NDArray[np.floating], bands: BeamBands, known: dict[str, Any]
 ) -> tuple[BeamView, EdgeShape]:
     """The beam to a fraction of a pixel, where it stands alone, and the shape of its edge.
 
-    ``rough`` holds all but contrast, edge width and thickness.
+    *known* are the fields of the view but contrast, edge width and thickness.
     """
+    sign, saturated = (1.0 if known["bright"] else -1.0), known["saturated"]
     objects, alone = bands.objects, bands.alone
     background, inside = _levels(smooth, objects, alone)
     clear = ~objects.follows | (objects.after - objects.end >= 2 * HALF)  # else the tip's light is in the windows
@@ -385,11 +375,11 @@ def beam_view(
     half = int(np.clip(bands.thickness // 2, 2, HALF))
     good = good[:, columns]
     far, near = objects.start[:, columns] - 0.5, objects.end[:, columns] - 0.5
-    width = _edge_width(frames, far, columns, good, half, rough.sign)
+    width = _edge_width(frames, far, columns, good, half, sign)
     windows, fits, edges, usable = [], [], [], good.copy()
-    for rows, sign in ((near, -rough.sign), (far, rough.sign)):
+    for rows, rising in ((near, -sign), (far, sign)):
         window, within = gather(frames, rows, columns, half)
-        fit = fit_edges(window, width, sign=sign)
+        fit = fit_edges(window, width, sign=rising)
         windows.append(window)
         fits.append(fit)
         edges.append(np.rint(rows) + fit.position)
@@ -399,8 +389,8 @@ def beam_view(
         contrast = float(np.median(fits[1].contrast[usable]))
         thickness = float(np.median((edges[0] - edges[1])[usable]))
         by_column = masked_median((edges[0] - edges[1]).T, usable.T)
-        known = np.isfinite(by_column)
-        by_column, across = by_column[known], columns[known] - rough.contact_column
+        seen = np.isfinite(by_column)
+        by_column, across = by_column[seen], columns[seen] - known["contact_column"]
     if usable.any() and across.size > 1:  # a line needs two columns
         # the surface is uneven on the scale of three pixels: neighbouring columns count as one
         independent = max(min(by_column.size, float(np.ptp(columns)) / 3.0), 1.0)
@@ -410,10 +400,10 @@ def beam_view(
         if abs(lean) * math.sqrt(independent / by_column.size) > _LEANS * left * math.sqrt(cover[0, 0]):
             thickness = float(level)
             error = max(left, _SURFACE) * math.sqrt(cover[1, 1] * by_column.size / independent)
-    clipped = max(_hot(frames, rows, columns, good, rough.saturated) for rows in (0.5 * (far + near), far - half))
-    hot = float((windows[1][good] >= rough.saturated).mean()) if good.any() else 0.0
-    view = dataclasses.replace(
-        rough,
+    clipped = max(_hot(frames, rows, columns, good, saturated) for rows in (0.5 * (far + near), far - half))
+    hot = float((windows[1][good] >= saturated).mean()) if good.any() else 0.0
+    view = BeamView(
+        **known,
         contrast=contrast,
         thickness=thickness,
         thickness_error=error,
@@ -425,7 +415,7 @@ def beam_view(
     steady = usable
     if np.isfinite(blur).any():  # an edge that speeds up within the exposure is bent whatever the camera's curve
         steady = usable & (blur <= _STEADY * np.nanpercentile(blur, 25.0))[:, None]
-    return view, edge_shape(windows[1], np.rint(far), fits[1], steady, width, rough.sign, clipped)
+    return view, edge_shape(windows[1], np.rint(far), fits[1], steady, width, sign, clipped)
 
 
 def _hot(
@@ -517,16 +507,13 @@ def saturation_level(frames: NDArray[np.integer], max_value: float, noise: float
     here = np.count_nonzero(frames == top)
     if here < LEAST * frames.size or here < 16:
         return float(max_value)
-    if top >= max_value or _whole_bits(int(top)):
+    # full scale of 10, 12 or 14 bits, at either end of 16
+    scales = [(2**bits - 1) << shift for bits in (10, 12, 14) for shift in (0, 16 - bits)]
+    if top >= max_value or int(top) in scales:
         return top
     reach = max(3.0 * noise, 3.0)
     below = np.count_nonzero((frames >= top - reach) & (frames < top)) / reach
     return top if noise > 0.5 and here > PILE * below else float(max_value)
-
-
-def _whole_bits(level: int) -> bool:
-    """Return whether a level is full scale of 10, 12 or 14 bits, at either end of 16."""
-    return any(level in (2**bits - 1, (2**bits - 1) << (16 - bits)) for bits in (10, 12, 14))
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -670,19 +657,11 @@ def find_sticker(
 def _peaks_sticker(steps: NDArray[np.floating], begin: int, height: float) -> list[tuple[int, float]]:
     """Rows and values of the extremes of each run of *steps* beyond *height*, from *begin* down."""
     peaks: list[tuple[int, float]] = []
-    row = begin
-    while row < steps.size:
-        if abs(steps[row]) > height:
-            stop = row
-            while stop < steps.size and steps[stop] * steps[row] > 0.0 and abs(steps[stop]) > height:
-                stop += 1
+    for row, stop in sorted(stretches(steps > height) + stretches(steps < -height)):
+        if row > begin:  # a run under way at the start belongs to the tip
             part = np.abs(steps[row:stop])
             peak = round(float((part * np.arange(row, stop)).sum() / part.sum()))
-            if row > begin:  # a run under way at the start belongs to the tip
-                peaks.append((peak, float(steps[peak])))
-            row = stop
-        else:
-            row += 1
+            peaks.append((peak, float(steps[peak])))
     return peaks
 
 
@@ -772,18 +751,6 @@ _STEEP = 3.0  # rows a column by which the outline of a tip may fall
 _CLEAR = 4.0  # rows from the beam within which a mark that stands alone may be the tip itself
 
 
-class Wanted(NamedTuple):
-    """Settings of the shaker: search for a sticker, tip location [px], fixed column.
-
-    ``head`` counts the frames at the start of the sample that are neighbours.
-    """
-
-    marker: bool
-    tip_distance: float | None
-    fixed_column: bool
-    head: int
-
-
 def find_rod(bands: BeamBands) -> tuple[int, int] | None:
     """Columns in which something stands beyond the beam in most of the sample; None if too few."""
     objects = bands.objects
@@ -799,15 +766,20 @@ def shaker_view(
     smooth: NDArray[np.floating],
     bands: BeamBands,
     rod: tuple[int, int],
-    wanted: Wanted,
+    settings: TrackingSettings,
+    distance: float | None,
+    head: int,
 ) -> tuple[ShakerView, float]:
-    """The shaker, and the column at which its tip comes nearest to the beam."""
+    """The shaker, and the column at which its tip comes nearest to the beam.
+
+    *distance* [px] is that of the tip from the sticker, if given; the first *head* frames are neighbours.
+    """
     beam = measure_beam(view, frames)
     near = beam.row + view.thickness
     middle = rod_middle(rod)
-    isolated = wanted.marker and _stands_alone(bands, middle, near)
+    isolated = settings.marker and _stands_alone(bands, middle, near)
     sticker = None
-    if wanted.marker:
+    if settings.marker:
         begin = _begin(view, bands, middle, isolated)
         sticker = find_sticker(smooth, middle, begin, view.contrast, view.sign if isolated else 0.0)
     isolated = isolated and sticker is not None
@@ -818,23 +790,24 @@ def shaker_view(
         reference = sticker_rows(view, sticker, frames, near).row
     outline, loose = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
     column = view.contact_column
-    certain = _reaches_border(bands, middle) if sticker is None else wanted.tip_distance is not None
+    certain = _reaches_border(bands, middle) if sticker is None else distance is not None
     sides = Rod(math.nan, math.nan, 0.0) if isolated else rod_sides(frames, rod, view.edge_width)
     turned = abs(sides.lean) > _TURNED and abs(sides.lean + float(np.nanmedian(beam.slope))) < _SQUARE
     turn = -sides.lean if turned else 0.0
-    cut = not wanted.fixed_column and (rod[0] < 2) != (rod[1] > frames.shape[2] - 2)
+    free = settings.contact_column is None
+    cut = free and (rod[0] < 2) != (rod[1] > frames.shape[2] - 2)
     shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, sides[:2], loose, turn, cut)
-    if sticker is not None and wanted.tip_distance is not None:
-        offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
+    if sticker is not None and distance is not None:
+        offset = -(distance + 0.5 * sticker.thickness)
         return dataclasses.replace(shown, tip_offset=offset, tip_source="distance to the sticker as given"), column
     upright = dataclasses.replace(outline, profile=outline.profile - turn * (outline.columns - column))
     apex = None if isolated else find_apex(upright, rod, column)
     if apex is not None:
-        column += 0.0 if wanted.fixed_column else apex.column
+        column += apex.column if free else 0.0
         source = "tip seen apart from the beam"
         return dataclasses.replace(shown, tip_offset=apex.row, tip_error=apex.error, tip_source=source), column
     if sticker is not None:
-        offset = _offset_at_rest(beam, near, reference, wanted.head)
+        offset = _offset_at_rest(beam, near, reference, head)
         source = "assumed to touch the beam in the first frames"
         return dataclasses.replace(shown, tip_offset=offset, tip_source=source), column
     raise InputError(
@@ -1026,31 +999,20 @@ def survey(
             "recording: no shaker is seen beyond the beam; set region (--region), side (--side), objects "
             "(--objects) or threshold (--threshold), or track the beam alone with shaker=False (--no-shaker)"
         )
-    centre, columns, groups, merged = placed(width, rod, settings.columns, settings.contact_column)
-    rough = BeamView(
-        threshold=level,
-        bright=bright,
-        contrast=math.nan,
-        noise=pixel_noise(frames),
-        saturated=saturated,
-        hot_share=0.0,
-        edge_width=1.0,
-        width_table=width_calibration(1.0, 2 * HALF + 1),
-        thickness=bands.thickness,
-        thickness_error=0.5,
-        columns=columns,
-        contact_column=centre,
-        groups=groups,
-        merged=merged,
-        fixtures=tuple((max(first - 1, 0), last + 1) for first, last in fixtures),
-    )
-    view, shape = beam_view(frames, smooth, bands, rough)
+    bars = tuple((max(first - 1, 0), last + 1) for first, last in fixtures)
+    known = {
+        "threshold": level,
+        "bright": bright,
+        "noise": pixel_noise(frames),
+        "saturated": saturated,
+        "fixtures": bars,
+    }
+    known |= placed(width, rod, settings.columns, settings.contact_column)
+    view, shape = beam_view(frames, smooth, bands, known)
     noise = noise_shape(frames[:head])
     if not settings.shaker or rod is None:
         return Scene(view, None, shape, noise, rod is not None)
     distance = None if settings.tip_distance is None else settings.tip_distance / pixel_size
-    wanted = Wanted(settings.marker, distance, settings.contact_column is not None, head)
-    shaker, column = shaker_view(view, frames, smooth, bands, rod, wanted)
-    centre, columns, groups, merged = placed(width, rod, settings.columns, column)
-    view = dataclasses.replace(view, contact_column=centre, columns=columns, groups=groups, merged=merged)
+    shaker, column = shaker_view(view, frames, smooth, bands, rod, settings, distance, head)
+    view = dataclasses.replace(view, **placed(width, rod, settings.columns, column))
     return Scene(view, shaker, shape, noise, False)

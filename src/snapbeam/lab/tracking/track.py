@@ -78,7 +78,7 @@ def tracked_dataset(
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         located = int(np.isfinite(rows.row).sum())
-        counts = {str(flag.name).lower().replace("_", " "): rows.flagged(flag) for flag in FrameFlag if flag}
+        counts = {flag.words: rows.flagged(flag) for flag in FrameFlag if flag}
         reasons = ", ".join(f"{name}: {number}" for name, number in counts.items() if number)
         raise InputError(
             f"{recording.path}: the beam was found in none of the frames at rest, in {located} of {rows.row.size} at all "
@@ -481,17 +481,22 @@ class _Background:
 # How well a recording was tracked, in numbers and in words.
 
 
-def check_tracked(dataset: xr.Dataset) -> xr.Dataset:
+_NAMES = ("time", "displacement_mm", "displacement_stderr_mm", "flags", "confidence", "beam_row", "beam_slope")
+
+
+def check_tracked(
+    dataset: xr.Dataset, names: tuple[str, ...] = _NAMES, attrs: tuple[str, ...] = ("pixel_size", "frame_rate", "side")
+) -> xr.Dataset:
     """Return *dataset* if it came from :func:`snapbeam.lab.track`; refuse it if not."""
     from snapbeam.util.datasets import xr
 
     if not isinstance(dataset, xr.Dataset):
         raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
-    names = ("time", "displacement_mm", "displacement_stderr_mm", "flags", "confidence", "beam_row", "beam_slope")
     missing = [name for name in names if name not in dataset.variables]
-    missing += [name for name in ("pixel_size", "frame_rate", "side") if name not in dataset.attrs]
+    missing += [name for name in attrs if name not in dataset.attrs]
     if missing:
-        raise InputError(f"dataset without {', '.join(missing)}: must come from track()")
+        where = " with a shaker" if "penetration_mm" in missing else ""
+        raise InputError(f"dataset without {', '.join(missing)}: must come from track(){where}")
     return dataset
 
 
@@ -532,11 +537,7 @@ def tracking_quality(dataset: xr.Dataset) -> dict[str, Any]:
         "frames": int(flags.size),
         "measured_share": float(measured.mean()),
         "flagged_share": float((flags != 0).mean()),
-        "counts": {
-            str(flag.name).lower().replace("_", " "): int(((flags & int(flag)) != 0).sum())
-            for flag in FrameFlag
-            if flag
-        },
+        "counts": {flag.words: int(((flags & int(flag)) != 0).sum()) for flag in FrameFlag if flag},
         "longest_gap": int(runs.max()),
         "beam_stderr_px": _median(dataset["displacement_stderr_mm"].values / pixel),
         "shaker_stderr_px": _median(dataset["shaker_stderr_mm"].values / pixel) if shaker else float("nan"),
@@ -641,11 +642,7 @@ def contact_onsets(dataset: xr.Dataset, *, tolerance: float | None = None, minim
     """
     from snapbeam.util.datasets import xr
 
-    if not isinstance(dataset, xr.Dataset):
-        raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
-    missing = [name for name in ("time", "penetration_mm") if name not in dataset.variables]
-    if missing:
-        raise InputError(f"dataset without {', '.join(missing)}: must come from track() with a shaker")
+    check_tracked(dataset, ("time", "penetration_mm"), ())
     minimum_frames = integer("minimum_frames", minimum_frames, 1)
     time, gap = dataset["time"].values, dataset["penetration_mm"].values
     pixel = float(dataset.attrs.get("pixel_size", 0.0)) * 1e3
@@ -674,15 +671,11 @@ def contact_onsets(dataset: xr.Dataset, *, tolerance: float | None = None, minim
         "closing_speed": ("m/s", "speed at which tip and beam close"),
         "bounded": ("1", "whether both ends of the contact were seen"),
     }
-    data = {
-        name: ("impact", table[:, i].astype(np.int64 if name in ("frames", "bounded") else np.float64), _label(*text))
-        for i, (name, text) in enumerate(names.items())
-    }
-    return xr.Dataset(data, attrs={"tolerance_mm": limit})
-
-
-def _label(units: str, long_name: str) -> dict[str, str]:
-    return {"units": units, "long_name": long_name}
+    found = xr.Dataset(attrs={"tolerance_mm": limit})
+    for column, (name, (units, words)) in zip(table.T, names.items(), strict=True):
+        kind = np.int64 if name in ("frames", "bounded") else np.float64
+        found[name] = "impact", column.astype(kind), {"units": units, "long_name": words}
+    return found
 
 
 def _noise(dataset: xr.Dataset) -> float:

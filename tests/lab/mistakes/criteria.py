@@ -1,0 +1,41 @@
+"""What gives a mistake away, by the code of its diagnostic, for the table of the documentation."""
+
+CRITERIA = {
+    "alignment.amplitude": "the amplitude seen by the camera, against the vibrometer's",
+    "calibration.antisymmetric": "parity of the model's modes, where the data tell modes apart by their order only",
+    "calibration.undetermined": "singular values of the sensitivities of all frequencies to all parameters",
+    "comparison.turned_over": "the motion of both shakers from the start on, with either sign",
+    "decay.clipped": "levels hit exactly again and again, or first maxima that do not fall",
+    "decay.clipped_throughout": "levels hit exactly again and again, or first maxima that do not fall",
+    "decay.disturbed": "amplitude and phase of the mode, cycle by cycle",
+    "decay.drift": "the mean over each cycle",
+    "decay.frequency_drift": "the phase cycle by cycle, against softening and a stop that the beam touches",
+    "decay.window": "the noise of the sensor in each eighth of the record, which does not decay",
+    "decay.hardening": "the sign of the change of the frequency with amplitude",
+    "decay.above_band": "the frequency of a mode against the sampling frequency",
+    "recording.lossy": "the compression of a video or of images",
+    "recording.contradiction": "frames saved, frames recorded and the step between them, against each other",
+    "recording.shutter": "the exposure against the time between frames",
+    "vibrometer.dropout": "stretches in which the record leaves its steady sine by far more than its noise",
+    "vibrometer.clipped": "tops of the mean cycle flatter than a sine's, or levels hit exactly again and again",
+    "vibrometer.hum": "lines that are in the rest before the start as they are in the motion",
+    "vibrometer.beat": "amplitude and phase cycle by cycle, against constant ones, drifts of either and two close "
+    "lines",
+    "camera.no_motion": "the range of the tracked beam over the recording, against its standard errors",
+    "camera.rulers": "pixel sizes by the thickness of the beam, the diameter of the striker and the amplitude of the "
+    "drive, against each other, the one given, and factors of mistaken units",
+    "camera.no_rest": "how long the beam stays where it is at the start, against the rest of its motion",
+    "camera.gamma": "asymmetry of the mean edge, finer than a pixel",
+    "camera.overexposed": "pixels in the middle of the beam that pile up at the highest grey level",
+    "camera.edge_shape": "what a blurred step leaves of the mean edge, finer than a pixel",
+    "camera.averaged": "noise of pixels, against that of the same pixels a frame later",
+    "camera.smoothed": "noise of pixels, against that of their neighbours",
+    "camera.interlaced": "the edge in odd rows of fast frames, against that in even ones",
+    "camera.fields": "each frame against the mean of its neighbours, with turning sign",
+    "camera.few_levels": "grey levels between beam and background, and noise that would even out their rounding",
+    "camera.sticker_alone": "a band of one height below the beam with nothing beyond it, that never comes near the "
+    "beam",
+    "camera.never_touches": "the gap between tip and beam over the recording, while the beam moves",
+    "camera.distorted": "thickness of the beam and shape of its edges in each frame, against the usual ones",
+    "camera.lost": "share of the frames with a measurement",
+}
