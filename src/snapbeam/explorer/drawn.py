@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 import unicodedata
 from typing import Any
 
@@ -22,17 +23,22 @@ _MARKERS = {
     "_": "dash", "|": "dash",
 }  # fmt: skip
 _pixels = IdentityTransform()
+_NOWHERE = np.full((3, 2), np.nan)
+"""Points of an entry of the legend alone; without any the browser draws no sample."""
 _PIXELS = 1.6
 """Pixels of the page for a point of the printed figure."""
 _SAMPLES = 20_000
 """Samples of a line; of a longer one the extremes of each part are drawn."""
 _CELLS = 20_000
 """Cells of unequal size that are drawn one by one."""
-_SUPERSCRIPT, _SUBSCRIPT = (str.maketrans("0123456789-i", digits) for digits in ("⁰¹²³⁴⁵⁶⁷⁸⁹⁻ⁱ", "₀₁₂₃₄₅₆₇₈₉₋ᵢ"))
+_LINE = 48
+"""Characters of a line of a label."""
+_SUPERSCRIPT = str.maketrans("0123456789-in", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ⁱⁿ")
+_SUBSCRIPT = str.maketrans("0123456789-aehijklmnoprstuvx", "₀₁₂₃₄₅₆₇₈₉₋ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ")
 
 
 def plain(label: str) -> str:
-    """A text of Matplotlib without its formulas: ``$\\omega_1$`` is ω₁."""
+    r"""A text of Matplotlib without its formulas: ``$\omega_1$`` is ω₁."""
 
     def formula(found: re.Match[str]) -> str:
         words = re.sub(r"\\(?:mathrm|text|mathit|mathbf)\s*", "", found[1])
@@ -42,11 +48,21 @@ def plain(label: str) -> str:
         words = re.sub(r"([_^])(?:\{([^{}]*)\}|(\w))", _script, words)
         return re.sub(r"\\[,;! ]|[{}]", "", words)
 
-    return unicodedata.normalize("NFC", re.sub(r"\$([^$]*)\$", formula, label)).replace("\n", " ")
+    return unicodedata.normalize("NFC", re.sub(r"\$([^$]*)\$", formula, label))
 
 
 _ACCENTS = {"dot": "\u0307", "ddot": "\u0308", "bar": "\u0304", "hat": "\u0302"}
-_SYMBOLS = {"leq": "≤", "le": "≤", "geq": "≥", "ge": "≥", "times": "×", "cdot": "·", "pm": "±", "infty": "∞", "partial": "∂"}
+_SYMBOLS = {
+    "leq": "≤",
+    "le": "≤",
+    "geq": "≥",
+    "ge": "≥",
+    "times": "×",
+    "cdot": "·",
+    "pm": "±",
+    "infty": "∞",
+    "partial": "∂",
+}
 
 
 def _symbol(found: re.Match[str]) -> str:
@@ -63,7 +79,16 @@ def _script(found: re.Match[str]) -> str:
     words = found[2] or found[3] or ""
     table = _SUPERSCRIPT if found[1] == "^" else _SUBSCRIPT
     small = words.strip("{}")
-    return small.translate(table) if all(ord(each) in table for each in small) else f" {small}"
+    return (
+        small.translate(table)
+        if all(ord(each) in table for each in small)
+        else f"{'^' if found[1] == '^' else ' '}{small}"
+    )
+
+
+def lines_of(label: str) -> str:
+    """A label in lines that a figure has room for."""
+    return "\n".join(textwrap.fill(line, _LINE) for line in plain(label).split("\n"))
 
 
 def thinned(x: NDArray[Any], y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -89,9 +114,11 @@ class Drawn:
         self.plots: list[tuple[Any, Any]] = []
         self._groups: list[tuple[Axes, Any, Any]] = []
         bars = {art.colorbar.ax for each in found.axes for art in each.collections + each.images if art.colorbar}
-        for each in found.axes:
-            if each not in bars and each.get_visible():
-                self.plots.append((self._plot(each), each.get_position()))
+        kept = [each for each in found.axes if each not in bars and each.get_visible()]
+        kept.sort(key=lambda each: (-round(each.get_position().y1, 2), each.get_position().x0))
+        self._own = found.legends if len(kept) == 1 else []
+        for each in kept:
+            self.plots.append((self._plot(each), each.get_position()))
 
     def _color(self, color: Any) -> str | None:
         """A colour for the page; greys are turned on a dark one."""
@@ -111,12 +138,16 @@ class Drawn:
             self._groups.append(group)
         _, x_range, line = group
         plot = style.figure(
-            self.look, x_range=x_range, y_range=axes.get_ylim(), height=120, tools="pan,box_zoom,wheel_zoom,reset,tap",
+            self.look, x_range=x_range, y_range=axes.get_ylim(), height=120, tools="pan,box_zoom,wheel_zoom,reset",
             x_axis_type="log" if axes.get_xscale() == "log" else "linear", active_scroll="wheel_zoom",
-            y_axis_type="log" if axes.get_yscale() == "log" else "linear", name="result-plot",
-            x_axis_label=plain(axes.get_xlabel()), y_axis_label=plain(axes.get_ylabel()), title=plain(axes.get_title()),
+            y_axis_type="log" if axes.get_yscale() == "log" else "linear", name=f"result-plot{len(self.plots) + 1 if self.plots else ''}",
+            x_axis_label=lines_of(axes.get_xlabel()), y_axis_label=lines_of(axes.get_ylabel()), title=plain(axes.get_title()),
         )  # fmt: skip
-        plot.add_tools(models.CrosshairTool(overlay=[line, models.Span(dimension="width", line_color=self.look.faint)]))
+        plot.add_tools(
+            models.CrosshairTool(
+                visible=False, overlay=[line, models.Span(dimension="width", line_color=self.look.faint)]
+            )
+        )
         plot.title.visible = bool(plot.title.text)
         for mine, theirs in ((plot.xaxis, axes.xaxis), (plot.yaxis, axes.yaxis)):
             if isinstance(theirs.get_major_locator(), ticker.FixedLocator):
@@ -126,16 +157,20 @@ class Drawn:
                 mine.major_label_overrides = {place: word for place, word in zip(at, words, strict=False) if word}
         named: dict[str, list[Any]] = {}
         for art in sorted(axes.get_children(), key=lambda each: each.get_zorder()):
-            if art.get_visible() and art is not axes.patch and art not in (axes.title, axes._left_title, axes._right_title):
+            if (
+                art.get_visible()
+                and art is not axes.patch
+                and art not in (axes.title, axes._left_title, axes._right_title)
+            ):
                 for renderer in self._artist(plot, axes, art):
                     named.setdefault(str(art.get_label()), []).append(renderer)
-        legend = axes.get_legend()
-        if legend is not None:
-            items = []
+        items = []
+        for legend in filter(None, (axes.get_legend(), *self._own)):
             for handle, words in zip(legend.legend_handles, legend.get_texts(), strict=False):
                 label = words.get_text()
                 drawn = named.get(label) or self._artist(plot, axes, handle, empty=True)
                 items.append(models.LegendItem(label=plain(label), renderers=drawn))
+        if items:
             plot.add_layout(models.Legend(items=items, ncols=2, nrows="auto"))
             style.legend(plot, self.look)
         return plot
@@ -148,7 +183,7 @@ class Drawn:
             return points if transform == axes.transData else (transform - axes.transData).transform(points)
 
         def columns(polygons: list[Any]) -> dict[str, Any]:
-            kept = [] if empty else [each for each in polygons if len(each)]
+            kept = [_NOWHERE] if empty else [each for each in polygons if len(each)]
             return {"xs": [each[:, 0] for each in kept], "ys": [each[:, 1] for each in kept]}
 
         if isinstance(art, lines.Line2D):
@@ -177,9 +212,8 @@ class Drawn:
                 name: [each[i % len(each)] for i in range(len(at))]
                 for name, each in (("size", sizes), ("fill", faces), ("edge", edges))
             }
-            data = {name: each[:0] if empty else each for name, each in data.items()}
             if empty:
-                return [plot.scatter([], [], size=6, fill_color=faces[0], line_color=edges[0])]
+                return [plot.scatter([np.nan], [np.nan], size=6, fill_color=faces[0], line_color=edges[0])]
             return [plot.scatter(
                 "x", "y", size="size", fill_color="fill", line_color="edge", source=models.ColumnDataSource(data)
             )]  # fmt: skip
@@ -210,7 +244,7 @@ class Drawn:
             plot.add_layout(across)
             return []
         if empty:
-            points = points[:0]
+            points = _NOWHERE
         x, y = thinned(*placed(points, art.get_transform()).T)
         made = []
         if dashes is not None and art.get_linewidth():

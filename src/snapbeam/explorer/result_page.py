@@ -104,7 +104,6 @@ class ResultPage(Tab):
 
     def draw(self) -> None:
         """Draw the chosen figure."""
-
         first = self.shown.value == next(iter(self.source.figures))
 
         def work(_: Token) -> Drawn:
@@ -125,12 +124,15 @@ class ResultPage(Tab):
             return
         self.drawn, parts = found, []
         for plot, box in found.plots:
-            plot.height = max(round(_WIDTH * found.size[1] / found.size[0] * box.height / 0.8), 130)
+            plot.height = max(round(_WIDTH * found.size[1] / found.size[0] * box.height / 0.8), 150)
             if first and start_of(self.source.skeleton) is not None:
-                plot.scatter("x", "y", source=self.mark, size=15, fill_color=None, line_color=self.look.accent, line_width=3)
+                plot.scatter(
+                    "x", "y", source=self.mark, size=15, fill_color=None, line_color=self.look.accent, line_width=3
+                )
                 plot.on_event(Tap, lambda event: self.ask((event.x, event.y)))
             part = framed_plot(plot, margin=0)
-            part.styles = {"flex": f"1 1 {max(round(420 * box.width), 240) if box.width < 0.55 else 500}px"}
+            row = sum(other.width for _, other in found.plots if abs(other.y1 - box.y1) < 0.01)
+            part.styles = {"flex": f"1 1 calc({100 * box.width / row:.0f}% - 2px)", "min-width": "min(230px, 100%)"}
             parts.append(part)
         self.place.objects = parts
 

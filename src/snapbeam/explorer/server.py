@@ -35,9 +35,11 @@ _COOKIE = "snapbeam_token"
 _TEMPLATE = """
 {% block preamble %}
     <meta name="viewport" content="width=device-width, initial-scale=1">
+    <script>console.log = () => undefined;</script>
     {{ super() }}
 {% endblock %}
 """
+"""Bokeh and Panel write two lines into the console of each page."""
 _OWN = "static/extensions/panel/"
 """Path of the static files on the server; Panel loads all others from elsewhere."""
 

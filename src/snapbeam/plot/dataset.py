@@ -67,17 +67,17 @@ def _orbit_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Star
 
 
 def _branch_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
-    """Start of the orbit nearest to a place over the parameter and mid-span displacement."""
-    if place is None:
-        return None
+    """Start of the orbit nearest to a place over the parameter and mid-span displacement, or of the middle one."""
     name = str(dataset.attrs["parameter"])
     nearest = dataset.isel(orbit=_nearest(dataset[name], dataset["midspan_displacement"], place))
     at = float(nearest[name]), float(nearest["midspan_displacement"])
     return _of_state(nearest, nearest["state"], {lookup(name).name: at[0]})._replace(place=at)
 
 
-def _nearest(x: Any, y: Any, place: tuple[float, float]) -> int:
-    """Number of the point that is nearest to a place, in parts of the widths of a figure of all."""
+def _nearest(x: Any, y: Any, place: tuple[float, float] | None) -> int:
+    """Number of the point that is nearest to a place, in parts of the widths of a figure of all; the middle one of none."""
+    if place is None:
+        return int(np.size(x) // 2)
     away = np.zeros(np.size(x))
     for values, at in zip((np.ravel(x), np.ravel(y)), place, strict=True):
         away += ((values - at) / (np.ptp(values[np.isfinite(values)]) or 1.0)) ** 2
@@ -86,7 +86,7 @@ def _nearest(x: Any, y: Any, place: tuple[float, float]) -> int:
 
 def _diagram_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
     """Start at the stored point nearest to a place, with all of its motion in the first mode."""
-    if place is None or not {"midspan_displacement", "midspan_velocity"} <= set(map(str, dataset.data_vars)):
+    if not {"midspan_displacement", "midspan_velocity"} <= set(map(str, dataset.data_vars)):
         return None
     w, v = dataset["midspan_displacement"], dataset["midspan_velocity"]
     name = next(str(each) for each in w.dims if each not in ("sweep", "period"))
@@ -94,7 +94,7 @@ def _diagram_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> St
     at = _nearest(x, w, place)
     here = float(x.flat[at]), float(w.values.flat[at])
     state = {"amplitude[1]": here[1], "velocity[1]": float(v.transpose(*w.dims).values.flat[at])}
-    return Start({lookup(name).name: here[0]}, state, 0, here)
+    return Start({lookup(name).name: here[0]}, state, 30, here)
 
 
 def _axes_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
@@ -104,15 +104,18 @@ def _axes_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start
     names.sort(key=lambda name: name == raised)
     if "threshold" in dataset and raised not in names:
         names.append(str(raised))
-    if place is None or not names or len(names) > 2:
+    if not names or len(names) > 2:
         return None
+    if place is None:
+        middles = [float(np.ravel(dataset[n])[dataset[n].size // 2]) for n in names if n in dataset.coords]
+        place = middles[0], middles[-1]
     given = {lookup(name).name: float(at) for name, at in zip(names, place, strict=False)}
     return Start(given, {}, 0, place)
 
 
 def _backbone_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
     """Start of the free motion nearest to a place, at rest where it turns back."""
-    if place is None or "initial_shift" in dataset or "amplitude_scale" not in dataset.attrs:
+    if "initial_shift" in dataset or "amplitude_scale" not in dataset.attrs:
         return None
     x, y = dataset["frequency_ratio"].values, 0.5 * (dataset["max_midspan"] - dataset["min_midspan"]).values
     at = _nearest(x, y, place)
