@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -197,3 +201,16 @@ def test_a_map_of_one_axis_or_one_point_stays_a_map(system):
     one = sb.sweep(SYSTEM, {"frequency_ratio": [0.9, 1.0, 1.1]}, SHORT)
     assert opened(one).dims == ["frequency_ratio", "velocity_amplitude"]
     assert len(opened(one.isel(frequency_ratio=[1])).dims) == 2
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x89HDF\r\n\x1a\n" + bytes(range(256)) * 20])
+def test_a_file_of_garbage_is_refused_in_words_before_a_page_is_loaded(content, tmp_path):
+    (tmp_path / "junk.nc").write_bytes(content)
+    code = (
+        "import sys\nfrom snapbeam.cli import main\n"
+        "try:\n    main()\nfinally:\n    print('panel' in sys.modules)"
+    )  # fmt: skip
+    asked = [sys.executable, "-c", code, "explore", "junk.nc", "--no-browser"]
+    found = subprocess.run(asked, cwd=tmp_path, capture_output=True, text=True, env=dict(os.environ, COLUMNS="400"))
+    assert found.returncode == 2 and found.stdout.strip() == "False"
+    assert found.stderr.strip() == "error: map = 'junk.nc': is no NetCDF or HDF5 file, or is damaged"

@@ -108,12 +108,12 @@ class Drawn:
 
     def __init__(self, axes: Axes, look: style.Look) -> None:
         self.look = look
-        found = axes.get_figure(root=True)
+        found: Any = axes.get_figure(root=True)
         found.canvas.draw()  # places, limits and colours are known from here on
         self.size = found.get_size_inches()
         self.plots: list[tuple[Any, Any]] = []
         self._groups: list[tuple[Axes, Any, Any]] = []
-        bars = {art.colorbar.ax for each in found.axes for art in each.collections + each.images if art.colorbar}
+        bars = {art.colorbar.ax for each in found.axes for art in [*each.collections, *each.images] if art.colorbar}
         kept = [each for each in found.axes if each not in bars and each.get_visible()]
         kept.sort(key=lambda each: (-round(each.get_position().y1, 2), each.get_position().x0))
         self._own = found.legends if len(kept) == 1 else []
@@ -129,7 +129,7 @@ class Drawn:
             red = green = blue = 1.0 - red
         return str(to_hex((red, green, blue, alpha), keep_alpha=True))
 
-    def _plot(self, axes: Axes) -> Any:
+    def _plot(self, axes: Any) -> Any:
         low, high = axes.get_xlim()
         group = next((held for held in self._groups if axes in axes.get_shared_x_axes().get_siblings(held[0])), None)
         if group is None:
@@ -156,6 +156,7 @@ class Drawn:
                 mine.ticker = at
                 mine.major_label_overrides = {place: word for place, word in zip(at, words, strict=False) if word}
         named: dict[str, list[Any]] = {}
+        titles = (axes.patch, axes.title, axes._left_title, axes._right_title)
         for art in sorted(axes.get_children(), key=lambda each: each.get_zorder()):
             if (
                 art.get_visible()
@@ -177,6 +178,7 @@ class Drawn:
 
     def _artist(self, plot: Any, axes: Axes, art: Any, empty: bool = False) -> list[Any]:
         """Draw one artist; *empty* for an entry of the legend alone."""
+        kind = type(art)
 
         def placed(points: Any, transform: Any) -> NDArray[Any]:
             points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
@@ -186,16 +188,16 @@ class Drawn:
             kept = [_NOWHERE] if empty else [each for each in polygons if len(each)]
             return {"xs": [each[:, 0] for each in kept], "ys": [each[:, 1] for each in kept]}
 
-        if isinstance(art, lines.Line2D):
+        if issubclass(kind, lines.Line2D):
             return self._line(plot, axes, art, placed, empty)
-        if isinstance(art, collections.QuadMesh) and not empty:
+        if issubclass(kind, collections.QuadMesh) and not empty:
             return self._cells(plot, art)
-        if isinstance(art, image.AxesImage) and not empty:
+        if issubclass(kind, image.AxesImage) and not empty:
             left, right, low, high = art.get_extent()
             colors = art.to_rgba(art.get_array(), bytes=True, norm=True)
             colors = colors if art.origin == "lower" else colors[::-1]
             return [self._image(plot, art, colors, (left, right, low, high))]
-        if isinstance(art, patches.Patch):
+        if issubclass(kind, patches.Patch):
             shape = art.get_path().interpolated(1).to_polygons(art.get_transform())
             data = columns([placed(each, _pixels) for each in shape])
             return [plot.patches(
@@ -203,7 +205,7 @@ class Drawn:
                 line_color=self._color(art.get_edgecolor()) if art.get_linewidth() else None,
                 hatch_pattern="/" if art.get_hatch() else None, hatch_color=self.look.faint,
             )]  # fmt: skip
-        if isinstance(art, (collections.PathCollection, collections.RegularPolyCollection)):
+        if issubclass(kind, (collections.PathCollection, collections.RegularPolyCollection)):
             at = placed(art.get_offsets(), art.get_offset_transform())
             sizes = np.sqrt(art.get_sizes()) * _PIXELS if len(art.get_sizes()) else np.array([6.0])
             faces = [self._color(each) for each in art.get_facecolors()] or [None]
@@ -217,12 +219,12 @@ class Drawn:
             return [plot.scatter(
                 "x", "y", size="size", fill_color="fill", line_color="edge", source=models.ColumnDataSource(data)
             )]  # fmt: skip
-        if isinstance(art, collections.Collection):
+        if issubclass(kind, collections.Collection):
             return self._paths(plot, art, placed, columns)
-        if isinstance(art, text.Text) and art.get_text() and not empty:
+        if issubclass(kind, text.Text) and art.get_text() and not empty:
             box = art.get_window_extent()
             ((x, y),) = placed([box.x0, box.y0], _pixels)
-            if isinstance(art, text.Annotation) and art.arrow_patch is not None:
+            if issubclass(kind, text.Annotation) and art.arrow_patch is not None:
                 path = placed(art.arrow_patch.get_path().vertices, art.arrow_patch.get_transform())
                 plot.line(*path.T, line_color=self.look.faint)
             plot.add_layout(models.Label(
@@ -231,7 +233,7 @@ class Drawn:
             ))  # fmt: skip
         return []
 
-    def _line(self, plot: Any, axes: Axes, art: lines.Line2D, placed: Any, empty: bool) -> list[Any]:
+    def _line(self, plot: Any, axes: Axes, art: Any, placed: Any, empty: bool) -> list[Any]:
         points = np.column_stack([np.asarray(each, dtype=np.float64) for each in art.get_data(orig=False)])
         color, wide = self._color(art.get_color()), _PIXELS * art.get_linewidth()
         look = {"line_color": color, "line_alpha": art.get_alpha() or 1.0, "line_width": wide}
@@ -285,7 +287,7 @@ class Drawn:
                 made.append(plot.patches("xs", "ys", source=data, fill_color=fill, **line, **hatch))
         return made
 
-    def _cells(self, plot: Any, art: collections.QuadMesh) -> list[Any]:
+    def _cells(self, plot: Any, art: Any) -> list[Any]:
         corners = art.get_coordinates()
         x, y = corners[0, :, 0], corners[:, 0, 1]
         colors = np.round(255.0 * art.get_facecolors()).astype(np.uint8).reshape(y.size - 1, x.size - 1, 4)
