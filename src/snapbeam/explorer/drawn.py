@@ -158,11 +158,7 @@ class Drawn:
         named: dict[str, list[Any]] = {}
         titles = (axes.patch, axes.title, axes._left_title, axes._right_title)
         for art in sorted(axes.get_children(), key=lambda each: each.get_zorder()):
-            if (
-                art.get_visible()
-                and art is not axes.patch
-                and art not in (axes.title, axes._left_title, axes._right_title)
-            ):
+            if art.get_visible() and art not in titles:
                 for renderer in self._artist(plot, axes, art):
                     named.setdefault(str(art.get_label()), []).append(renderer)
         items = []
