@@ -156,7 +156,7 @@ class Drawn:
                 mine.ticker = at
                 mine.major_label_overrides = {place: word for place, word in zip(at, words, strict=False) if word}
         named: dict[str, list[Any]] = {}
-        titles = (axes.patch, axes.title, axes._left_title, axes._right_title)
+        titles = (axes.patch, axes.title, axes._left_title, axes._right_title, *axes.spines.values())
         for art in sorted(axes.get_children(), key=lambda each: each.get_zorder()):
             if art.get_visible() and art not in titles:
                 for renderer in self._artist(plot, axes, art):
@@ -266,8 +266,12 @@ class Drawn:
             [self._color(each) for each in found] for found in (art.get_facecolors(), art.get_edgecolors())
         )  # fmt: skip
         made = []
-        for at, path in enumerate(art.get_paths()):
-            polygons = [placed(each, art.get_transform()) for each in path.to_polygons(closed_only=False)]
+        groups = [[path] for path in art.get_paths()]
+        if max(map(len, (faces, edges, art.get_linewidths(), art.get_linestyles()))) <= 1:  # all look the same
+            groups = [[path for group in groups for path in group]]
+        for at, group in enumerate(groups):
+            parts = [part for path in group for part in path.to_polygons(closed_only=False)]
+            polygons = [placed(each, art.get_transform()) for each in parts]
             fill = faces[at % len(faces)] if faces else None
             edge = edges[at % len(edges)] if edges else None
             widths = art.get_linewidths()
