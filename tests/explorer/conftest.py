@@ -146,14 +146,15 @@ class Tab:
       return [box.left + plot.frame.x_scale.compute(x), box.top + plot.frame.y_scale.compute(y)];
     }"""
 
-    def __init__(self, browser, url: str, **options) -> None:
+    def __init__(self, browser, url: str, plot: str = "map", **options) -> None:
+        self.plot = plot
         still = {"viewport": {"width": 1280, "height": 720}, "reduced_motion": "reduce"}
         self.context = browser.new_context(accept_downloads=True, **(still | options))
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
         self.errors: list[str] = []
         self.foreign: list[str] = []
-        self.page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
+        self.page.on("console", lambda message: self.errors.append(message.text))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", self._asked)
         self.open(url)
@@ -163,15 +164,16 @@ class Tab:
             self.foreign.append(request.url)
 
     def open(self, url: str) -> None:
-        """Load a page and wait until its map stands."""
+        """Load a page and wait until its map, or the plot of another result, stands."""
         base, _, search = url.partition("?")
         if base in TOKENS:
             search = f"token={TOKENS[base]}" + (f"&{search}" if search else "")
         self.page.goto(f"{base}?{search}")
         assert "token" not in self.page.url
         self.page.wait_for_function(
-            """() => { const d = window.Bokeh && Bokeh.documents[0]; const m = d && d.get_model_by_name('map');
-                       return m && Bokeh.index.find_one(m) && Bokeh.index.find_one(m).frame.bbox.width > 10; }"""
+            """(name) => { const d = window.Bokeh && Bokeh.documents[0]; const m = d && d.get_model_by_name(name);
+                       return m && Bokeh.index.find_one(m) && Bokeh.index.find_one(m).frame.bbox.width > 10; }""",
+            arg=self.plot,
         )
         self.wait(lambda: self.head() not in ("", FIRST), "the first run")
         limit = time.monotonic() + 2.0  # not every run has notes
@@ -194,9 +196,9 @@ class Tab:
         return self.js(self._PLACE, [plot, x, y])
 
     def click(self, x: float, y: float) -> None:
-        """Click on the map."""
+        """Click on the map or the plot of the page."""
         before, url = (self.head(0), self.head(1)), self.page.url
-        self.page.mouse.click(*self.place(x, y))
+        self.page.mouse.click(*self.place(x, y, self.plot))
         limit = time.monotonic() + 2.0  # of a click on the point that is shown
         self.wait(
             lambda: (self.head(0), self.head(1)) != before or (self.page.url == url and time.monotonic() > limit),
@@ -249,7 +251,7 @@ class Tab:
 
 @pytest.fixture
 def tab(browser):
-    """Open pages; each must have ended without an error in its console, and without asking another machine."""
+    """Open pages; each must have ended with nothing said in its console, and without asking another machine."""
     opened: list[Tab] = []
 
     def open_one(url: str, **options) -> Tab:

@@ -13,9 +13,11 @@ from snapbeam.dynamics.results import beam_attributes, in_unit, labelled
 from snapbeam.dynamics.shooting import OrbitNotFoundError
 from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.harvester import Harvester
+from snapbeam.model.state import amplitude_scale
 from snapbeam.model.striker import Contact
 from snapbeam.model.system import System
 from snapbeam.util.diagnostics import counting
+from snapbeam.util.provenance import canonical_json
 from snapbeam.util.singular_values import lstsq
 from snapbeam.util.validation import InputError, checked, choice, instance, integer, positive, shown, within
 
@@ -509,5 +511,6 @@ def _dataset(structure: _Structure, points: list[dict[str, Any]], end: str) -> x
         "title": "backbone curve", "well": structure.well, "end": end, "modes": n,
         "reference_frequency": model.reference_frequency, "length_scale": model.length_scale,
         "natural_frequencies": (structure.omega / (2.0 * np.pi)).tolist(), **beam_attributes(model),
+        "amplitude_scale": float(amplitude_scale(model)), "system": canonical_json(System(model).to_mapping()),
     }  # fmt: skip
     return labelled(variables, coords, attrs)

@@ -840,7 +840,7 @@ class SystemCard:
         unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
         name = f"{row.name.partition('.')[2].replace('_', ' ')}{unit}"
         words = f"{row.quantity.long_name}; allowed: {row.limits or 'any'}"
-        common: dict[str, Any] = {"name": name, "width": 160, "description": words}
+        common: dict[str, Any] = {"name": name, "width": 160 if len(name) < 20 else 230, "description": words}
         if row.quantity.choices:
             return pn.widgets.Select(options=list(row.quantity.choices), **common)
         if row.quantity.kind is bool:

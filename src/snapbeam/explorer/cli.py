@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -44,12 +45,16 @@ def explore(
 
     Example: snapbeam explore map.nc
     """
+    from snapbeam.util.hdf5 import open_hdf5
+    from snapbeam.util.netcdf import split_group
     from snapbeam.util.validation import InputError
 
     if file is not None and config is not None:
         raise InputError(f"config = {str(config)!r}: a map holds its own system; give one of the two")
     if token is not None and len(token) < 16:
         raise InputError("token: must have at least 16 characters")
+    if file is not None and os.path.isfile(stored := split_group(file)[0]):
+        open_hdf5(stored, "map").close()  # what is no result is refused before Panel is loaded, which takes seconds
     system = integration = None
     if config is not None:
         from snapbeam.model.parameter_file import load_config

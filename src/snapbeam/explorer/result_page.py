@@ -2,32 +2,29 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from typing import Any
 
 import matplotlib.pyplot as plt
 import panel as pn
 from bokeh.events import Tap
 from bokeh.models import ColumnDataSource
-from bokeh.plotting import figure
 from markupsafe import Markup
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import snapbeam as sb
 from snapbeam import Run
 from snapbeam.explorer.address import Address
 from snapbeam.explorer.cards import draw
+from snapbeam.explorer.drawn import Drawn
 from snapbeam.explorer.jobs import RUN_SECONDS, Downloads, Tab, Token, check_run, drawing, file_bytes
 from snapbeam.explorer.maps import ResultSource, sections_of, started
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import NOTE, REFUSED, Html, button, look_of, sheet, styled
+from snapbeam.explorer.style import NOTE, REFUSED, Html, button, framed_plot, look_of, sheet, styled
 from snapbeam.model.parameters import parameters
 from snapbeam.plot.dataset import start_of
 
-_DOTS = 150
-"""Dots per inch of a figure on the page."""
+_WIDTH = 560
+"""Pixels of the page for the width of a figure; its height follows from its shape."""
 _CLICK = "Click on the figure to compute the run that starts there."
 
 
@@ -50,22 +47,16 @@ class ResultPage(Tab):
         save = button("Save figure", self.post, self.save, width=100)
         self.downloads = Downloads()
         self.words = Html("", sizing_mode="stretch_width", css_classes=["take-words"])
-        self.image = ColumnDataSource({"url": [], "w": [], "h": []}, name="result")
-        self.plot = figure(
-            toolbar_location=None, sizing_mode="scale_width", aspect_ratio=1.4, tools="", name="result-plot"
-        )
-        self.plot.axis.visible = self.plot.grid.visible = False
-        self.plot.min_border = 0
-        self.plot.image_url("url", 0, 0, "w", "h", anchor="bottom_left", source=self.image)
-        self.plot.on_event(Tap, lambda event: self.tapped(event.x, event.y))
-        self.axes: Any = None
+        self.mark = ColumnDataSource({"x": [], "y": []}, name="mark")
+        self.drawn: Drawn | None = None
+        self.place = pn.FlexBox(margin=0, sizing_mode="stretch_width")
         self.view = RunView(self.look, "A", self.post, self.later)
         self.view.tabs.active = int("multiplier_real" in self.source.skeleton)  # an orbit in its phase portrait
         self._token: Token | None = None
         pn.config.raw_css = [sheet(self.look)]
         title = Markup('<h1>snapbeam <span class="faint">{}: {}</span></h1>').format(self.source.name, self.source.kind)
         left = pn.Column(
-            pn.FlexBox(self.shown, save, self.kind, margin=0, align_items="center"), pn.pane.Bokeh(self.plot, sizing_mode="stretch_width"),
+            pn.FlexBox(self.shown, save, self.kind, margin=0, align_items="center"), self.place,
             self.words, Html(self._facts(), sizing_mode="stretch_width"),
             sizing_mode="stretch_width", css_classes=["card", "left"],
         )  # fmt: skip
@@ -108,34 +99,42 @@ class ResultPage(Tab):
 
     # ------------------------------------------------------------------ figures
 
-    def _paint(self) -> Any:
-        return self.source.figures[self.shown.value](self.source.skeleton, ax=None)
+    def _paint(self, ax: Any = None) -> Any:
+        return self.source.figures[self.shown.value](self.source.skeleton, ax=ax)
 
     def draw(self) -> None:
         """Draw the chosen figure."""
+        first = self.shown.value == next(iter(self.source.figures))
 
-        def work(_: Token) -> tuple[bytes, tuple[int, int], Any]:
+        def work(_: Token) -> Drawn:
             with drawing:
-                axes = self._paint()
-                canvas = FigureCanvasAgg(axes.get_figure(root=True))
-                canvas.figure.set_dpi(_DOTS)
-                stream = io.BytesIO()
-                canvas.print_png(stream)
-                plt.close(canvas.figure)
-                return stream.getvalue(), canvas.get_width_height(), axes
+                try:
+                    axes = self._paint()
+                    if "function" in (axes.get_xscale(), axes.get_yscale()):  # the page has no such scale
+                        axes = self._paint(plt.subplots()[1])
+                    return Drawn(axes, self.look)
+                finally:
+                    plt.close("all")
 
-        self.shared.jobs.export(work, lambda *found: self.post(lambda: self._drawn(*found)), Token())
+        self.shared.jobs.export(work, lambda *found: self.post(lambda: self._drawn(first, *found)), Token())
 
-    def _drawn(self, found: Any, error: str) -> None:
+    def _drawn(self, first: bool, found: Drawn | None, error: str) -> None:
         if found is None:
             self.words.object = REFUSED.format(error)
             return
-        picture, (width, height), self.axes = found
-        self.plot.x_range.update(start=0, end=width)
-        self.plot.y_range.update(start=0, end=height)
-        self.plot.update(aspect_ratio=width / height, max_width=round(1.2 * width))
-        url = "data:image/png;base64," + base64.b64encode(picture).decode()
-        self.image.data = {"url": [url], "w": [width], "h": [height]}
+        self.drawn, parts = found, []
+        for plot, box in found.plots:
+            plot.height = max(round(_WIDTH * found.size[1] / found.size[0] * box.height / 0.8), 150)
+            if first and start_of(self.source.skeleton) is not None:
+                plot.scatter(
+                    "x", "y", source=self.mark, size=15, fill_color=None, line_color=self.look.accent, line_width=3
+                )
+                plot.on_event(Tap, lambda event: self.ask((event.x, event.y)))
+            part = framed_plot(plot, margin=0)
+            row = sum(other.width for _, other in found.plots if abs(other.y1 - box.y1) < 0.01)
+            part.styles = {"flex": f"1 1 calc({100 * box.width / row:.0f}% - 2px)", "min-width": "min(230px, 100%)"}
+            parts.append(part)
+        self.place.objects = parts
 
     def save(self) -> None:
         """Give the figure as a file."""
@@ -153,13 +152,6 @@ class ResultPage(Tab):
 
     # ------------------------------------------------------------------ runs
 
-    def tapped(self, x: float, y: float) -> None:
-        """Compute the run of a place in the figure."""
-        if self.axes is None or start_of(self.source.skeleton) is None:
-            return
-        if self.axes.bbox.contains(x, y):
-            self.ask(tuple(self.axes.transData.inverted().transform((x, y))))
-
     def ask(self, place: tuple[float, float] | None) -> None:
         """Compute the run that starts at a place of the first figure, or at the stored state."""
         start, base, how = start_of(self.source.skeleton), self.shared.system, self.shared.integration
@@ -171,27 +163,29 @@ class ResultPage(Tab):
         self._token = token = Token(RUN_SECONDS)
         self.view.wait("")
 
-        def work(token: Token) -> tuple[Run, str] | None:
+        def work(token: Token) -> tuple[Run, str, Any] | None:
             found = start(self.source.skeleton, place)
             if found is None:
                 return None
             given = {**found.parameters, **found.state}
             words = ", ".join(f"{name} {value:.5g}" for name, value in given.items())
             system = started(sections_of(base.replace(**found.parameters), how), found.state)
-            integration = how.replace(cycles=found.cycles, engine="auto", threads=None)
+            integration = how.replace(cycles=found.cycles or how.cycles, engine="auto", threads=None)
             check_run(system, integration)
-            return sb.simulate(system, integration, progress=token.check), words
+            return sb.simulate(system, integration, progress=token.check), words, found.place
 
-        def done(found: tuple[Run, str] | None, error: str) -> None:
+        def done(found: tuple[Run, str, Any] | None, error: str) -> None:
             self.post(lambda: tell(found, error))
 
-        def tell(found: tuple[Run, str] | None, error: str) -> None:
+        def tell(found: tuple[Run, str, Any] | None, error: str) -> None:
             if error:
                 self.view.fail(error)
             elif found is None:
                 self.view.forget(_CLICK)
             else:
-                self.view.show(*found)
+                run, words, at = found
+                self.mark.data = {"x": [at[0]], "y": [at[1]]} if at is not None else {"x": [], "y": []}
+                self.view.show(run, words)
 
         self.shared.jobs.run(work, done, token)
 

@@ -652,7 +652,7 @@ class Phase(RunPanel):
         self.where.param.watch(lambda _: self.cursor.later(self._draw, 1), "value")
         self.phase.param.watch(lambda _: self.cursor.later(self._draw, 1), "value_throttled")
         return [
-            pn.Row(self.where, self.phase, margin=0),
+            pn.FlexBox(self.where, self.phase, margin=0),
             pn.Row(*(self.wrap(plot) for plot in plots), sizing_mode="stretch_width"),
         ]
 

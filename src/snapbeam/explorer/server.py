@@ -35,9 +35,11 @@ _COOKIE = "snapbeam_token"
 _TEMPLATE = """
 {% block preamble %}
     <meta name="viewport" content="width=device-width, initial-scale=1">
+    <script>console.log = () => undefined;</script>
     {{ super() }}
 {% endblock %}
 """
+"""Bokeh and Panel write two lines into the console of each page."""
 _OWN = "static/extensions/panel/"
 """Path of the static files on the server; Panel loads all others from elsewhere."""
 
@@ -353,6 +355,7 @@ def _shared(what: Any, system: System | None, integration: Integration | None) -
     from snapbeam.explorer.shared import Shared
 
     settings.resources = "server"  # whatever a page is made of comes from this machine
+    settings.log_level = "error"  # nothing else is said in the console of the browser
     pn.extension()
     file = Path(what) if isinstance(what, (str, Path)) else None
     shared = Shared(opened(what, system=system, integration=integration), file)

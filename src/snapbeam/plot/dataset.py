@@ -42,11 +42,16 @@ class _Kind(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Start of a run: parameters by dotted name, amplitudes and velocities by name, and its cycles."""
+    """Start of a run: parameters by dotted name, amplitudes and velocities by name, and its cycles.
+
+    Without a state it begins as the system does; 0 cycles are those of the result.  *place* is the drawn point that it
+    starts from.
+    """
 
     parameters: dict[str, float]
     state: dict[str, float]
     cycles: int
+    place: tuple[float, float] | None = None
 
 
 _Starts = Callable[["xr.Dataset", "tuple[float, float] | None"], "Start | None"]
@@ -62,22 +67,68 @@ def _orbit_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Star
 
 
 def _branch_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
-    """Start of the orbit nearest to a place over the parameter and mid-span displacement."""
-    if place is None:
-        return None
+    """Start of the orbit nearest to a place over the parameter and mid-span displacement, or of the middle one."""
     name = str(dataset.attrs["parameter"])
-    away = np.zeros(dataset.sizes["orbit"])
-    for values, at in zip((dataset[name], dataset["midspan_displacement"]), place, strict=True):
-        away += ((values.values - at) / (np.ptp(values.values) or 1.0)) ** 2
-    nearest = dataset.isel(orbit=int(np.argmin(away)))
-    return _of_state(nearest, nearest["state"], {lookup(name).name: float(nearest[name])})
+    nearest = dataset.isel(orbit=_nearest(dataset[name], dataset["midspan_displacement"], place))
+    at = float(nearest[name]), float(nearest["midspan_displacement"])
+    return _of_state(nearest, nearest["state"], {lookup(name).name: at[0]})._replace(place=at)
+
+
+def _nearest(x: Any, y: Any, place: tuple[float, float] | None) -> int:
+    """Number of the point that is nearest to a place, in parts of the widths of a figure of all; the middle one of none."""
+    if place is None:
+        return int(np.size(x) // 2)
+    away = np.zeros(np.size(x))
+    for values, at in zip((np.ravel(x), np.ravel(y)), place, strict=True):
+        away += ((values - at) / (np.ptp(values[np.isfinite(values)]) or 1.0)) ** 2
+    return int(np.nanargmin(away))
+
+
+def _diagram_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
+    """Start at the stored point nearest to a place, with all of its motion in the first mode."""
+    if not {"midspan_displacement", "midspan_velocity"} <= set(map(str, dataset.data_vars)):
+        return None
+    w, v = dataset["midspan_displacement"], dataset["midspan_velocity"]
+    name = next(str(each) for each in w.dims if each not in ("sweep", "period"))
+    x = dataset[name].broadcast_like(w).transpose(*w.dims).values
+    at = _nearest(x, w, place)
+    here = float(x.flat[at]), float(w.values.flat[at])
+    state = {"amplitude[1]": here[1], "velocity[1]": float(v.transpose(*w.dims).values.flat[at])}
+    return Start({lookup(name).name: here[0]}, state, 30, here)
+
+
+def _axes_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
+    """Start with the parameters of a place, the raised one up the figure if there is another one."""
+    raised = dataset.attrs.get("parameter")
+    names = [str(name) for name in dataset.dims if name in dataset.coords and "parameter" in dataset[name].attrs]
+    names.sort(key=lambda name: name == raised)
+    if "threshold" in dataset and raised not in names:
+        names.append(str(raised))
+    if not names or len(names) > 2:
+        return None
+    if place is None:
+        middles = [float(np.ravel(dataset[n])[dataset[n].size // 2]) for n in names if n in dataset.coords]
+        place = middles[0], middles[-1]
+    given = {lookup(name).name: float(at) for name, at in zip(names, place, strict=False)}
+    return Start(given, {}, 0, place)
+
+
+def _backbone_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
+    """Start of the free motion nearest to a place, at rest where it turns back."""
+    if "initial_shift" in dataset or "amplitude_scale" not in dataset.attrs:
+        return None
+    x, y = dataset["frequency_ratio"].values, 0.5 * (dataset["max_midspan"] - dataset["min_midspan"]).values
+    at = _nearest(x, y, place)
+    alpha = dataset["initial_amplitude"].values[at] / float(dataset.attrs["amplitude_scale"])
+    state = {f"amplitude[{number}]": float(each) for number, each in enumerate(alpha, 1)}
+    return Start({"model.damping_ratio": 0.0}, state, 10, (float(x[at]), float(y[at])))
 
 
 def _basin_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
     names = [str(name) for name in dataset["basin"].dims]
     if place is None or len(names) != 2:
         return None
-    return Start({}, dict(zip(names, map(float, place), strict=True)), 30)
+    return Start({}, dict(zip(names, map(float, place), strict=True)), 30, place)
 
 
 def _branch(dataset: xr.Dataset, ax: Axes | None = None, **options: Any) -> Axes:
@@ -145,8 +196,8 @@ def _gradient(dataset: xr.Dataset) -> dict[str, _Draws]:
 
 _KINDS = (
     _Kind("run", {"displacement_at_striker"}, {"time"}, _run),
-    _Kind("threshold", {"lower_threshold"}, set(), lambda _: {"threshold": plot_threshold}),
-    _Kind("quantiles of a threshold", {"threshold"}, {"quantile"}, lambda _: {"threshold": uncertainty.plot_quantiles}),
+    _Kind("threshold", {"lower_threshold"}, set(), lambda _: {"threshold": plot_threshold}, _axes_start),
+    _Kind("quantiles of a threshold", {"threshold"}, {"quantile"}, lambda _: {"threshold": uncertainty.plot_quantiles}, _axes_start),
     _Kind(
         "probability map", {"probability"}, {"outcome"},
         lambda ds: {str(name): partial(uncertainty.plot_probability, outcome=str(name)) for name in ds["outcome"].values} | _means(ds),
@@ -179,16 +230,17 @@ _KINDS = (
         "periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": dynamics.plot_multipliers}, _orbit_start
     ),
     _Kind(
-        "backbone curve", {"participation", "initial_amplitude"}, {"point"}, lambda _: {"frequency_ratio": dynamics.plot_backbone}
+        "backbone curve", {"participation", "initial_amplitude"}, {"point"}, lambda _: {"frequency_ratio": dynamics.plot_backbone},
+        _backbone_start,
     ),
     _Kind("homoclinic tangency", {"crosses", "bracket"}, {"value"}, lambda _: {"crosses": dynamics.plot_tangency}),
     _Kind("manifold", {"saddle", "age"}, {"point"}, lambda _: {"state": dynamics.plot_manifold}),
     _Kind("attractors", {"points", "share"}, {"attractor"}, lambda _: {"points": dynamics.plot_attractors}),
-    _Kind("Lyapunov exponents", {"exponent"}, set(), lambda _: {"exponent": dynamics.plot_exponents}),
+    _Kind("Lyapunov exponents", {"exponent"}, set(), lambda _: {"exponent": dynamics.plot_exponents}, _axes_start),
     _Kind("basins of attraction", {"basin"}, set(), lambda _: {"basin": dynamics.plot_basins}, _basin_start),
-    _Kind("bifurcation diagram", set(), {"sweep", "period"}, _diagram),
+    _Kind("bifurcation diagram", set(), {"sweep", "period"}, _diagram, _diagram_start),
     _Kind("section", {"drive_phase"}, {"point"}, _section),
-    _Kind("statistics swept up and down", {"response_class"}, {"sweep"}, _swept),
+    _Kind("statistics swept up and down", {"response_class"}, {"sweep"}, _swept, _axes_start),
     _Kind(
         "force-displacement curve", {"snap_through_force"}, {"branch_number"},
         lambda _: {"force": force_displacement.plot_force_displacement},

@@ -72,10 +72,8 @@ def open_hdf5(path: str | os.PathLike[str], name: str = "path", *, in_parts: boo
             file.close()
         if isinstance(error, InputError) or not isinstance(error, Exception):
             raise
-        said = str(error).strip().split("\n")[0][:200]  # of damaged bytes the library makes errors of every kind
-        raise InputError(
-            f"{name} = {str(path)!r}: is no NetCDF or HDF5 file, or is damaged ({said or type(error).__name__})"
-        ) from error
+        # of damaged bytes the library makes errors of every kind, in words about its own calls
+        raise InputError(f"{name} = {str(path)!r}: is no NetCDF or HDF5 file, or is damaged") from error
     return file
 
 
