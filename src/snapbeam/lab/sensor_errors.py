@@ -331,7 +331,7 @@ class _Filter(NamedTuple):
         return np.asarray(np.polyval(self.above, turn) / np.polyval(self.below, turn))
 
     def passed(self, waves: _Array, rate: float) -> _Array:
-        """What it makes of columns sampled at a rate [Hz]."""
+        """All that it makes of columns sampled at a rate [Hz]."""
         speed = rate / (math.pi * self.centre)
         above, below = (
             np.pad(side, (3 - len(side), 0)) * np.array([speed**2, speed, 1.0]) @ _BILINEAR
