@@ -88,7 +88,6 @@ def test_numbers_of_the_comparison():
     assert f"SciPy {min(scipy):.0f} to {max(scipy):.0f}" in PLAIN
 
 
-
 def test_numbers_of_the_claims():
     words = json.loads((ROOT / "docs" / "data" / "claims.json").read_text(encoding="utf-8"))["summary"]
     total, hold, part, fail, close = re.findall(r"\d+", words)[:5]
