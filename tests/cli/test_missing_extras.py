@@ -80,6 +80,7 @@ LABORATORY = [
 
 
 @LAB
+@pytest.mark.slow
 def test_commands_of_the_laboratory(files, refused):
     refused(files, LABORATORY, "lab")
 

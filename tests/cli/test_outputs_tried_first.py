@@ -42,7 +42,8 @@ ALSO_NAMED = [
 ]
 
 
-@pytest.mark.parametrize("named", [NAMED, pytest.param(ALSO_NAMED, marks=pytest.mark.slow)], ids=len)
+@pytest.mark.parametrize("named", [NAMED, ALSO_NAMED], ids=len)
+@pytest.mark.slow
 def test_names_of_any_bytes(tmp_path, tmp_path_factory, named):
     lines = [[*words, name] for words, name in named]
     modules = ("xarray", "dask.array", "h5netcdf", "pint", "snapbeam.cli.map", "snapbeam.plot.run")

@@ -76,6 +76,7 @@ settings = {generations = 2, population = 6, samples = 8, validation_samples = 2
 """
 
 
+@pytest.mark.slow
 def test_limits_of_a_statistic_over_the_buckling_level_have_units(tmp_path) -> None:
     (tmp_path / "stop.toml").write_text(FILE.format(second="70e9"))
     found = []
