@@ -64,8 +64,10 @@ template <class L> void hit(Group<L> &runs, int number, typename L::Marks on) {
     Channel<L> &c = z.channel[number];
     const int n = z.s->size();
     const Number zero = Number(0.0), M = c.M[number], tip = signal_slope(z, c);
-    // the tick is later than the zero of the gap: the rate was another one there, and the beam has gone on with its new velocity
-    const Number late = select(on, c.d0 / c.r0, zero), r = c.r0 - late * pressed_by(z, c, z.q, z.p, z.k);
+    // the tick is later than the zero of the gap: the rate was another one there, and the beam has gone on with its new velocity; not
+    // where it grazes, so that the rate changes its sign in between
+    const Number after = c.d0 / c.r0, late = select(on & (abs(value(after)) <= z.tick), after, zero);
+    const Number r = c.r0 - late * pressed_by(z, c, z.q, z.p, z.k);
     const Number away = c.P[0] * r, bounce = select(on, (r + away) / M, zero);
     for (int i = 0; i < n; ++i) z.p[i] = fma(typename L::Cell(bounce), c.row[i], z.p[i]), z.q[i] = fma(typename L::Cell(bounce * late), c.row[i], z.q[i]);
     const Number pressed = pressed_by(z, c, z.q, z.p, z.k);

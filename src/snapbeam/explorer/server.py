@@ -355,7 +355,7 @@ def _shared(what: Any, system: System | None, integration: Integration | None) -
     from snapbeam.explorer.shared import Shared
 
     settings.resources = "server"  # whatever a page is made of comes from this machine
-    settings.log_level = "error"  # nothing else is said in the console of the browser
+    settings.log_level = "error"  # warnings of Bokeh are not shown in the console of the browser
     pn.extension()
     file = Path(what) if isinstance(what, (str, Path)) else None
     shared = Shared(opened(what, system=system, integration=integration), file)

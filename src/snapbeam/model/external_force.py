@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale, Timed
-from snapbeam.model.drive.components import Component, Tone, hermite, in_pieces, sampled
+from snapbeam.model.drive.components import Component, Tone, half_tone, hermite, sampled
 from snapbeam.model.drive.sampled import FileKeys, Sampled, require_unit
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, check_label, keep_shape, quantity
 from snapbeam.model.reduced_model import ReducedModel, row_of_matrices
@@ -202,8 +202,7 @@ class HalfSineForce(ForceHistory, Timed):
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """Half a tone."""
         found = self.shape_numbers(columns, scale)
-        window = in_pieces((np.zeros(1), {0: np.ones(1)}), (found["duration"], {}))
-        return [Tone(found["amplitude"], found["fastest"], window=window)]
+        return half_tone(found["amplitude"], found["duration"])
 
     def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Peak force, N."""

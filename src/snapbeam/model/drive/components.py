@@ -121,6 +121,11 @@ class Motion:
         return found.reshape(3, *given.shape)
 
 
+def half_tone(amplitude: _Array, duration: _Array) -> list[Component]:
+    """A sin(pi t/T) for t < T, and 0 after it."""
+    return [Tone(amplitude, math.pi / duration, window=in_pieces((np.zeros(1), {0: np.ones(1)}), (duration, {})))]
+
+
 def _of_runs(values: _Array | float, runs: int | NDArray[np.int64]) -> _Array:
     """Numbers of some runs, from one for all or one for each."""
     array = np.asarray(values, dtype=np.float64)

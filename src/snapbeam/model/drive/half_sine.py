@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Scale, Timed, displacement_ratio
-from snapbeam.model.drive.components import Component, Tone, in_pieces
+from snapbeam.model.drive.components import Component, half_tone
 from snapbeam.model.quantity import RUN, quantity
 
 _Array = NDArray[np.float64]
@@ -54,8 +54,7 @@ class HalfSine(Timed):
     def components(self, columns: Mapping[str, _Array], scale: Scale) -> list[Component]:
         """Half a tone."""
         found = self.shape_numbers(columns, scale)
-        window = in_pieces((np.zeros(1), {0: np.ones(1)}), (found["duration"], {}))
-        return [Tone(found["amplitude"], found["fastest"], window=window)]
+        return half_tone(found["amplitude"], found["duration"])
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""
