@@ -326,7 +326,7 @@ def find_attractors(
     integration : Integration, optional
         Solver settings.
     progress : callable, optional
-        Called as ``progress(done, total)`` with parts of the work; True writes a line to standard error.
+        Called as ``progress(done, total)`` with parts of the work; True prints it.
 
     Returns
     -------

@@ -73,7 +73,7 @@ def basins_of_attraction(
     every : int
         Periods between two checks.
     progress : callable, optional
-        Called as ``progress(done, total)`` with periods; True writes a line to standard error.
+        Called as ``progress(done, total)`` with periods; True prints it.
 
     Returns
     -------

@@ -348,15 +348,15 @@ def bifurcation_curve(
         Tolerance of the orbit and of the condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light
         impacts make the multipliers rough.
     progress : callable, optional
-        Called as ``progress(done, total)`` with points; True writes a line to standard error.
+        Called as ``progress(done, total)`` with points; True prints it.
 
     Returns
     -------
     xarray.Dataset
         Variables over ``point``: both parameters, their errors, the state, the multipliers, impacts, residual. Over
         ``special_point``: kind and parameters of points of codimension two. On a grazing curve the attribute
-        ``kept_gap`` is the gap over b; ``contact_force`` is false if the multipliers are those of the motion without
-        contact.
+        ``kept_gap`` is the gap over b; ``contact_force`` is "left out" if the
+        multipliers are those of the motion without contact.
 
     Raises
     ------

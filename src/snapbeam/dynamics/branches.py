@@ -422,7 +422,7 @@ def continuation(
     orbit : PeriodicOrbit
         First orbit, of :func:`periodic_orbit` or of a branch.
     name : str
-        Parameter, by dotted name or the name in datasets.
+        Parameter, by any of its names.
     bounds : pair of float
         Minimum and maximum value.
     direction : {"up", "down"}

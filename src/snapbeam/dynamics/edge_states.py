@@ -131,7 +131,7 @@ def edge_tracking(
     integration : Integration, optional
         Solver settings.
     progress : callable, optional
-        Called as ``progress(done, total)`` with periods; True writes a line to standard error.
+        Called as ``progress(done, total)`` with periods; True prints it.
 
     Returns
     -------

@@ -60,7 +60,7 @@ def lyapunov_spectrum(
     periods : int
         Periods of the drive to average over.
     transient : int, optional
-        Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
+        Periods before them; by default 16 time constants of the slowest mode, in [200, 20,000].
     states : State or array_like of shape (runs, d), optional
         Starts of the runs; the system's start by default.
     axes : mapping, optional
@@ -68,7 +68,7 @@ def lyapunov_spectrum(
     integration : Integration, optional
         Solver settings.
     progress : callable, optional
-        Called as ``progress(done, total)`` with periods; True writes a line to standard error.
+        Called as ``progress(done, total)`` with periods; True prints it.
 
     Returns
     -------

@@ -471,7 +471,7 @@ def homoclinic_tangency(
     orbit : PeriodicOrbit
         Saddle of a map of the plane.
     name : str
-        Parameter, by dotted name or the name in datasets.
+        Parameter, by any of its names.
     bounds : pair of float
         Values with and without crossing, in either order of size.
     max_arclength, max_distance, max_turn : float

@@ -60,7 +60,7 @@ def poincare_section(
     periods : int
         Periods to record.
     transient : int, optional
-        Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
+        Periods before them; by default 16 time constants of the slowest mode, in [200, 20,000].
     phase : float, optional
         Phase of the primary excitation, rad, of the stroboscopic section; that at the start by default.
     integration : Integration, optional

@@ -83,7 +83,7 @@ def bifurcation_diagram(
     system : System
         System whose parameter is swept.
     name : str
-        Parameter, by dotted name or the name in datasets.
+        Parameter, by any of its names.
     values : array_like
         Values of the parameter, strictly increasing, in its unit.
     integration : Integration, optional
@@ -98,7 +98,7 @@ def bifurcation_diagram(
     grazing : bool
         Sample every approach in four of the recorded periods densely: ``clearance``, ``min_penetration``.
     progress : callable, optional
-        Called as ``progress(done, total)`` with values; True writes a line to standard error.
+        Called as ``progress(done, total)`` with values; True prints it.
 
     Returns
     -------
@@ -257,7 +257,7 @@ def hysteresis(
     system : System
         System, in the initial state of the first value.
     name : str
-        Parameter, by dotted name or the name in datasets.
+        Parameter, by any of its names.
     values : array_like
         Values of the parameter, strictly increasing, in its unit.
     integration : Integration, optional
@@ -265,7 +265,7 @@ def hysteresis(
     sweeps : sequence of {"up", "down"}
         Directions in their order.
     progress : callable, optional
-        Called as ``progress(done, total)`` with values; True writes a line to standard error.
+        Called as ``progress(done, total)`` with values; True prints it.
 
     Returns
     -------

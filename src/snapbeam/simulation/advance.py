@@ -69,7 +69,7 @@ def advance(
         Return the state after each period, along a new first dimension, instead of the last one.  The
         ``statistics`` are those of all periods, except the status, which is that of each state.
     progress : callable, optional
-        Function that receives ``(done, total)``, numbers of states; True writes a line to standard error.
+        Function that receives ``(done, total)``, numbers of states; True prints it.
 
     Returns
     -------

@@ -381,8 +381,7 @@ def simulate(
         the first mode, and the ends of the steps of each impact.  Times that a run did not reach, because it ended
         early or failed, are NaN, with ``valid`` = 0.
     progress : callable, optional
-        Function that receives the finished fraction of the run, several times per second; True writes a line to
-        standard error.  For several runs it receives ``(done, total)``.
+        Function that receives the finished fraction of the run, several times per second; True prints it.  For several runs it receives ``(done, total)``.
 
     Returns
     -------

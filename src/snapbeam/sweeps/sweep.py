@@ -62,7 +62,7 @@ def sweep(
     output : path, optional
         NetCDF file, which is written block by block, so that the memory does not grow with the sweep.
     progress : callable, optional
-        Function that receives ``(done, total)``, numbers of points; True writes a line to standard error.
+        Function that receives ``(done, total)``, numbers of points; True prints it.
 
     Returns
     -------

@@ -79,7 +79,7 @@ def threshold(
     integration : Integration, optional
         Solver settings.  Early termination is always used, also if ``integration.early_termination`` is False.
     progress : callable, optional
-        Function that receives ``(done, total)``, numbers of runs; True writes a line to standard error.
+        Function that receives ``(done, total)``, numbers of runs; True prints it.
 
     Returns
     -------

@@ -229,35 +229,30 @@ _PHASE = UniformRange(math.pi, 2.0 * math.pi)
 class ParameterUncertainty:
     """Uncertainty of the parameters and the initial state of a system.
 
-    Sample number s comes from the seed and s alone (Philox with the key (seed, s)): it is the same at every point, in
-    every order, on any number of threads or workers.
+    Sample number s follows from the seed and s alone (Philox with the key (seed, s)), on any number of threads or
+    workers. With a phase or a ringing start the tip's mid-position is fixed in space.
 
     Parameters
     ----------
     of : mapping of str to Distribution
-        Distributions by the names of parameters, as :func:`snapbeam.sweep` takes them: :class:`Normal`,
-        :class:`UniformTolerance`, :class:`LogNormal`, about the value of the system or of the point, or :class:`UniformRange`.
+        Distributions by the names of parameters: :class:`Normal`, :class:`UniformTolerance`, :class:`LogNormal`, about
+        the value of the system or of the point, or :class:`UniformRange`.
     correlation : array_like of shape (parameters, parameters), optional
-        Correlations of the normal scores behind the distributions (a Gaussian copula), in the order of *of*.
+        Correlations of the normal scores (a Gaussian copula), in the order of *of*.
     displacement : float
-        Root mean square of a faint ringing at the start, of all modes with equal mean energy, at the centre, m; a beam
-        that would be pressed by the tip at rest begins on the other side of its rest instead.
+        Root mean square at the centre, m, of a ringing start of all modes with equal mean energy; a start that would
+        press the beam into the tip is mirrored about its rest.
     phase : bool
-        True if the drive begins at any phase of the half of its cycle in which the tip is drawn back.
+        True if the drive begins at any phase of the half cycle in which the tip is drawn back.
     hold_fixed : {"physical", "normalised"}
-        Excitation that stays fixed if the beam differs from the nominal one.  ``"physical"``: the same frequency in Hz,
-        velocity in m/s and location in m, so that Omega, V and x_s change with the beam's own frequency, buckling level
-        and length.  ``"normalised"``: the same Omega, V and x_s.
+        Excitation that stays fixed if the beam differs from the nominal one: ``"physical"``, frequency in Hz, velocity
+        in m/s and location in m; ``"normalised"``, Omega, V and x_s.
     seed : int
         Seed of the samples.
 
     See Also
     --------
     snapbeam.uncertainty.probability_map, snapbeam.uncertainty.sample_systems
-
-    Notes
-    -----
-    With a phase or a ringing start the tip's mid-position is fixed in space, as everywhere in dynamics.
 
     Examples
     --------
