@@ -155,7 +155,9 @@ rendered = lab.render_run(truth, camera=camera, stage=stage, rest_frames=300)
 path = rendered.write(files / "test.cihx")
 
 recording = lab.open_recording(path)
-print(f"{len(recording)} frames of {recording.shape} pixels at {recording.frame_rate} Hz")
+print(
+    f"{len(recording)} frames of {recording.shape} pixels at {recording.frame_rate} Hz"
+)
 
 # %%
 # Tracking knows the calibrated buckling level, because a camera cannot know where the middle between the wells is.
@@ -178,7 +180,9 @@ figure = plot_tracking_quality(tracked)
 pixel = 1e3 * camera.pixel_size
 for name in ("displacement_mm", "shaker_displacement_mm"):
     error = (tracked[name].values - rendered.truth[name].values) / pixel
-    print(f"{name}: mean error {np.nanmean(error):+.3f} px, RMS about it {np.nanstd(error):.3f} px")
+    print(
+        f"{name}: mean error {np.nanmean(error):+.3f} px, RMS about it {np.nanstd(error):.3f} px"
+    )
 
 # %%
 # The mean error is that of the calibrated buckling level, which places the beam at rest.

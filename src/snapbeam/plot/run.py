@@ -76,7 +76,7 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
     ----------
     run : Run or xarray.Dataset
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
     modes : int
 
     Examples
@@ -151,12 +151,12 @@ def plot_spectrum(
     Parameters
     ----------
     run : Run or xarray.Dataset
-        Of a run; or the power spectral density that ``estimated_psd`` of a recorded acceleration or a random vibration
-        returns: it is drawn with its interval, over the density that it was drawn from.
+        Run, or the power spectral density of ``estimated_psd``, which is drawn with its interval over the given
+        density.
     variable : str, optional
-        A variable over time, by name; the displacement of mid-span, or at the striker, by default.
+        Variable over time; the displacement of mid-span, or at the striker, by default.
     window : pair of float, optional
-        First and last cycle to take; everything by default.
+        First and last cycle; all by default.
 
     Returns
     -------
@@ -471,19 +471,17 @@ _MANY = 20_000  # samples above which a curve is stored as pixels in a vector fi
 def plot_run(run: Run | xr.Dataset, window: tuple[float, float] | None = None, ax: Axes | None = None) -> Axes:
     """Draw the displacements, the penetration and the contact force of a run, and its hardest impact closer.
 
-    Left, over cycles of excitation: the whole run or a window.  More than 100 cycles are drawn by the range,
-    minimum to maximum, in intervals of whole cycles; choose a window to see each cycle.  Right, over time: the
-    samples about the maximum contact force within the window, from a little before the contact to a little
-    after it.  A measured run has no force, and is drawn without it.
+    Left, over cycles: the whole run or a window; more than 100 cycles as the range, minimum to maximum, of whole
+    cycles. Right, over time: the maximum contact force within the window. A measured run is drawn without force.
 
     Parameters
     ----------
     run : Run or xarray.Dataset
         A run, or a dataset that follows :data:`snapbeam.simulation.dataset.SCHEMA`.
     window : pair of float, optional
-        First and last cycle to draw; everything by default.
+        First and last cycle; all by default.
     ax : matplotlib.axes.Axes, optional
-        Axes for the displacements alone; by default a new figure of two columns shows everything.
+        Axes for the displacements alone; a new figure of two columns by default.
 
     Returns
     -------
