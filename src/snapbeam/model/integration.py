@@ -32,7 +32,7 @@ class Integration:
         predictability horizon; in place of *step* and *accuracy*.
     engine : {"auto", "native", "python", "cuda"}
         Solver: ``"auto"`` and ``"native"`` are the core in C++. ``"python"`` is its specification, for laws in plain
-        Python: thousands of times slower, without *step*, *tolerance* or *early_termination*. ``"cuda"`` is the core on
+        Python: hundreds to thousands of times slower, without *step*, *tolerance* or *early_termination*. ``"cuda"`` is the core on
         an NVIDIA GPU (extra ``cuda``), for maps of ten thousand runs and more.
     early_termination : bool
         End a run once its response class is certain; other statistics stop there.
