@@ -26,6 +26,7 @@ from snapbeam.model.modal_convergence import converged_modes, error_of_auto
 from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physical, parse_axis, unit_of
 from snapbeam.model.parameters import (
     PHYSICAL,
+    physical_hint,
     Parameter,
     kind_of,
     kinds_of,
@@ -232,6 +233,7 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
     unit = "" if item.unit == "1" else f" in {item.unit}"
     message, value = _from_text(name, value, item.unit) if item.kind is float else ("", value)
     if message:
+        message += physical_hint(row.name)
         return message, None
     if item.kind is float and not (name == "damping_ratio" and isinstance(value, (list, np.ndarray))):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
