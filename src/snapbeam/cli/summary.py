@@ -291,9 +291,7 @@ def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
 def _point(values: xr.DataArray, index: dict[Any, Any], attrs: Any) -> dict[str, Any]:
     """Return the coordinates of a point of a map: those of its axes, and the paper's."""
     point = values.isel(index)
-    if "location" not in values.dims and is_of_matrices(attrs):
-        point = point.drop_vars("location", errors="ignore")
-    in_unit = {ratio_name(str(name)) for name in values.dims}
+    in_unit = {ratio_name(str(name)) for name in values.dims} | ({"location"} if is_of_matrices(attrs) else set())
     names = [str(name) for name in values.coords if name in values.dims or name in {*_PAPER} - in_unit]
     return {name: point[name].item() for name in names}
 

@@ -26,13 +26,13 @@ from snapbeam.model.modal_convergence import converged_modes, error_of_auto
 from snapbeam.model.parameter_axes import axis_that_changes_unit, checked_physical, parse_axis, unit_of
 from snapbeam.model.parameters import (
     PHYSICAL,
-    physical_hint,
     Parameter,
     kind_of,
     kinds_of,
     lookup,
     named_in,
     parameters,
+    physical_hint,
     physical_names,
     ratio_of,
     refuse_well_axis,
