@@ -47,7 +47,11 @@ def conversion_factor(given: str, unit: str) -> float | None:
         return 1.0
     registry = _registry()
     given = re.sub(r"(?<=[A-Za-z])(?=[2-4](?![0-9.]))", "^", given)  # kg/m3 is kg/m^3
-    ends = [(given, unit), (_GRAVITY.sub("standard_gravity", given), unit), (given, _GRAVITY.sub("standard_gravity", unit))]
+    ends = [
+        (given, unit),
+        (_GRAVITY.sub("standard_gravity", given), unit),
+        (given, _GRAVITY.sub("standard_gravity", unit)),
+    ]
     for text, wanted_unit in dict.fromkeys(ends):
         try:
             own, target = registry.Unit(text), registry.Unit("" if wanted_unit == "1" else wanted_unit)
