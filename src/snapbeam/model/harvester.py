@@ -363,8 +363,7 @@ class PiezoelectricPatches(_Layers):
             raise InputError(f"patches = {shown(self.patches)}: must be rows of start < end and a moment per volt")
         within("patches", float(rows[:, :2].min()), 0.0, 1.0, closed="both")
         within("patches", float(rows[:, :2].max()), 0.0, 1.0, closed="both")
-        rows.setflags(write=False)
-        object.__setattr__(self, "patches", rows)
+        object.__setattr__(self, "patches", tuple(map(tuple, rows.tolist())))  # rows of numbers, so that == compares
 
     @classmethod
     def wired(

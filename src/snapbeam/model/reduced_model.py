@@ -926,16 +926,17 @@ def _coupling(parity: NDArray[np.int_]) -> _Array:
 # The shape of a beam along its length, from the amplitudes of its buckling modes.
 
 
-def row_of_matrices(model: ReducedModel, shape: _Array | None) -> _Array:
+def row_of_matrices(model: ReducedModel, shape: tuple[float, ...] | None) -> _Array:
     """Row of a force on a structure given by matrices, (N,): its *shape*, by default that of the contact."""
     if shape is None:
         assert model.contact_shape is not None
         return model.contact_shape
-    if shape.shape != (model.modes,):
+    row = np.asarray(shape)
+    if row.shape != (model.modes,):
         raise InputError(
-            f"force.shape of shape {shape.shape}: must be ({model.modes},); give one number for each coordinate"
+            f"force.shape of shape {row.shape}: must be ({model.modes},); give one number for each coordinate"
         )
-    return shape
+    return row
 
 
 def displacement_along(

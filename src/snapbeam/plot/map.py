@@ -428,7 +428,8 @@ def _curves(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, along: str) -> No
     factor, _ = _label(dataset, name, dataset[name].values)
     for at, (color, mark) in enumerate(zip(colors, itertools.cycle("os^Dv<>"), strict=False)):
         value = tick_text(dataset, other, float(dataset[other][at]), 4) if words is None else words[at]
-        text = value if words is None else f"{symbol_of(dataset, other) or other} = {value}"
+        symbol = symbol_of(dataset, other) or ("" if words is None else other)
+        text = f"{symbol} = {value.removesuffix(f' in {symbol}')}" if symbol else value
         values = data.isel({other: at}).values
         ax.plot(points, values, f"{mark}-", color=color, markersize=1.2 * marker_size(points.size), label=text)
         if f"{name}_low" in dataset:

@@ -13,6 +13,7 @@ from scipy.special import ndtr
 
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
+from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -399,7 +400,12 @@ def uncertainty_from_mapping(
     for key, table in _flat(given).items():
         if not isinstance(table, Mapping):
             raise InputError(f"{name}.{key} = {shown(table)}: must be a table, such as {{normal = 0.01}}")
-        of[full_name(key)] = _distribution(f"{name}.{key}", table)
+        own = full_name(key)
+        try:
+            of[own] = _distribution(f"{name}.{key}", table, lookup(own).quantity.unit)
+        except InputError as error:
+            words = str(error)
+            raise InputError(words if words.startswith(f"{name}.{key}") else f"{name}.{key}: {words}") from None
     return ParameterUncertainty(of=of, **{key: given[key] for key in _OWN if key in given})
 
 
@@ -416,7 +422,14 @@ def _flat(given: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _distribution(name: str, table: Mapping[str, Any]) -> Distribution:
+def _distribution(name: str, table: Mapping[str, Any], unit: str) -> Distribution:
+    def number(value: Any) -> Any:
+        """A number that text states in the unit of the parameter, or as a share."""
+        if not isinstance(value, str):
+            return value
+        found = number_in_unit(value, "1" if table.get("relative") or "lognormal" in table else unit)
+        return value if found is None else found
+
     kinds = [key for key in table if key in KINDS]
     others = [key for key in table if key not in KINDS and key != "relative"]
     if len(kinds) != 1 or others:
@@ -426,8 +439,8 @@ def _distribution(name: str, table: Mapping[str, Any]) -> Distribution:
     if kinds[0] == "range":
         if more or not isinstance(value, (list, tuple)) or len(value) != 2:
             raise InputError(f"{name}.range = {shown(value)}: must be two numbers [low, high] alone")
-        return UniformRange(*value)
+        return UniformRange(*map(number, value))
     if kinds[0] == "lognormal" and more:
         raise InputError(f"{name}: a lognormal is relative by itself; leave relative out")
     kind: Any = KINDS[kinds[0]]
-    return kind(value, **more)
+    return kind(number(value), **more)

@@ -73,6 +73,11 @@ def wells_of(attrs: Mapping[str, Any]) -> int:
     return int(found.item())
 
 
+def is_of_matrices(attrs: Mapping[str, Any]) -> bool:
+    """Return whether the structure of a dataset was given by matrices: its contact is at their row, at no location."""
+    return '"contact_shape"' in str(attrs.get("system", ""))
+
+
 class RunStatus(IntEnum):
     """Status of a run.  All but ``OK``, ``EARLY_STOP`` and ``FILLED`` leave the response class unknown.
 
