@@ -61,9 +61,12 @@ class WindowControl:
     def __init__(self, card: MapCard) -> None:
         self.card = card
         self._token: jobs.Token | None = None
+        self._key: Any = None
         self._moved, self._pushed = 0, 0.0
         self._asked: set[Any] = set()
         """Keys of the windows that were asked for: they are computed to their end."""
+        self._halted: set[Any] = set()
+        """Keys of the windows that were stopped: they go on when they are asked for."""
         self._awake = False
         self._waiting = jobs.Waiting(card.later)
 
@@ -120,6 +123,9 @@ class WindowControl:
         key = (self.card.plane_key, bounds)
         if force:
             self._asked.add(key)
+            self._halted.discard(key)
+        elif key in self._halted:
+            return
         seconds = math.inf if key in self._asked else _WAIT
         self.cancel("")
         self.card.own.add(key)
@@ -142,6 +148,7 @@ class WindowControl:
             self.card.tell("" if window.finished or not force else "the map is as fine as the screen shows")
             return
         self._token = token = jobs.Token(jobs.WINDOW_SECONDS)
+        self._key = key
         self.card.stop.visible = True
         self.card.tell("computing this view")
         self._waiting.begin(0, self._still)
@@ -196,6 +203,11 @@ class WindowControl:
             if not words and window.waits:
                 words = f"window: {window.done} of {window.wanted} points; Compute view continues"
             self.card.tell(words or f"window: all {window.wanted} points computed")
+
+    def halt(self) -> None:
+        """Stop the window, until it is asked for."""
+        self._halted.add(self._key)
+        self.cancel("stopped")
 
     def cancel(self, words: str) -> None:
         """Compute no window any more."""
@@ -274,7 +286,7 @@ class MapCard:
         self.auto = pn.widgets.Checkbox(name="compute the view automatically", value=True, align="center")
         hidden: dict[str, Any] = {"visible": False, "align": "center"}
         self.stop = style.button(
-            "Stop", self.post, lambda: self.control.cancel("stopped"), button_type="warning", width=70, **hidden
+            "Stop", self.post, lambda: self.control.halt(), button_type="warning", width=70, **hidden
         )
         self.again = style.button(
             "Compute view", self.post, lambda: self.control.compute_view(force=True), width=110, align="center"
@@ -780,7 +792,7 @@ class SystemCard:
 
     def _vary(self) -> None:
         """Let the slider hold the chosen parameter, from half of its value to one and a half."""
-        held, rows = self._held(), parameters()
+        held, rows = maps.held_values(self.system, self.integration), parameters()
         numbers = [name for name in self.fields if isinstance(held.get(name), (int, float)) and held[name]]
         self.vary.options = {"": ""} | {
             name.replace("_", " "): name for name in numbers if rows[name].quantity.kind is not bool
@@ -804,19 +816,14 @@ class SystemCard:
 
     def _released(self, value: float) -> None:
         self.page.drag({})
-        if value != self._varied:
-            self._use({str(self.vary.value): parameters()[self.vary.value].quantity.kind(value)})
+        name = str(self.vary.value)  # back at its place, the run that was shown before is computed again
+        self._use({name: parameters()[name].quantity.kind(value)} if value != self._varied else {})
 
     def _edited(self) -> dict[str, Any]:
         return {name: each.value for name, each in self.fields.items() if each.value != self._filled[name]}
 
-    def _held(self) -> dict[str, Any]:
-        """Values of the parameters of the system and of its integration, by dotted name."""
-        how = maps.integration_mapping(self.integration) | {"cycles": self.integration.cycles_or_default}
-        return dict(self.system.parameters) | {f"integration.{name}": value for name, value in how.items()}
-
     def _make_fields(self, typed: Mapping[str, Any]) -> None:
-        held = self._held()
+        held = maps.held_values(self.system, self.integration)
         rows = self._rows()
         if [row.name for row in rows] != list(self.fields):
             self.fields = {row.name: self._field(row) for row in rows}
@@ -954,21 +961,28 @@ class SystemCard:
         self.facts.object = Markup('<table class="facts"><tr>{}</tr></table>{}').format(cells, doubts)
 
 
-def changed_words(changes: Mapping[str, Any]) -> str:
-    """Changed parameters in the words of their fields; of a section with lists, and of one that is gone, its title."""
+def changed_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """Parameters that differ, in the words of their fields and with their values.
+
+    Lists, and sections that are gone, are told by their titles; defaults of a new section are not told.
+    """
     found: dict[str, None] = {}
-    for name, value in changes.items():
-        section, key = split_name(name)
-        title = _SECTIONS.get(section.partition(".")[0], section.replace("_", " "))
-        if isinstance(value, (list, tuple, dict)):
+    sections = [{split_name(name)[0] for name in each} for each in (before, after)]
+    for name in dict.fromkeys([*before, *after]):
+        value, (section, key), row = after.get(name), split_name(name), parameters().get(name)
+        root = section.partition(".")[0]
+        title = _SECTIONS.get(_group(row) if row else root, root.replace("_", " "))
+        if maps.plain(before.get(name)) == maps.plain(value):
+            continue
+        if section not in sections[1]:
+            found[f"no {_SECTIONS.get(root, root).lower()}"] = None
+        elif isinstance(value, (list, tuple, dict, np.ndarray)):
             found[title] = None
-        elif key:
-            row = parameters().get(name)
-            unit = "" if row is None or row.quantity.unit == "1" or value is None else f" {row.quantity.unit}"
-            text = "the default" if value is None else maps.brief(value)
-            found[f"{title}: {key.replace('_', ' ')} {text}{unit}"] = None
-        else:
-            found[f"default {title.lower()}" if section in _ALWAYS else f"no {title.lower()}"] = None
+        elif name == "contact.type":
+            found[f"Contact law: {_LAWS.get(value, str(value).replace('_', ' '))}"] = None
+        elif value is not None and (section in sections[0] or row is None or value != row.default):
+            unit = "" if row is None or row.quantity.unit == "1" else f" {row.quantity.unit}"
+            found[f"{title}: {key.replace('_', ' ')} {maps.brief(value)}{unit}"] = None
     more = f" and {len(found) - 6} more" if len(found) > 6 else ""
     return ", ".join(list(found)[:6]) + more
 

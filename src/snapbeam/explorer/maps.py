@@ -1389,9 +1389,15 @@ def patched(sections: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str
     return {section: values for section, values in found.items() if values}
 
 
+def held_values(system: sb.System, integration: sb.Integration) -> dict[str, Any]:
+    """Values of the parameters of a system and of its integration, by dotted name."""
+    how = integration_mapping(integration) | {"cycles": integration.cycles_or_default}
+    return dict(system.parameters) | {f"integration.{name}": value for name, value in how.items()}
+
+
 def values_of(names: Iterable[str], system: sb.System, integration: sb.Integration) -> dict[str, Any]:
     """The values of some parameters, also in physical units, by dotted name; without those that a system has not."""
-    held = dict(system.parameters) | {"integration.cycles": integration.cycles_or_default}
+    held = held_values(system, integration)
     found = {}
     for name in names:
         value = held.get(PHYSICAL[name].parameter if name in PHYSICAL else name)
