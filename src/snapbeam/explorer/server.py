@@ -35,11 +35,15 @@ _COOKIE = "snapbeam_token"
 _TEMPLATE = """
 {% block preamble %}
     <meta name="viewport" content="width=device-width, initial-scale=1">
-    <script>console.log = () => undefined;</script>
+    <script>
+      const log = console.log.bind(console);
+      console.log = (...words) => { if (words[0] !== 'Bokeh items were rendered successfully') { log(...words); } };
+    </script>
     {{ super() }}
 {% endblock %}
+{% block postamble %}<script>Bokeh.logger.set_level('warn');</script>{% endblock %}
 """
-"""Bokeh and Panel write two lines into the console of each page."""
+"""Nothing but warnings in the console; for one line Bokeh has no level."""
 _OWN = "static/extensions/panel/"
 """Path of the static files on the server; Panel loads all others from elsewhere."""
 
@@ -355,7 +359,7 @@ def _shared(what: Any, system: System | None, integration: Integration | None) -
     from snapbeam.explorer.shared import Shared
 
     settings.resources = "server"  # whatever a page is made of comes from this machine
-    settings.log_level = "error"  # warnings of Bokeh are not shown in the console of the browser
+    settings.log_level = None  # to set it in this way is a message in the console of the browser
     pn.extension()
     file = Path(what) if isinstance(what, (str, Path)) else None
     shared = Shared(opened(what, system=system, integration=integration), file)
