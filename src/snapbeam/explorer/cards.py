@@ -25,6 +25,7 @@ from snapbeam.explorer import jobs, maps, style
 from snapbeam.explorer.address import Address, typed
 from snapbeam.explorer.map_view import MapView
 from snapbeam.explorer.run_view import across, within
+from snapbeam.explorer.scatter import ScatterView
 from snapbeam.explorer.shared import Shared
 from snapbeam.model.parameter_axes import CHANGES_UNITS
 from snapbeam.model.parameter_file import Config, config_from_mapping
@@ -249,6 +250,8 @@ class MapCard:
         self.own: set[Any] = set()
         """Keys of the windows that this page requested; those of other tabs are not drawn over its map."""
         self._drawn: list[tuple[maps.Window, NDArray[np.int8]]] = []
+        self._apart: NDArray[np.float64] | None = None
+        """The difference of two maps, of shape (y, x), if it is shown."""
         self._words = list(address.words)
         self._restoring = False
         self._make_controls(address)
@@ -295,8 +298,9 @@ class MapCard:
             options={
                 "interwell threshold": "threshold", "quasi-static threshold": "quasi",
                 "measured points": "dots", "computed windows": "windows",
+                "difference": "difference", "scatter": "scatter",
             },
-            value=["windows"], button_type="default",
+            value=["windows"] if self.shared.other is None else ["windows", "difference"], button_type="default",
         )  # fmt: skip
         self.hover = style.Html("\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4))
         self._selected: Markup = Markup("&nbsp;")
@@ -310,6 +314,8 @@ class MapCard:
             slider.param.watch(lambda _: None if self._restoring else self.post(self._cut_changed), "value")
         self.auto.visible = self.again.visible = not source.is_list
         self.slider_box = pn.FlexBox(margin=0)
+        self.scatter: ScatterView | None = None
+        self.scatter_box = pn.Column(sizing_mode="stretch_width", margin=0)
         self.typed = pn.FlexBox(margin=0)
         """Fields of a point."""
 
@@ -415,7 +421,7 @@ class MapCard:
         return pn.Column(
             pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder,
             self.state, self.key, self.hover, self.typed,
-            pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0),
+            pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0), self.scatter_box,
             sizing_mode="stretch_width", css_classes=["card"],
         )  # fmt: skip
 
@@ -482,6 +488,11 @@ class MapCard:
         self.view.show_threshold(kinds)
         self._draw_dots("dots" in layers, words)
         self._draw_marks()
+        self.scatter_box.visible = "scatter" in layers
+        if "scatter" in layers:
+            self.scatter = self.scatter or ScatterView(self)
+            self.scatter.fill()
+            self.scatter_box.objects = [self.scatter.layout]
         if any(words):
             self._words = [each for each in words if each]
         self.tell()
@@ -489,14 +500,37 @@ class MapCard:
 
     def show_windows(self) -> None:
         """Draw the windows over the map."""
-        shown = self.windows() if "windows" in self.layers.value or not self.source.skeleton.data_vars else []
+        layers, held = set(self.layers.value), bool(self.source.skeleton.data_vars)
+        shown = self.windows() if layers & {"windows", "difference"} or not held else []
         if shown and self.show.value != "response_class" and not self.source.skeleton.data_vars:
             known = [w.values[self.show.value][w.stride > 0] for w in shown if self.show.value in w.values]
             self.view.limits = _span(np.concatenate(known)) if known else (0.0, 1.0)
             low, high = self.view.limits
             self.view.mapper.update(low=low, high=max(high, low + 1e-300))
         self._drawn = self.view.show_windows(shown, self.show.value, self.shown_plane)
+        self._apart, words = self._difference() if "difference" in layers else (None, "")
+        if self._apart is not None:
+            most = float(np.nanmax(np.abs(self._apart), initial=0.0)) or 1.0
+            self.view.show(style.DIFFERENCE, self._apart, (-most, most), words)
+            self.view.fade(False)
+            self.view.show_windows([], "", None)
         self._legend()
+        if words:
+            said = self._said if self._apart is not None else words
+            self.key.object = Markup('<div class="key">{}</div>').format(said)
+
+    def _difference(self) -> tuple[NDArray[np.float64] | None, str]:
+        """The difference from the other map, or of what was computed from the map, and its title; None and a reason."""
+        other, name = None if self.changed else self.shared.other, self.show.value
+        if self.source.is_list or not self.source.skeleton.data_vars or (other is None and not self.changed):
+            return None, "a difference needs two maps: start with --against, or change the system of a map"
+        try:
+            found, self._said = maps.apart(self.plane, name, other, self._drawn)
+        except InputError as error:
+            return None, str(error)
+        names = ("computed", self.source.name) if other is None else (self.source.name, other.name)
+        label, unit = self.source.label(name)
+        return found, f"{label}{'' if unit == '1' else f' ({unit})'}: {names[0]} minus {names[1]}"
 
     @property
     def shown_plane(self) -> maps.Plane | None:
@@ -644,7 +678,10 @@ class MapCard:
             self.hover.object = self._selected
             return
         point = self.point(x, y)
-        self.hover.object = self._readout(point.words(), self._held(point, x, y))
+        held = self._held(point, x, y)
+        if self._apart is not None:
+            held = held | {style.DIFFERENCE: float(self._apart[self.plane.index(x, y)])}
+        self.hover.object = self._readout(point.words(), held)
 
     def _held(self, point: maps.Point, x: float, y: float) -> dict[str, Any]:
         """The class, the shown variable and two more of the cell at a location."""
@@ -672,7 +709,7 @@ class MapCard:
             held = {}
         if "response_class" in held:
             parts.append(Markup("<b>{}</b>").format(ResponseClass(int(held["response_class"])).label))
-        for each in dict.fromkeys((self.show.value, "zero_crossings", "peak_force")):
+        for each in dict.fromkeys((style.DIFFERENCE, self.show.value, "zero_crossings", "peak_force")):
             if each in held and each != "response_class":
                 unit = self.source.label(each)[1]
                 parts.append(f"{each.replace('_', ' ')} {held[each]:.5g}{'' if unit == '1' else f' {unit}'}")
