@@ -252,6 +252,8 @@ class MapCard:
         self._drawn: list[tuple[maps.Window, NDArray[np.int8]]] = []
         self._apart: NDArray[np.float64] | None = None
         """The difference of two maps, of shape (y, x), if it is shown."""
+        self._said = ""
+        """The legend of the difference, or the reason why there is none."""
         self._words = list(address.words)
         self._restoring = False
         self._make_controls(address)
@@ -514,10 +516,8 @@ class MapCard:
             self.view.show(style.DIFFERENCE, self._apart, (-most, most), words)
             self.view.fade(False)
             self.view.show_windows([], "", None)
+        self._said = words if self._apart is None else self._said
         self._legend()
-        if words:
-            said = self._said if self._apart is not None else words
-            self.key.object = Markup('<div class="key">{}</div>').format(said)
 
     def _difference(self) -> tuple[NDArray[np.float64] | None, str]:
         """The difference from the other map, or of what was computed from the map, and its title; None and a reason."""
@@ -566,8 +566,8 @@ class MapCard:
 
     def _legend(self) -> None:
         """Name the classes, with the share of the area in view that each has as it is drawn."""
-        if self.show.value != "response_class":
-            self.key.object = ""
+        if self._said or self.show.value != "response_class":
+            self.key.object = Markup('<div class="key">{}</div>').format(self._said) if self._said else ""
             return
         shares = self._shares()
         items = []
