@@ -228,8 +228,8 @@ def _duration(seconds: float) -> str:
 # ----------------------------------------------------------------------------------------------------
 
 
-_HEIGHT = 345
-"""Pixels of the figure."""
+_HEIGHT, _LOW = 345, 240
+"""Pixels of the figure, alone and above another one."""
 
 
 class MapCard:
@@ -296,14 +296,11 @@ class MapCard:
         self.again = style.button(
             "Compute view", self.post, lambda: self.control.compute_view(force=True), width=110, align="center"
         )  # fmt: skip
-        self.layers = pn.widgets.CheckButtonGroup(
-            options={
-                "interwell threshold": "threshold", "quasi-static threshold": "quasi",
-                "measured points": "dots", "computed windows": "windows",
-                "difference": "difference", "scatter": "scatter",
-            },
-            value=["windows"] if self.shared.other is None else ["windows", "difference"], button_type="default",
-        )  # fmt: skip
+        layers = {"threshold": "threshold", "quasi-static": "quasi", "measured": "dots", "windows": "windows"}
+        if source.skeleton.data_vars:
+            layers |= {"difference": "difference", "scatter": "scatter"}
+        given = ["windows"] if self.shared.other is None else ["windows", "difference"]
+        self.layers = pn.widgets.CheckButtonGroup(options=layers, value=given, button_type="default")
         self.hover = style.Html("\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4))
         self._selected: Markup = Markup("&nbsp;")
         self.state = style.Html("", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4))
@@ -421,9 +418,9 @@ class MapCard:
     def layout(self) -> Any:
         """The card."""
         return pn.Column(
-            pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder,
+            pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder, self.scatter_box,
             self.state, self.key, self.hover, self.typed,
-            pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0), self.scatter_box,
+            pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0),
             sizing_mode="stretch_width", css_classes=["card"],
         )  # fmt: skip
 
@@ -491,6 +488,8 @@ class MapCard:
         self._draw_dots("dots" in layers, words)
         self._draw_marks()
         self.scatter_box.visible = "scatter" in layers
+        self.holder.css_classes = ["two"] if "scatter" in layers else []  # both are seen at a time
+        self.view.plot.height = _LOW if "scatter" in layers else _HEIGHT
         if "scatter" in layers:
             self.scatter = self.scatter or ScatterView(self)
             self.scatter.fill()

@@ -34,7 +34,7 @@ class ScatterView:
         for each in self.choice:
             each.param.watch(lambda _: card.post(self.fill), "value")
         tools = {"tools": "box_select,lasso_select,pan,wheel_zoom,reset", "active_drag": "box_select"}
-        self.plot = style.figure(look, name="scatter-plot", height=280, **tools)
+        self.plot = style.figure(look, name="scatter-plot", height=200, used=390, share=0.5, **tools)
         faint = {"nonselection_fill_alpha": 0.12, "nonselection_line_alpha": 0.0}
         self.plot.scatter("a", "b", color="color", source=self.points, size=5, **faint)
         self.words = style.Html("", sizing_mode="stretch_width", css_classes=["scatter-words"])
