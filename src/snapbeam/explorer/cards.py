@@ -325,12 +325,12 @@ class MapCard:
         }
         if len(labels) < points.size:
             labels = {repr(value): at for at, value in enumerate(points.tolist())}
-        words, unit = self.source.label(name)
-        title = f"{words} ({unit})" if unit != "1" else words
         value = self._place(name, address) or 0
         # this one of Panel's widgets shows its name and its labels as HTML
         options = {str(escape(label)): at for label, at in labels.items()}
-        return pn.widgets.DiscreteSlider(name=str(escape(title)), options=options, value=value, width=240)
+        return pn.widgets.DiscreteSlider(
+            name=str(escape(self.source.title(name))), options=options, value=value, width=240
+        )
 
     def _place(self, name: str, address: Address) -> int | None:
         """Which point of an axis that is not shown an address describes; None if it does not, or is of another map."""
@@ -468,9 +468,7 @@ class MapCard:
             values = None
             words.append(str(error))
         limits = self._limits(name, values)
-        label, unit = self.source.label(name)
-        title = f"{label}{'' if unit == '1' else f' ({unit})'}"
-        title = "" if name == "response_class" else title
+        title = "" if name == "response_class" else self.source.title(name)
         if self.source.is_list and values is not None:
             self.view.show_list(self.plane.x.at, self.plane.y.at, name, values, limits, title)
         else:
@@ -528,8 +526,7 @@ class MapCard:
         except InputError as error:
             return None, str(error)
         names = ("computed", self.source.name) if other is None else (self.source.name, other.name)
-        label, unit = self.source.label(name)
-        return found, f"{label}{'' if unit == '1' else f' ({unit})'}: {names[0]} minus {names[1]}"
+        return found, f"{self.source.title(name)}: {names[0]} minus {names[1]}"
 
     @property
     def shown_plane(self) -> maps.Plane | None:
@@ -954,16 +951,7 @@ class SystemCard:
             self.refuse(str(error))
 
     def _given(self, content: bytes | None) -> None:
-        if not content:
-            return
-        if len(content) > jobs.UPLOAD:
-            self.refuse(jobs.too_large("the file", len(content)))
-            return
-
-        def done(config: Config | None, error: str) -> None:
-            self.page.post(lambda: self.refuse(error) if config is None else self._open(config))
-
-        self.page.shared.jobs.run(lambda _: _uploaded_config(content), done, jobs.Token())
+        _read_upload(self, "the file", content, _uploaded_config, self._open)
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
@@ -1015,7 +1003,7 @@ def changed_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
         elif isinstance(value, (list, tuple, dict, np.ndarray)):
             found[title] = None
         elif name == "contact.type":
-            found[f"Contact law: {_LAWS.get(value, str(value).replace('_', ' '))}"] = None
+            found[f"Contact law: {_LAWS.get(str(value), str(value).replace('_', ' '))}"] = None
         elif value is not None and (section in sections[0] or row is None or value != row.default):
             unit = "" if row is None or row.quantity.unit == "1" else f" {row.quantity.unit}"
             found[f"{title}: {key.replace('_', ' ')} {maps.brief(value)}{unit}"] = None
@@ -1290,15 +1278,7 @@ class TakeCard:
         self._make("window", ".nc", partial(write_netcdf, window_dataset(windows[-1])))
 
     def _dots(self, content: bytes | None) -> None:
-        if not content:
-            return
-        if len(content) > jobs.UPLOAD:
-            self.refuse(jobs.too_large("the table", len(content)))
-            return
         page, attrs = self.page, self.page.card.source.attrs
-
-        def done(dots: Any, error: str) -> None:
-            page.post(lambda: self.refuse(error) if dots is None else tell(dots))
 
         def tell(dots: Any) -> None:
             page.card.dots = dots
@@ -1306,7 +1286,7 @@ class TakeCard:
             page.card.layers.value = list(dict.fromkeys([*page.card.layers.value, "dots"]))
             page.card.redraw()
 
-        page.shared.jobs.run(lambda _: _uploaded_points(content, attrs), done, jobs.Token())
+        _read_upload(self, "the table", content, partial(_uploaded_points, attrs=attrs), tell)
 
 
 _RATE = 44_100
@@ -1318,6 +1298,24 @@ def write_sound(time: NDArray[np.float64], velocity: NDArray[np.float64], path: 
     series = np.interp(even, time, velocity)
     loudest = float(np.abs(series).max(initial=0.0)) or 1.0
     wavfile.write(path, _RATE, np.round(32767.0 / loudest * series).astype(np.int16))
+
+
+def _read_upload(
+    card: SystemCard | TakeCard,
+    what: str,
+    content: bytes | None,
+    read: Callable[[bytes], Any],
+    use: Callable[[Any], None],
+) -> None:
+    """Read a file that was given to a card, beside the page, and use what it holds; say why if it cannot be read."""
+    if content and len(content) > jobs.UPLOAD:
+        card.refuse(jobs.too_large(what, len(content)))
+    elif content:
+
+        def done(found: Any, error: str) -> None:
+            card.page.post(lambda: card.refuse(error) if found is None else use(found))
+
+        card.page.shared.jobs.run(lambda _: read(content), done, jobs.Token())
 
 
 def _uploaded_config(content: bytes) -> Config:

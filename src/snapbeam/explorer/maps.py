@@ -207,8 +207,7 @@ class Source:
 
     def scalars(self) -> dict[str, Any]:
         """Dimensions of one point, and coordinates that hold throughout, by name."""
-        found = {str(name): item.values.item() for name, item in self.skeleton.coords.items() if item.size == 1}
-        return found
+        return {str(name): item.values.item() for name, item in self.skeleton.coords.items() if item.size == 1}
 
     def variables(self) -> list[str]:
         """Variables that can be shown, the response class first."""
@@ -227,6 +226,11 @@ class Source:
             return str(attrs.get("long_name", name)), str(attrs.get("units", "1"))
         row = sb.STATISTICS.get(name)
         return (name, "1") if row is None else (row.long_name, row.unit)
+
+    def title(self, name: str) -> str:
+        """Long name of a variable or an axis, with its unit."""
+        words, unit = self.label(name)
+        return words if unit == "1" else f"{words} ({unit})"
 
     def values(self, name: str) -> xr.DataArray | None:
         """A number over the parameters, in memory; None if there are no numbers yet.
@@ -596,14 +600,9 @@ def plain_symbol(text: str) -> str:
     """A symbol as a browser shows it without mathematics."""
     for sign, letter in _SIGNS.items():
         text = text.replace(sign, letter)
-    return (
-        text.replace(r"\mathrm", "")
-        .replace("_s", "ₛ")
-        .replace("_{s}", "ₛ")
-        .replace("{", "")
-        .replace("}", "")
-        .replace("\\", "")
-    )
+    for sign, letter in ((r"\mathrm", ""), ("_s", "ₛ"), ("_{s}", "ₛ"), ("{", ""), ("}", ""), ("\\", "")):
+        text = text.replace(sign, letter)
+    return text
 
 
 @dataclass(frozen=True, eq=False)

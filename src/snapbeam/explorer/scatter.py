@@ -73,8 +73,7 @@ class ScatterView:
             "color": colors if kinds is not None else [card.look.accent] * a.size,
         }
         for axis, each in zip(self.plot.axis, self.choice, strict=True):
-            label, unit = card.source.label(each.value)
-            axis.axis_label = f"{label}{'' if unit == '1' else f' ({unit})'}"
+            axis.axis_label = card.source.title(each.value)
         if self._marked is not card.view:
             self._marked = card.view
             card.view.mark_selected(self.points)
