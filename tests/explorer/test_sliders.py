@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import wave
 from urllib.parse import parse_qs
 
@@ -10,11 +11,13 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.explorer.cards import write_sound
+from snapbeam.explorer.jobs import Cancelled
 from snapbeam.explorer.maps import opened, python_lines
 from snapbeam.model.parameter_file import Config
 
 pytest.importorskip("panel")
 
+from snapbeam.explorer.map_view import MapView
 from snapbeam.explorer.page import Page
 from snapbeam.explorer.shared import Shared
 
@@ -32,6 +35,27 @@ class _Now:
 
     def close(self):
         """Nothing is left."""
+
+
+class _Held(_Now):
+    """Jobs that are done when a test says so."""
+
+    turn = staticmethod(lambda token: contextlib.nullcontext())
+
+    def __init__(self):
+        self.waiting = []
+
+    def run(self, work, done, token):
+        self.waiting.append((work, done, token))
+
+    window = run
+
+    def work(self):
+        """Do all that is wanted."""
+        while self.waiting:
+            work, done, token = self.waiting.pop(0)
+            with contextlib.suppress(Cancelled):
+                done(work(token), "")
 
 
 @pytest.fixture
@@ -79,6 +103,65 @@ def test_the_lines_of_python_draw_the_view_that_is_seen(page, tmp_path, monkeypa
     again = sb.load(tmp_path / "run.nc")
     assert again.summary.zero_crossings == view.run.summary.zero_crossings
     np.testing.assert_array_equal(again.dataset["time"][0], view.run.dataset["time"][0])
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+def test_a_slider_that_returns_shows_the_run_of_the_point_again(page):
+    page.ask(page.card.point(1.0, 0.2))
+    card, own = page.system_card(), page.runs[0].run.summary
+    card.vary.value = "beam.thickness"
+    held = card.slider.value
+    for value in (1.2 * held, held):
+        card.slider.value = value
+    assert page.runs[0].run.integration.cycles == 30
+    card._released(held)
+    again = page.runs[0].run
+    assert page.changes == {} and again.integration.cycles == 40 and again.summary.peak_force == own.peak_force
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+@pytest.mark.parametrize("way", ["fields", "back"])
+def test_run_and_export_of_a_changed_system_are_old_until_it_is_computed(page, way):
+    page.ask(page.card.point(1.0, 0.2))
+    take, view = page.take_card(), page.runs[0]
+    page.write_address()
+    before = page._search()
+    assert view.current is not None and "snapbeam simulate" in take.text.object
+    page.shared.jobs = held = _Held()
+    if way == "fields":
+        page.system_card().fields["beam.thickness"].value = "0.0005"
+        page.system_card().apply()
+        assert "Beam: thickness 0.0005 m" in page.old.object
+    else:
+        page._went(f"{before}&set=beam.thickness:0.0005")
+    assert view.current is None and view.tabs.css_classes == ["stale"], "Numbers is one of the tabs"
+    assert "is old" in take.text.object and "snapbeam simulate" not in take.text.object
+    take.buttons["WAV"].clicks += 1
+    assert "is old" in take.words.object
+    held.work()
+    assert view.current.system.parameters["beam.thickness"] == 0.0005 and view.tabs.css_classes == []
+    assert "snapbeam simulate" in take.text.object
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+def test_a_window_that_was_stopped_goes_on_to_its_end_when_asked(page, monkeypatch):
+    monkeypatch.setattr(MapView, "pixels", (81, 81))
+    monkeypatch.setattr("snapbeam.explorer.cards._WAIT", 0.0)
+    page.shared.jobs = held = _Held()
+    control, card = page.card.control, page.card
+    control.compute_view()
+    held.work()
+    assert "Compute view continues" in card.state.object, "a long level is a question"
+    control.compute_view(force=True)
+    control.halt()
+    held.work()
+    (window,) = card.windows()
+    assert "stopped" in card.state.object and not window.finished and not card.stop.visible
+    control.compute_view()  # the figure got another size
+    assert not held.waiting, "nothing goes on unasked"
+    control.compute_view(force=True)
+    held.work()
+    assert window.finished and card.windows() == [window] and "continues" not in card.state.object
 
 
 def _state(page):

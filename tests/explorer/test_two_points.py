@@ -56,13 +56,19 @@ def test_changes_are_told_in_the_words_of_the_fields():
     pytest.importorskip("panel")
     from snapbeam.explorer.cards import changed_words
 
-    changes = {
-        "beam.thickness": 0.0005, "model.modes": 1, "integration": None, "contact": None, "imperfection.shape": [0.0, 0.1],
-        "drive.phase": None,
+    before = {
+        "beam.thickness": 4e-4, "contact.type": "hertz", "contact.stiffness": 4e8, "integration.cycles": 30, "force.amplitude": 1.0,
+        "imperfection.shape": [0.0, 0.0], "integration.step": None,
     }  # fmt: skip
-    words = changed_words(changes)
-    assert words == (
-        "Beam: thickness 0.0005 m, Reduced model: modes 1, default integration, no contact, Imperfection, Drive: phase the default"
-    )
-    many = changed_words({f"model.name_{at}": at for at in range(9)})
-    assert many.endswith("and 3 more") and "none" not in words + many
+    after = {
+        "beam.thickness": 5e-4, "contact.type": "restitution", "contact.coefficient": 0.6, "integration.cycles": 200,
+        "imperfection.shape": [0.0, 0.1], "integration.step": None, "base_excitation.phase": 0.0, "base_excitation.type": "sine",
+    }  # fmt: skip
+    words = changed_words(before, after)
+    assert words.startswith("Beam: thickness 0.0005 m, Contact law: coefficient of restitution, ")
+    assert "Integration: cycles 200" in words and "no external force" in words and ", Imperfection" in words
+    assert "Contact: coefficient 0.6" in words and "phase" not in words
+    assert not any(word in words for word in ("None", "default", "stiffness", "[", "step"))
+    assert changed_words(after, after) == ""
+    many = {f"model.name_{at}": at for at in range(9)}
+    assert changed_words({"model.modes": 1}, many | {"model.modes": 1}).endswith("and 3 more")

@@ -25,6 +25,7 @@ from snapbeam.explorer import jobs, maps, style
 from snapbeam.explorer.address import Address, typed
 from snapbeam.explorer.map_view import MapView
 from snapbeam.explorer.run_view import across, within
+from snapbeam.explorer.scatter import ScatterView
 from snapbeam.explorer.shared import Shared
 from snapbeam.model.parameter_axes import CHANGES_UNITS
 from snapbeam.model.parameter_file import Config, config_from_mapping
@@ -61,9 +62,12 @@ class WindowControl:
     def __init__(self, card: MapCard) -> None:
         self.card = card
         self._token: jobs.Token | None = None
+        self._key: Any = None
         self._moved, self._pushed = 0, 0.0
         self._asked: set[Any] = set()
         """Keys of the windows that were asked for: they are computed to their end."""
+        self._halted: set[Any] = set()
+        """Keys of the windows that were stopped: they go on when they are asked for."""
         self._awake = False
         self._waiting = jobs.Waiting(card.later)
 
@@ -120,6 +124,9 @@ class WindowControl:
         key = (self.card.plane_key, bounds)
         if force:
             self._asked.add(key)
+            self._halted.discard(key)
+        elif key in self._halted:
+            return
         seconds = math.inf if key in self._asked else _WAIT
         self.cancel("")
         self.card.own.add(key)
@@ -142,6 +149,7 @@ class WindowControl:
             self.card.tell("" if window.finished or not force else "the map is as fine as the screen shows")
             return
         self._token = token = jobs.Token(jobs.WINDOW_SECONDS)
+        self._key = key
         self.card.stop.visible = True
         self.card.tell("computing this view")
         self._waiting.begin(0, self._still)
@@ -197,6 +205,11 @@ class WindowControl:
                 words = f"window: {window.done} of {window.wanted} points; Compute view continues"
             self.card.tell(words or f"window: all {window.wanted} points computed")
 
+    def halt(self) -> None:
+        """Stop the window, until it is asked for."""
+        self._halted.add(self._key)
+        self.cancel("stopped")
+
     def cancel(self, words: str) -> None:
         """Compute no window any more."""
         if self._token is not None:
@@ -215,8 +228,8 @@ def _duration(seconds: float) -> str:
 # ----------------------------------------------------------------------------------------------------
 
 
-_HEIGHT = 345
-"""Pixels of the figure."""
+_HEIGHT, _LOW = 345, 240
+"""Pixels of the figure, alone and above another one."""
 
 
 class MapCard:
@@ -237,6 +250,10 @@ class MapCard:
         self.own: set[Any] = set()
         """Keys of the windows that this page requested; those of other tabs are not drawn over its map."""
         self._drawn: list[tuple[maps.Window, NDArray[np.int8]]] = []
+        self._apart: NDArray[np.float64] | None = None
+        """The difference of two maps, of shape (y, x), if it is shown."""
+        self._said = ""
+        """The legend of the difference, or the reason why there is none."""
         self._words = list(address.words)
         self._restoring = False
         self._make_controls(address)
@@ -274,18 +291,16 @@ class MapCard:
         self.auto = pn.widgets.Checkbox(name="compute the view automatically", value=True, align="center")
         hidden: dict[str, Any] = {"visible": False, "align": "center"}
         self.stop = style.button(
-            "Stop", self.post, lambda: self.control.cancel("stopped"), button_type="warning", width=70, **hidden
+            "Stop", self.post, lambda: self.control.halt(), button_type="warning", width=70, **hidden
         )
         self.again = style.button(
             "Compute view", self.post, lambda: self.control.compute_view(force=True), width=110, align="center"
         )  # fmt: skip
-        self.layers = pn.widgets.CheckButtonGroup(
-            options={
-                "interwell threshold": "threshold", "quasi-static threshold": "quasi",
-                "measured points": "dots", "computed windows": "windows",
-            },
-            value=["windows"], button_type="default",
-        )  # fmt: skip
+        layers = {"threshold": "threshold", "quasi-static": "quasi", "measured": "dots", "windows": "windows"}
+        if source.skeleton.data_vars:
+            layers |= {"difference": "difference", "scatter": "scatter"}
+        given = ["windows"] if self.shared.other is None else ["windows", "difference"]
+        self.layers = pn.widgets.CheckButtonGroup(options=layers, value=given, button_type="default")
         self.hover = style.Html("\xa0", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4))
         self._selected: Markup = Markup("&nbsp;")
         self.state = style.Html("", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4))
@@ -298,6 +313,8 @@ class MapCard:
             slider.param.watch(lambda _: None if self._restoring else self.post(self._cut_changed), "value")
         self.auto.visible = self.again.visible = not source.is_list
         self.slider_box = pn.FlexBox(margin=0)
+        self.scatter: ScatterView | None = None
+        self.scatter_box = pn.Column(sizing_mode="stretch_width", margin=0)
         self.typed = pn.FlexBox(margin=0)
         """Fields of a point."""
 
@@ -308,12 +325,12 @@ class MapCard:
         }
         if len(labels) < points.size:
             labels = {repr(value): at for at, value in enumerate(points.tolist())}
-        words, unit = self.source.label(name)
-        title = f"{words} ({unit})" if unit != "1" else words
         value = self._place(name, address) or 0
         # this one of Panel's widgets shows its name and its labels as HTML
         options = {str(escape(label)): at for label, at in labels.items()}
-        return pn.widgets.DiscreteSlider(name=str(escape(title)), options=options, value=value, width=240)
+        return pn.widgets.DiscreteSlider(
+            name=str(escape(self.source.title(name))), options=options, value=value, width=240
+        )
 
     def _place(self, name: str, address: Address) -> int | None:
         """Which point of an axis that is not shown an address describes; None if it does not, or is of another map."""
@@ -401,7 +418,7 @@ class MapCard:
     def layout(self) -> Any:
         """The card."""
         return pn.Column(
-            pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder,
+            pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder, self.scatter_box,
             self.state, self.key, self.hover, self.typed,
             pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0),
             sizing_mode="stretch_width", css_classes=["card"],
@@ -451,9 +468,7 @@ class MapCard:
             values = None
             words.append(str(error))
         limits = self._limits(name, values)
-        label, unit = self.source.label(name)
-        title = f"{label}{'' if unit == '1' else f' ({unit})'}"
-        title = "" if name == "response_class" else title
+        title = "" if name == "response_class" else self.source.title(name)
         if self.source.is_list and values is not None:
             self.view.show_list(self.plane.x.at, self.plane.y.at, name, values, limits, title)
         else:
@@ -470,6 +485,13 @@ class MapCard:
         self.view.show_threshold(kinds)
         self._draw_dots("dots" in layers, words)
         self._draw_marks()
+        self.scatter_box.visible = "scatter" in layers
+        self.holder.css_classes = ["two"] if "scatter" in layers else []  # both are seen at a time
+        self.view.plot.height = _LOW if "scatter" in layers else _HEIGHT
+        if "scatter" in layers:
+            self.scatter = self.scatter or ScatterView(self)
+            self.scatter.fill()
+            self.scatter_box.objects = [self.scatter.layout]
         if any(words):
             self._words = [each for each in words if each]
         self.tell()
@@ -477,14 +499,34 @@ class MapCard:
 
     def show_windows(self) -> None:
         """Draw the windows over the map."""
-        shown = self.windows() if "windows" in self.layers.value or not self.source.skeleton.data_vars else []
+        layers, held = set(self.layers.value), bool(self.source.skeleton.data_vars)
+        shown = self.windows() if layers & {"windows", "difference"} or not held else []
         if shown and self.show.value != "response_class" and not self.source.skeleton.data_vars:
             known = [w.values[self.show.value][w.stride > 0] for w in shown if self.show.value in w.values]
             self.view.limits = _span(np.concatenate(known)) if known else (0.0, 1.0)
             low, high = self.view.limits
             self.view.mapper.update(low=low, high=max(high, low + 1e-300))
         self._drawn = self.view.show_windows(shown, self.show.value, self.shown_plane)
+        self._apart, words = self._difference() if "difference" in layers else (None, "")
+        if self._apart is not None:
+            most = float(np.nanmax(np.abs(self._apart), initial=0.0)) or 1.0
+            self.view.show(style.DIFFERENCE, self._apart, (-most, most), words)
+            self.view.fade(False)
+            self.view.show_windows([], "", None)
+        self._said = words if self._apart is None else self._said
         self._legend()
+
+    def _difference(self) -> tuple[NDArray[np.float64] | None, str]:
+        """The difference from the other map, or of what was computed from the map, and its title; None and a reason."""
+        other, name = None if self.changed else self.shared.other, self.show.value
+        if self.source.is_list or not self.source.skeleton.data_vars or (other is None and not self.changed):
+            return None, "a difference needs two maps: start with --against, or change the system of a map"
+        try:
+            found, self._said = maps.apart(self.plane, name, other, self._drawn)
+        except InputError as error:
+            return None, str(error)
+        names = ("computed", self.source.name) if other is None else (self.source.name, other.name)
+        return found, f"{self.source.title(name)}: {names[0]} minus {names[1]}"
 
     @property
     def shown_plane(self) -> maps.Plane | None:
@@ -520,8 +562,8 @@ class MapCard:
 
     def _legend(self) -> None:
         """Name the classes, with the share of the area in view that each has as it is drawn."""
-        if self.show.value != "response_class":
-            self.key.object = ""
+        if self._said or self.show.value != "response_class":
+            self.key.object = Markup('<div class="key">{}</div>').format(self._said) if self._said else ""
             return
         shares = self._shares()
         items = []
@@ -632,7 +674,10 @@ class MapCard:
             self.hover.object = self._selected
             return
         point = self.point(x, y)
-        self.hover.object = self._readout(point.words(), self._held(point, x, y))
+        held = self._held(point, x, y)
+        if self._apart is not None:
+            held = held | {style.DIFFERENCE: float(self._apart[self.plane.index(x, y)])}
+        self.hover.object = self._readout(point.words(), held)
 
     def _held(self, point: maps.Point, x: float, y: float) -> dict[str, Any]:
         """The class, the shown variable and two more of the cell at a location."""
@@ -660,7 +705,7 @@ class MapCard:
             held = {}
         if "response_class" in held:
             parts.append(Markup("<b>{}</b>").format(ResponseClass(int(held["response_class"])).label))
-        for each in dict.fromkeys((self.show.value, "zero_crossings", "peak_force")):
+        for each in dict.fromkeys((style.DIFFERENCE, self.show.value, "zero_crossings", "peak_force")):
             if each in held and each != "response_class":
                 unit = self.source.label(each)[1]
                 parts.append(f"{each.replace('_', ' ')} {held[each]:.5g}{'' if unit == '1' else f' {unit}'}")
@@ -780,7 +825,7 @@ class SystemCard:
 
     def _vary(self) -> None:
         """Let the slider hold the chosen parameter, from half of its value to one and a half."""
-        held, rows = self._held(), parameters()
+        held, rows = maps.held_values(self.system, self.integration), parameters()
         numbers = [name for name in self.fields if isinstance(held.get(name), (int, float)) and held[name]]
         self.vary.options = {"": ""} | {
             name.replace("_", " "): name for name in numbers if rows[name].quantity.kind is not bool
@@ -804,19 +849,14 @@ class SystemCard:
 
     def _released(self, value: float) -> None:
         self.page.drag({})
-        if value != self._varied:
-            self._use({str(self.vary.value): parameters()[self.vary.value].quantity.kind(value)})
+        name = str(self.vary.value)  # back at its place, the run that was shown before is computed again
+        self._use({name: parameters()[name].quantity.kind(value)} if value != self._varied else {})
 
     def _edited(self) -> dict[str, Any]:
         return {name: each.value for name, each in self.fields.items() if each.value != self._filled[name]}
 
-    def _held(self) -> dict[str, Any]:
-        """Values of the parameters of the system and of its integration, by dotted name."""
-        how = maps.integration_mapping(self.integration) | {"cycles": self.integration.cycles_or_default}
-        return dict(self.system.parameters) | {f"integration.{name}": value for name, value in how.items()}
-
     def _make_fields(self, typed: Mapping[str, Any]) -> None:
-        held = self._held()
+        held = maps.held_values(self.system, self.integration)
         rows = self._rows()
         if [row.name for row in rows] != list(self.fields):
             self.fields = {row.name: self._field(row) for row in rows}
@@ -911,16 +951,7 @@ class SystemCard:
             self.refuse(str(error))
 
     def _given(self, content: bytes | None) -> None:
-        if not content:
-            return
-        if len(content) > jobs.UPLOAD:
-            self.refuse(jobs.too_large("the file", len(content)))
-            return
-
-        def done(config: Config | None, error: str) -> None:
-            self.page.post(lambda: self.refuse(error) if config is None else self._open(config))
-
-        self.page.shared.jobs.run(lambda _: _uploaded_config(content), done, jobs.Token())
+        _read_upload(self, "the file", content, _uploaded_config, self._open)
 
     def refuse(self, words: str) -> None:
         """Say what cannot be done."""
@@ -954,21 +985,28 @@ class SystemCard:
         self.facts.object = Markup('<table class="facts"><tr>{}</tr></table>{}').format(cells, doubts)
 
 
-def changed_words(changes: Mapping[str, Any]) -> str:
-    """Changed parameters in the words of their fields; of a section with lists, and of one that is gone, its title."""
+def changed_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """Parameters that differ, in the words of their fields and with their values.
+
+    Lists, and sections that are gone, are told by their titles; defaults of a new section are not told.
+    """
     found: dict[str, None] = {}
-    for name, value in changes.items():
-        section, key = split_name(name)
-        title = _SECTIONS.get(section.partition(".")[0], section.replace("_", " "))
-        if isinstance(value, (list, tuple, dict)):
+    sections = [{split_name(name)[0] for name in each} for each in (before, after)]
+    for name in dict.fromkeys([*before, *after]):
+        value, (section, key), row = after.get(name), split_name(name), parameters().get(name)
+        root = section.partition(".")[0]
+        title = _SECTIONS.get(_group(row) if row else root, root.replace("_", " "))
+        if maps.plain(before.get(name)) == maps.plain(value):
+            continue
+        if section not in sections[1]:
+            found[f"no {_SECTIONS.get(root, root).lower()}"] = None
+        elif isinstance(value, (list, tuple, dict, np.ndarray)):
             found[title] = None
-        elif key:
-            row = parameters().get(name)
-            unit = "" if row is None or row.quantity.unit == "1" or value is None else f" {row.quantity.unit}"
-            text = "the default" if value is None else maps.brief(value)
-            found[f"{title}: {key.replace('_', ' ')} {text}{unit}"] = None
-        else:
-            found[f"default {title.lower()}" if section in _ALWAYS else f"no {title.lower()}"] = None
+        elif name == "contact.type":
+            found[f"Contact law: {_LAWS.get(str(value), str(value).replace('_', ' '))}"] = None
+        elif value is not None and (section in sections[0] or row is None or value != row.default):
+            unit = "" if row is None or row.quantity.unit == "1" else f" {row.quantity.unit}"
+            found[f"{title}: {key.replace('_', ' ')} {maps.brief(value)}{unit}"] = None
     more = f" and {len(found) - 6} more" if len(found) > 6 else ""
     return ", ".join(list(found)[:6]) + more
 
@@ -1240,15 +1278,7 @@ class TakeCard:
         self._make("window", ".nc", partial(write_netcdf, window_dataset(windows[-1])))
 
     def _dots(self, content: bytes | None) -> None:
-        if not content:
-            return
-        if len(content) > jobs.UPLOAD:
-            self.refuse(jobs.too_large("the table", len(content)))
-            return
         page, attrs = self.page, self.page.card.source.attrs
-
-        def done(dots: Any, error: str) -> None:
-            page.post(lambda: self.refuse(error) if dots is None else tell(dots))
 
         def tell(dots: Any) -> None:
             page.card.dots = dots
@@ -1256,7 +1286,7 @@ class TakeCard:
             page.card.layers.value = list(dict.fromkeys([*page.card.layers.value, "dots"]))
             page.card.redraw()
 
-        page.shared.jobs.run(lambda _: _uploaded_points(content, attrs), done, jobs.Token())
+        _read_upload(self, "the table", content, partial(_uploaded_points, attrs=attrs), tell)
 
 
 _RATE = 44_100
@@ -1268,6 +1298,24 @@ def write_sound(time: NDArray[np.float64], velocity: NDArray[np.float64], path: 
     series = np.interp(even, time, velocity)
     loudest = float(np.abs(series).max(initial=0.0)) or 1.0
     wavfile.write(path, _RATE, np.round(32767.0 / loudest * series).astype(np.int16))
+
+
+def _read_upload(
+    card: SystemCard | TakeCard,
+    what: str,
+    content: bytes | None,
+    read: Callable[[bytes], Any],
+    use: Callable[[Any], None],
+) -> None:
+    """Read a file that was given to a card, beside the page, and use what it holds; say why if it cannot be read."""
+    if content and len(content) > jobs.UPLOAD:
+        card.refuse(jobs.too_large(what, len(content)))
+    elif content:
+
+        def done(found: Any, error: str) -> None:
+            card.page.post(lambda: card.refuse(error) if found is None else use(found))
+
+        card.page.shared.jobs.run(lambda _: read(content), done, jobs.Token())
 
 
 def _uploaded_config(content: bytes) -> Config:

@@ -25,6 +25,10 @@ def explore(
         Path | None,
         typer.Option("--config", help="TOML file of the initial system, if no map is given.", metavar="FILE"),
     ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option("--against", help="Another map, whose difference from the first is shown.", metavar="MAP"),
+    ] = None,
     port: Annotated[
         int | None,
         typer.Option(help="Port; by default 8760 or the next free one; 0 for any free one.", min=0, max=65535),
@@ -76,7 +80,7 @@ def explore(
     with contextlib.suppress(KeyboardInterrupt):  # the server may also end by itself at Ctrl+C
         serve(
             file, address=address, port=port, allow_remote=allow_remote, token=token, system=system,
-            integration=integration, ready=ready,
+            integration=integration, against=against, ready=ready,
         )  # fmt: skip
     out().print("stopped")
     raise typer.Exit(INTERRUPTED)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam import ResponseClass
 from snapbeam.explorer.maps import Axis, Plane, Window, picture, visible_strides
-from snapbeam.explorer.style import Look, colors_of, columns, figure, inner_size, sequential, style_axis
+from snapbeam.explorer.style import Look, colors_of, colors_of_numbers, columns, figure, inner_size, style_axis
 from snapbeam.model import quasi_static_threshold
 from snapbeam.plot.style import CLASS_COLORS
 
@@ -26,6 +26,10 @@ probe.data = {x: [cb_obj.x], y: [cb_obj.y]};
 """
 _IMAGE = ("image", "x", "y", "dw", "dh")
 _QUASI_STATIC = {"frequency_ratio", "velocity_amplitude", "location"}
+
+
+def _palette(name: str) -> list[str]:
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b, _ in colors_of_numbers(name)]
 
 
 class MapView:
@@ -69,9 +73,7 @@ class MapView:
             "x", "y", "text", source=self.mark, x_offset="away", y_offset=-6, text_align="align", text_color="#ffffff",
             text_outline_color="#000000", text_font_style="bold", text_font_size=look.font(14),
         )  # fmt: skip
-        self.mapper = models.LinearColorMapper(
-            palette=[f"#{r:02x}{g:02x}{b:02x}" for r, g, b, _ in sequential()], low=0.0, high=1.0
-        )
+        self.mapper = models.LinearColorMapper(palette=_palette(""), low=0.0, high=1.0)
         self.bar = models.ColorBar(
             color_mapper=self.mapper, visible=False, width=10, padding=4, label_standoff=5,
             background_fill_color=look.card, major_label_text_color=look.text, bar_line_color=look.faint,
@@ -176,7 +178,8 @@ class MapView:
     def _scale(self, name: str, limits: tuple[float, float], title: str) -> None:
         """Take the limits of the colours of a variable, and its title."""
         self.limits, self.bar.visible, self.plot.title.text = limits, name != "response_class", title
-        self.mapper.update(low=limits[0], high=limits[1] if limits[1] > limits[0] else limits[0] + 1.0)
+        high = limits[1] if limits[1] > limits[0] else limits[0] + 1.0
+        self.mapper.update(palette=_palette(name), low=limits[0], high=high)
 
     def fade(self, old: bool) -> None:
         """Show the map pale, if it is of another system than what is computed."""
@@ -221,6 +224,18 @@ class MapView:
             "away": [-10 if each[2] == "A" else 10 for each in marks],  # A left and B right of what may be one place
             "align": ["right" if each[2] == "A" else "left" for each in marks],
         }  # fmt: skip
+
+    def mark_selected(self, points: models.ColumnDataSource) -> None:
+        """Mark the selected ones of some points, and let a box in the map select."""
+        unseen = {f"{kind}{part}_alpha": 0.0 for kind in ("", "nonselection_") for part in ("fill", "line")}
+        ring = {
+            "selection_line_color": "#000000",
+            "selection_line_alpha": 1.0,
+            "selection_fill_color": "#ffffff",
+            "selection_fill_alpha": 1.0,
+        }
+        marks = self.plot.scatter("x", "y", source=points, size=6, **unseen, **ring)
+        self.plot.add_tools(models.BoxSelectTool(renderers=[marks]))
 
     def show_quasi_static(self, visible: bool, fixed: dict[str, Any]) -> str:
         """Draw V_QS1 of one mode (Eq. 21); returns the reason if it cannot be drawn."""

@@ -27,6 +27,7 @@ from snapbeam.plot.axes import edges_of, is_geometric, positions
 from snapbeam.plot.dataset import figures_of
 from snapbeam.sweeps.points import ratios_of
 from snapbeam.util.netcdf import read_result, split_group
+from snapbeam.util.proportions import proportion
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -206,8 +207,7 @@ class Source:
 
     def scalars(self) -> dict[str, Any]:
         """Dimensions of one point, and coordinates that hold throughout, by name."""
-        found = {str(name): item.values.item() for name, item in self.skeleton.coords.items() if item.size == 1}
-        return found
+        return {str(name): item.values.item() for name, item in self.skeleton.coords.items() if item.size == 1}
 
     def variables(self) -> list[str]:
         """Variables that can be shown, the response class first."""
@@ -226,6 +226,11 @@ class Source:
             return str(attrs.get("long_name", name)), str(attrs.get("units", "1"))
         row = sb.STATISTICS.get(name)
         return (name, "1") if row is None else (row.long_name, row.unit)
+
+    def title(self, name: str) -> str:
+        """Long name of a variable or an axis, with its unit."""
+        words, unit = self.label(name)
+        return words if unit == "1" else f"{words} ({unit})"
 
     def values(self, name: str) -> xr.DataArray | None:
         """A number over the parameters, in memory; None if there are no numbers yet.
@@ -595,14 +600,9 @@ def plain_symbol(text: str) -> str:
     """A symbol as a browser shows it without mathematics."""
     for sign, letter in _SIGNS.items():
         text = text.replace(sign, letter)
-    return (
-        text.replace(r"\mathrm", "")
-        .replace("_s", "ₛ")
-        .replace("_{s}", "ₛ")
-        .replace("{", "")
-        .replace("}", "")
-        .replace("\\", "")
-    )
+    for sign, letter in ((r"\mathrm", ""), ("_s", "ₛ"), ("_{s}", "ₛ"), ("{", ""), ("}", ""), ("\\", "")):
+        text = text.replace(sign, letter)
+    return text
 
 
 @dataclass(frozen=True, eq=False)
@@ -1167,16 +1167,127 @@ def drawn_shares(
         borders.append(edges)
     middles = [0.5 * (edges[1:] + edges[:-1]) for edges in borders]
     shown = np.full((middles[1].size, middles[0].size), none, dtype=np.int16)
-    pictures = [(window.edges, window.values["response_class"], stride) for window, stride in drawn]
     if kinds is not None:
-        pictures.insert(0, (own, kinds, np.ones(kinds.shape, dtype=np.int8)))
-    for cells, values, stride in pictures:
-        (across, columns), (upward, rows) = map(_inside, cells, middles)
-        part, there = np.ix_(upward, across), np.ix_(rows, columns)
-        shown[part] = np.where(stride[there] > 0, values[there], shown[part])
+        _lay(shown, middles, own, kinds, np.ones(kinds.shape, dtype=np.int8))
+    for window, stride in drawn:
+        _lay(shown, middles, window.edges, window.values["response_class"], stride)
     area = np.outer(np.diff(borders[1]), np.diff(borders[0]))
     whole = float(area[shown != none].sum())
     return {int(kind): float(area[shown == kind].sum()) / whole for kind in np.unique(shown) if kind != none}
+
+
+def _lay(
+    shown: NDArray[Any], places: list[_Array], edges: tuple[_Array, _Array], values: NDArray[Any], stride: NDArray[Any]
+) -> None:
+    """Write the values of cells over what is shown at some places across and upward, where their stride is not 0."""
+    (across, columns), (upward, rows) = map(_inside, edges, places)
+    part, there = np.ix_(upward, across), np.ix_(rows, columns)
+    shown[part] = np.where(stride[there] > 0, values[there], shown[part])
+
+
+# ----------------------------------------------------------------------------------------------------
+# The difference of a map from another one, or from what was computed of a changed system.
+
+
+def apart(
+    plane: Plane, name: str, other: Source | None, drawn: list[tuple[Window, NDArray[np.int8]]]
+) -> tuple[_Array, str]:
+    """A number of a map minus that of the *other* one, or that of the *drawn* windows minus the map's.
+
+    Returns
+    -------
+    array of shape (y, x)
+        Differences at the points of the map, those of the other one in whose cells they lie; NaN where one is unknown.
+    str
+        Number of the points that differ, and of those that differ by more than the scatter of both: the interval of the
+        difference (Newcombe, Stat. Med. 17 (1998) 873) of two estimates with intervals does not hold 0.
+
+    Raises
+    ------
+    InputError
+        If the other map has no such number, or not the cut.
+    """
+    values, cut = _known_numbers(plane, name), None if other is None else _same_cut(plane, other)
+    places = [plane.x.at, plane.y.at]
+
+    def of_other(wanted: str) -> _Array:
+        found = np.full(values.shape, np.nan)
+        if cut is not None:
+            held = _known_numbers(cut, wanted)
+            _lay(found, places, (cut.x.edges, cut.y.edges), held, np.ones(held.shape))
+        log = (plane.x.log, plane.y.log)
+        for window, stride in drawn if cut is None else []:
+            scaled = [_scaled(each, along) for each, along in zip(places, log, strict=True)]
+            _lay(found, scaled, window.edges, window.values[wanted], stride)
+        return found
+
+    beside = of_other(name)
+    found = beside - values if cut is None else values - beside
+    known = np.isfinite(found)
+    words = f"{int((found[known] != 0.0).sum())} of {int(known.sum())} points differ"
+    ends = [_limits(each, name) for each in (plane, cut) if each is not None]
+    if len(ends) == 2 and cut is not None and all(ends):
+        (low, high), (low_there, high_there) = (
+            [_known_numbers(plane, each) for each in ends[0]], [of_other(each) for each in ends[1]]
+        )  # fmt: skip
+        least = found - np.hypot(values - low, high_there - beside)
+        most = found + np.hypot(high - values, beside - low_there)
+        level = 100.0 * float(plane.source.attrs.get("confidence", 0.95))
+        words += (
+            f", {int(((least > 0.0) | (most < 0.0)).sum())} by more than the scatter of both (intervals of {level:g} %)"
+        )
+    else:
+        words += "; their scatter is not known, the values have no intervals"
+    return found, words + (f"; {int((~known).sum())} points are not in both" if not known.all() else "")
+
+
+def _known_numbers(plane: Plane, name: str) -> _Array:
+    """A number on a cut, NaN where it is not computed; also the limits of a share of replicas, ``.low`` and ``.high``."""
+    share, _, end = name.partition(".")
+    found = plane.values(share)
+    if found is None:
+        raise sb.InputError(f"{plane.source.name}: has no {share}")
+    numbers = found.astype(np.float64)
+    if end:
+        runs = int(plane.source.attrs["replicates"]) + 1
+        numbers = proportion(np.round(numbers * runs), runs)[1 if end == "low" else 2]
+    status = plane.values("status")
+    unknown = np.zeros(numbers.shape, dtype=bool) if status is None else status == sb.RunStatus.NOT_RUN
+    numbers[unknown | ((numbers < 0.0) if name == "response_class" else False)] = np.nan
+    return numbers
+
+
+def _limits(plane: Plane, name: str) -> list[str]:
+    """Names of the limits of a number; empty if it has none."""
+    layers = plane.source.layers
+    if layers[name].variable == "class_fraction" and "replicates" in plane.source.attrs:
+        return [f"{name}.low", f"{name}.high"]
+    names = {each: each for each in layers}
+    found = [_partner(layers, layers[name], f"{layers[name].variable}_{end}", names) for end in ("low", "high")]
+    return found if all(found) else []
+
+
+def _same_cut(plane: Plane, other: Source) -> Plane:
+    """The cut through another map at the same values; refused (InputError) if it has not the axes or the values."""
+    source, fixed = plane.source, {}
+    for name in other.dims:
+        if name in (plane.x.name, plane.y.name):
+            continue
+        points, value = other.coordinate(name), None
+        if name in source.skeleton.coords:
+            value = source.coordinate(name)[plane.fixed.get(name, 0)]
+            same = np.isclose(points, value) if points.dtype.kind in "iuf" else points == value
+            fixed[name] = int(np.argmax(same))
+        if value is None or not same.any():
+            raise sb.InputError(f"{other.name}: has no {name} = {value}, at which this map is seen")
+    try:
+        cut = Plane.of(other, plane.x.name, plane.y.name, fixed)
+    except sb.InputError as error:
+        raise sb.InputError(f"{other.name}: {error}") from None
+    for axis, there in ((plane.x, cut.x), (plane.y, cut.y)):
+        if axis.words != there.words:
+            raise sb.InputError(f"{other.name}: has other values of {axis.name}")
+    return cut
 
 
 def _middle(at: int, stride: int) -> int:
@@ -1389,9 +1500,15 @@ def patched(sections: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str
     return {section: values for section, values in found.items() if values}
 
 
+def held_values(system: sb.System, integration: sb.Integration) -> dict[str, Any]:
+    """Values of the parameters of a system and of its integration, by dotted name."""
+    how = integration_mapping(integration) | {"cycles": integration.cycles_or_default}
+    return dict(system.parameters) | {f"integration.{name}": value for name, value in how.items()}
+
+
 def values_of(names: Iterable[str], system: sb.System, integration: sb.Integration) -> dict[str, Any]:
     """The values of some parameters, also in physical units, by dotted name; without those that a system has not."""
-    held = dict(system.parameters) | {"integration.cycles": integration.cycles_or_default}
+    held = held_values(system, integration)
     found = {}
     for name in names:
         value = held.get(PHYSICAL[name].parameter if name in PHYSICAL else name)

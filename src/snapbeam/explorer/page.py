@@ -199,6 +199,10 @@ class Page(jobs.Tab):
             self._take.refresh()
         return self._take
 
+    def _refresh_take(self) -> None:
+        if self._take is not None:
+            self._take.refresh()
+
     def close(self) -> None:
         """The tab is closed: compute nothing for it any more."""
         super().close()
@@ -357,14 +361,14 @@ class Page(jobs.Tab):
         if found is None:
             view.fail(f"{self._words(which)}: {error}")
             self._pair()
+            self._refresh_take()
             return
         view.show(found.run, self._words(which))
         self._pair()
         view.say("map", found.words, bad=not found.same)
         view.say("chances", found.chances)
         view.say("conditioning", "")
-        if self._take is not None:
-            self._take.refresh()
+        self._refresh_take()
         self._condition(which, point, found.run, token)
 
     def _condition(self, which: int, point: maps.Point, run: Run, token: jobs.Token) -> None:
@@ -423,10 +427,8 @@ class Page(jobs.Tab):
         for which in sorted({0, 1}, key=lambda each: each == self.which):
             point = self.points[which]
             if point is not None:
-                self.runs[which].outdate()
                 self.ask(maps.Point(point.values), which)
-        if self._take is not None:
-            self._take.refresh()
+        self._refresh_take()
         self.write_address()
 
     def _adopt(self, changes: Mapping[str, Any]) -> None:
@@ -438,7 +440,13 @@ class Page(jobs.Tab):
             system, integration = maps.system_from(maps.patched(maps.sections_of(system, integration), changes))
         self.changes = dict(changes)
         self.card.use(system, integration, bool(changes))
-        old = f"Changed: {changed_words(changes)}" if changes else ""
+        held = [
+            maps.held_values(*each) for each in ((self.shared.system, self.shared.integration), (system, integration))
+        ]
+        old = f"Changed: {changed_words(*held)}" if changes else ""
+        for view in self.runs:
+            view.outdate()
+        self._refresh_take()
         if old and self.shared.source.skeleton.data_vars:
             old = f"The map is old: it is of the system before. {old}"
         self.old.object = Markup('<p class="old" role="status">{}</p>').format(old) if old else ""

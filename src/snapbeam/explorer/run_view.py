@@ -469,7 +469,7 @@ class Impacts(RunPanel):
             for name, (title, digits) in names.items()
         ]
         table = models.DataTable(
-            source=self.source, columns=shown, sizing_mode="stretch_width", height=400, index_position=None,
+            source=self.source, columns=shown, sizing_mode="stretch_width", height=400, index_position=None, reorderable=False,
             stylesheets=[style.sheet(self.look), _TABLE],
         )  # fmt: skip
         self.source.selected.on_change("indices", self._chosen)
@@ -894,8 +894,7 @@ class WaveformPanel(RunPanel):
         factor, unit = scale_of(item.values, str(item.attrs.get("units", "1")).removesuffix("1"))
         own = [envelope(x, each / factor, *self.span) for each in _columns_of(data, self.below.value).T]
         self.force.data, self.further[1].data = _curve(own), _curves(own[1:])
-        words = str(self.below.value).replace("_", " ")
-        self.low.yaxis.axis_label = f"{words} ({unit})" if unit else words
+        self.low.yaxis.axis_label = unit or "1"  # the words, too long for its height, stand in the field below it
         style.fit(self.low, *(np.append(y, 0.0) for _, y in own))
 
     def _pair(self) -> list[tuple[_Array, _Array]]:

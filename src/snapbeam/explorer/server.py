@@ -35,11 +35,15 @@ _COOKIE = "snapbeam_token"
 _TEMPLATE = """
 {% block preamble %}
     <meta name="viewport" content="width=device-width, initial-scale=1">
-    <script>console.log = () => undefined;</script>
+    <script>
+      const log = console.log.bind(console);
+      console.log = (...words) => { if (words[0] !== 'Bokeh items were rendered successfully') { log(...words); } };
+    </script>
     {{ super() }}
 {% endblock %}
+{% block postamble %}<script>Bokeh.logger.set_level('warn');</script>{% endblock %}
 """
-"""Bokeh and Panel write two lines into the console of each page."""
+"""Nothing but warnings in the console; for one line Bokeh has no level."""
 _OWN = "static/extensions/panel/"
 """Path of the static files on the server; Panel loads all others from elsewhere."""
 
@@ -344,26 +348,31 @@ class Explorer:
         return f"<Explorer at {self.url}>"
 
 
-def _shared(what: Any, system: System | None, integration: Integration | None) -> Any:
+def _shared(what: Any, system: System | None, integration: Integration | None, against: Any) -> Any:
     try:
         import panel as pn
     except ImportError as error:
         raise InputError(_MISSING) from error
     from bokeh.settings import settings
 
-    from snapbeam.explorer.maps import opened
+    from snapbeam.explorer.maps import ResultSource, opened
     from snapbeam.explorer.shared import Shared
 
     settings.resources = "server"  # whatever a page is made of comes from this machine
-    settings.log_level = "error"  # warnings of Bokeh are not shown in the console of the browser
+    settings.log_level = None  # to set it in this way is a message in the console of the browser
     pn.extension()
     file = Path(what) if isinstance(what, (str, Path)) else None
-    shared = Shared(opened(what, system=system, integration=integration), file)
+    other = None if against is None else opened(against)
+    if other is not None and (isinstance(other, ResultSource) or other.is_list):
+        raise InputError(f"against = {other.name!r}: must be a map over a grid of two parameters")
+    shared = Shared(opened(what, system=system, integration=integration), file, other)
     shared.warm()
     return shared
 
 
-def explore(what: Any = None, *, integration: Integration | None = None, height: int = 900) -> Explorer:
+def explore(
+    what: Any = None, *, integration: Integration | None = None, height: int = 900, against: Any = None
+) -> Explorer:
     """Open a result in the browser: click on a point of a map, see its run, watch the beam.
 
     Parameters
@@ -375,6 +384,8 @@ def explore(what: Any = None, *, integration: Integration | None = None, height:
         Of a system.
     height : int
         Of the frame in a notebook, pixels.
+    against : xarray.Dataset or path, optional
+        Another map, whose difference from *what* is shown.
 
     Returns
     -------
@@ -388,7 +399,7 @@ def explore(what: Any = None, *, integration: Integration | None = None, height:
     """
     if not isinstance(integration, (Integration, type(None))):
         raise InputTypeError(f"integration is a {type(integration).__name__}: must be an Integration or None")
-    shared = _shared(what, None, integration)
+    shared = _shared(what, None, integration, against)
 
     ready = threading.Event()
     held: dict[str, Any] = {}
@@ -432,6 +443,7 @@ def serve(
     token: str | None = None,
     system: System | None = None,
     integration: Integration | None = None,
+    against: Any = None,
     ready: Callable[[str], None] = print,
 ) -> None:
     """Serve the page until the process is interrupted; *ready* is called with its address.
@@ -444,7 +456,7 @@ def serve(
     import matplotlib
 
     matplotlib.use("Agg")  # pictures are drawn beside the page, for files alone
-    shared = _shared(what, system, integration)
+    shared = _shared(what, system, integration, against)
     if token is None and is_loopback(address):
         token = kept_token()
     server, url = make_server(shared, address, port, allow_remote=allow_remote, token=token)

@@ -16,10 +16,11 @@ _WINDOWS = 48
 
 
 class Shared:
-    """One map and its server; *command* is the file or checkpoint that begins it again, empty if it has none."""
+    """One map, its *file* if it has one, the *other* map that it is compared with, and its server."""
 
-    def __init__(self, source: Source, file: Path | None = None) -> None:
+    def __init__(self, source: Source, file: Path | None = None, other: Source | None = None) -> None:
         self.source = source
+        self.other = other
         self.file = file
         self.jobs = Jobs()
         self.pages = 0

@@ -182,12 +182,17 @@ def columns(**values: Any) -> ColumnDataSource:
     return ColumnDataSource({name: np.asarray(value) for name, value in values.items()})
 
 
+DIFFERENCE = "difference"
+"""Name of what is shown of two maps."""
+
+
 @cache
-def sequential() -> NDArray[np.uint8]:
-    """The 256 colours of numbers, of shape (256, 4)."""
+def colors_of_numbers(name: str = "") -> NDArray[np.uint8]:
+    """The 256 colours of a number, or of a difference, of shape (256, 4)."""
     from cmcrameri import cm
 
-    colors: NDArray[np.uint8] = np.round(255.0 * cm.batlow(np.linspace(0.0, 1.0, 256))).astype(np.uint8)
+    scale = cm.vik if name == DIFFERENCE else cm.batlow
+    colors: NDArray[np.uint8] = np.round(255.0 * scale(np.linspace(0.0, 1.0, 256))).astype(np.uint8)
     return colors
 
 
@@ -210,7 +215,7 @@ def colors_of(name: str, values: NDArray[Any], limits: tuple[float, float]) -> N
         low, high = limits
         share = (numbers - low) / (high - low if high > low else 1.0)
         good = np.isfinite(share)
-        bytes_ = sequential()[np.clip(np.where(good, share, 0.0) * 255.0, 0, 255).astype(np.int64)].copy()
+        bytes_ = colors_of_numbers(name)[np.clip(np.where(good, share, 0.0) * 255.0, 0, 255).astype(np.int64)].copy()
         bytes_[~good, 3] = 0
     return np.ascontiguousarray(bytes_).view(np.uint32).reshape(values.shape)
 
