@@ -105,6 +105,13 @@ template <class L> SNAPBEAM_FN void amplitudes(const Runs<L> &z, typename L::Pla
     }
 }
 
+// Bound of the sum of a channel's signals, of which *of* gives that of each.
+template <class L, class F> SNAPBEAM_FN typename L::Real bound_of_signals(const Runs<L> &z, const Channel<L> &c, F of) {
+    typename L::Real s = typename L::Real(0.0);
+    SNAPBEAM_LOOP
+    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Real(c.factor[i] < 0.0 ? -c.factor[i] : c.factor[i]), value(of(z.signal[c.signal[i]])), s);
+    return s;
+}
 // Largest acceleration along a row that forces may have within a horizon (s); *row_of* j gives r.r_j.
 template <class L, class Row, class Product>
 SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row &row, typename L::Real horizon, const typename L::Plain *amplitude, Product product) {
@@ -117,13 +124,7 @@ SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row &row, type
         if (!c.active) continue;
         Real most = max(abs(value(c.first_f)), abs(value(c.f)));
         if (c.timed) {
-            most = Real(0.0);
-            SNAPBEAM_LOOP
-            for (int i = 0; i < c.uses; ++i) {
-                const Signal<L> &one = z.signal[c.signal[i]];
-                const Real own = value(c.law == BASE ? one.greatest_bend() : one.greatest_value());
-                most = fma(Real(c.factor[i] < 0 ? -c.factor[i] : c.factor[i]), own, most);
-            }
+            most = bound_of_signals(z, c, [&](const Signal<L> &one) { return c.law == BASE ? one.greatest_bend() : one.greatest_value(); });
         } else if (!c.contact) {
             typename L::Plain sum = typename L::Plain(0.0);
             SNAPBEAM_LOOP

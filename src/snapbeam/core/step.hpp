@@ -133,27 +133,21 @@ SNAPBEAM_FN typename L::Cell product_rows(const Structure<L> &s, const typename 
     return along;
 }
 
+template <class L, class F> SNAPBEAM_FN typename L::Number sum_of_signals(const Runs<L> &z, const Channel<L> &c, F of) {
+    typename L::Number s = typename L::Number(0.0);
+    SNAPBEAM_LOOP
+    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), of(z.signal[c.signal[i]]), s);
+    return s;
+}
 // Sum of a channel's signals: displacement of a striker, force, load; acceleration of a base.
 template <class L> SNAPBEAM_FN typename L::Number signal_of(const Runs<L> &z, const Channel<L> &c) {
-    typename L::Number s = typename L::Number(0.0);
-    SNAPBEAM_LOOP
-    for (int i = 0; i < c.uses; ++i) {
-        const Signal<L> &one = z.signal[c.signal[i]];
-        s = fma(typename L::Number(c.factor[i]), c.law == BASE ? one.acceleration() : one.value_at(), s);
-    }
-    return s;
+    return sum_of_signals(z, c, [&](const Signal<L> &one) { return c.law == BASE ? one.acceleration() : one.value_at(); });
 }
 template <class L> SNAPBEAM_FN typename L::Number signal_slope(const Runs<L> &z, const Channel<L> &c) {
-    typename L::Number s = typename L::Number(0.0);
-    SNAPBEAM_LOOP
-    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), z.signal[c.signal[i]].slope(), s);
-    return s;
+    return sum_of_signals(z, c, [](const Signal<L> &one) { return one.slope(); });
 }
 template <class L> SNAPBEAM_FN typename L::Number signal_bend(const Runs<L> &z, const Channel<L> &c) {
-    typename L::Number s = typename L::Number(0.0);
-    SNAPBEAM_LOOP
-    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), z.signal[c.signal[i]].acceleration(), s);
-    return s;
+    return sum_of_signals(z, c, [](const Signal<L> &one) { return one.acceleration(); });
 }
 // Acceleration along a row by the linear modes.
 template <class L> SNAPBEAM_FN typename L::Number linear_acceleration(const Structure<L> &s, const typename L::Cell *row, const typename L::Cell *q, const typename L::Cell *p) {
