@@ -109,52 +109,25 @@ template <class L> struct Group {
         return true;
     }
 
+    // From memory that is zero; lanes that have no run have numbers, too.
     SNAPBEAM_SELDOM void begin() {
-        const int n = s->cells;
-        Held<Cell, CELLS> *rows[] = {&z.q, &z.p, &z.k, &z.q1, &z.p1, &z.k1, &z.r};
-        for (auto *row : rows)
-            for (int i = 0; i < n; ++i) (*row)[i] = Cell(0.0);
-        for (long i = 0; i < long(s->composition.distinct) * n * 4; ++i) own[i] = Plain(0.0);
-        for (long i = 0; i < long(s->composition.distinct) * n * 4 * problem->levels; ++i) tables[i] = Plain(0.0);
-        for (int i = 0; i < problem->levels; ++i) lengths[i] = Real(0.0);
-        alive = again = landing = z.jumping = FromBits<Marks>::of(0), circuits = false;
-        Real *zeros[] = {&ticks, &wanted, &event, &tries, &cuts, &key, &step, &end, &limit, &output_interval, &next_output, &contact_step, &halvings,
-                         &most_steps, &stretch, &stretch_at_rest, &calm, &energy, &lowest, &jump, &turned, &z.t, &z.ticks};
-        for (Real *x : zeros) *x = Real(0.0);
-        z.tick = z.sign = z.parts = Real(1.0), z.h = z.drift = z.gq = z.qr = z.along_g = z.along_r = Number(0.0), z.next_gq = Cell(0.0);
-        z.flows = own;
+        z.tick = z.sign = z.parts = Real(1.0), z.flows = own;
         for (int i = 0; i < z.signals; ++i) {
             Signal<L> &one = z.signal[i];
             one.kind = problem->signal_kinds[i], one.pieces = batch->pieces;
             one.window = problem->windows[i] < 0 ? nullptr : z.signal + problem->windows[i];
-            for (Number &x : one.p) x = Number(0.0);
-            one.at = one.begun = one.kept = Moment<L>{Number(0.0), Number(1.0), Number(0.0), Number(0.0), Number(0.0), Number(0.0)};
-            for (int &x : one.piece) x = 0;
-            one.acts = false, one.set_length(z.h);
+            one.at.cosine = one.begun.cosine = one.kept.cosine = Number(1.0), one.set_length(z.h);
         }
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             c.law = problem->laws[j];
             with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state(batch->numbers + long(j) * problem->law_numbers), c.memory = law.memory, c.impulsive = law.impulsive; });
             c.circuit = c.law == CIRCUIT, circuits |= c.circuit, c.harvests = c.circuit || c.law == LINEAR_DAMPING;
-            c.uses = 0;
             for (int i = 0; i < z.signals; ++i)
                 if (problem->uses[j * z.signals + i] != 0.0) c.signal[c.uses] = i, c.factor[c.uses++] = problem->uses[j * z.signals + i];
-            for (int i = 0; i < n; ++i) c.row[i] = Cell(0.0);
-            c.follows = FromBits<Marks>::of(0);
-            for (int i = 0; c.law == CIRCUIT && i < n; ++i) c.along_q[i] = c.along_p[i] = Cell(0.0);
-            for (int i = 0; c.law == CIRCUIT && i < z.channels; ++i) c.along_M[i] = Number(0.0);
             for (int i = 0; i < problem->law_numbers; ++i) c.P[i] = Number(1.0);
-            for (int i = 0; i < z.channels; ++i) c.M[i] = Number(0.0);
-            c.rest = c.offset = c.tip = c.tip_slope = c.early = c.z = c.x = c.y = c.f = c.first_f = c.v = c.d0 = c.r0 = c.d1 = c.r1 = Number(0.0);
-            for (Number &x : c.decay) x = Number(0.0);
-            c.closed = c.pressing = FromBits<Marks>::of(0), c.onset = c.safe = Real(0.0), c.begun = Number(0.0);
-            c.impulse = c.work = c.lost = c.own_impulse = c.deepest = c.hardest = Number(0.0);
-            for (Number &x : c.sums) x = Number(0.0);
-            Event<L> &e = events[j];
-            e.flip = e.force = FromBits<Marks>::of(0), e.at_force = e.low = e.low_f = e.high = e.high_f = Real(0.0);
         }
-        totals.clear(shares_row());
+        totals.shared = shares_row();
         unsigned fresh = 0;
         for (int l = 0; l < L::runs; ++l) fresh |= unsigned(load(l)) << l;
         start(fresh);
@@ -602,13 +575,8 @@ template <class L> struct Group {
             doubt = fma(weight * error, amplitude[i], doubt);
         }
         const Real horizon = Real(TRUST) * step * z.tick, h = value(z.h), d0 = value(c.d0), d1 = value(c.d1);
-        Real tip = Real(0.0), tip_doubt = Real(0.0);
-        SNAPBEAM_LOOP
-        for (int i = 0; i < c.uses; ++i) {
-            const Signal<L> &one = z.signal[c.signal[i]];
-            const Real factor = Real(c.factor[i] < 0 ? -c.factor[i] : c.factor[i]);
-            tip = fma(factor, value(one.greatest_slope()), tip), tip_doubt = fma(factor, value(one.doubt(Number(h))), tip_doubt);
-        }
+        const Real tip = bound_of_signals(z, c, [](const Signal<L> &one) { return one.greatest_slope(); });
+        const Real tip_doubt = bound_of_signals(z, c, [&](const Signal<L> &one) { return one.doubt(Number(h)); });
         const Real push = largest_push(z, c.row, horizon, amplitude, [&](int j) { return value(c.M[j]); });
         const Real bound = fma(Real(MARGIN), L::total(speed), fma(push, horizon, tip));
         const Real until = z.t + min(-d0 / bound, horizon) / z.tick;
@@ -1009,11 +977,11 @@ namespace SNAPBEAM_SET {
 // Runs of one thread, until none is left or all are asked to stop.
 template <class L> void integrate(const Problem &problem, const Batch &batch) {
     Structure<L> structure;
-    Group<L> groups[L::together];
+    Group<L> groups[L::together]{};
     Arena measured{nullptr, 0};
     structure.build(problem, measured);
     for (Group<L> &group : groups) group.lay_out(structure, batch, measured);
-    char *memory = static_cast<char *>(__builtin_malloc(measured.used + 64));
+    char *memory = static_cast<char *>(__builtin_calloc(measured.used + 64, 1));
     if (!memory) return void(__atomic_store_n(batch.lacking, 1, __ATOMIC_RELAXED));
     Arena arena{memory + (64 - reinterpret_cast<unsigned long long>(memory) % 64), 0};
     structure.build(problem, arena);

@@ -78,8 +78,7 @@ template <class L, class Cell = typename L::Plain, class Number = typename L::Re
 };
 
 // Acceleration along a row at the beginning (*last* false) or the end of a step.
-template <class L, class Row> SNAPBEAM_CALLED typename L::Number bend_at(const Runs<L> &z, const Row &row, bool last) {
-    typedef typename L::Cell Cell;
+template <class L, class Row, class Cell = typename L::Cell> SNAPBEAM_CALLED typename L::Number bend_at(const Runs<L> &z, const Row &row, bool last) {
     const Structure<L> &s = *z.s;
     const Cell *q = last ? z.q1 : z.q, *p = last ? z.p1 : z.p, *k = last ? z.k1 : z.k;
     Cell sum = Cell(0.0);
@@ -105,11 +104,16 @@ template <class L> SNAPBEAM_FN void amplitudes(const Runs<L> &z, typename L::Pla
     }
 }
 
+// Bound of the sum of a channel's signals, of which *of* gives that of each.
+template <class L, class F> SNAPBEAM_FN typename L::Real bound_of_signals(const Runs<L> &z, const Channel<L> &c, F of) {
+    typename L::Real s = typename L::Real(0.0);
+    SNAPBEAM_LOOP
+    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Real(c.factor[i] < 0.0 ? -c.factor[i] : c.factor[i]), value(of(z.signal[c.signal[i]])), s);
+    return s;
+}
 // Largest acceleration along a row that forces may have within a horizon (s); *row_of* j gives r.r_j.
-template <class L, class Row, class Product>
-SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row &row, typename L::Real horizon, const typename L::Plain *amplitude, Product product) {
-    typedef typename L::Real Real;
-    typedef typename L::Number Number;
+template <class L, class Row, class Product, class Real = typename L::Real, class Number = typename L::Number>
+SNAPBEAM_FN Real largest_push(const Runs<L> &z, const Row &row, typename L::Real horizon, const typename L::Plain *amplitude, Product product) {
     const int n = z.s->size();
     Real push = max(abs(value(dot<L>(row, z.k, n))), abs(value(dot<L>(row, z.k1, n))));
     for (int j = 0; j < z.channels; ++j) {
@@ -117,13 +121,7 @@ SNAPBEAM_FN typename L::Real largest_push(const Runs<L> &z, const Row &row, type
         if (!c.active) continue;
         Real most = max(abs(value(c.first_f)), abs(value(c.f)));
         if (c.timed) {
-            most = Real(0.0);
-            SNAPBEAM_LOOP
-            for (int i = 0; i < c.uses; ++i) {
-                const Signal<L> &one = z.signal[c.signal[i]];
-                const Real own = value(c.law == BASE ? one.greatest_bend() : one.greatest_value());
-                most = fma(Real(c.factor[i] < 0 ? -c.factor[i] : c.factor[i]), own, most);
-            }
+            most = bound_of_signals(z, c, [&](const Signal<L> &one) { return c.law == BASE ? one.greatest_bend() : one.greatest_value(); });
         } else if (!c.contact) {
             typename L::Plain sum = typename L::Plain(0.0);
             SNAPBEAM_LOOP

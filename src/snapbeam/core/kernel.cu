@@ -32,7 +32,7 @@ extern "C" __global__ void __launch_bounds__(SNAPBEAM_BLOCK) go_on(Shared *share
     aside += long(blockIdx.x) * blockDim.x + threadIdx.x;
     long long *own = reinterpret_cast<long long *>(&group);
 #pragma unroll 1
-    for (int i = 0; i < words && !begins; ++i) own[i] = aside[i * threads];
+    for (int i = 0; i < words; ++i) own[i] = begins ? 0 : aside[i * threads];
     __shared__ long long place[sizeof(Structure<L>) / sizeof(long long)];  // read at every step
     for (int i = threadIdx.x; i < sizeof(place) / sizeof(long long); i += blockDim.x) place[i] = reinterpret_cast<long long *>(&shared->structure)[i];
     __syncthreads();

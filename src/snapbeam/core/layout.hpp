@@ -35,28 +35,15 @@ template <int W, int FIXED = 0> struct ModeLanes {
     typedef Pack<W> Coef;
     typedef bool Marks;
     static constexpr int runs = 1, lanes = W, fixed = FIXED, together = 2, directions = 0;
-    static SNAPBEAM_FN double total(Cell x) {
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
-        if constexpr (W == 8) {
-            const __m512d v = (__m512d)x.v;
-            const __m256d half = _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd(v, 1));
-            const __m128d pair = _mm_add_pd(_mm256_castpd256_pd128(half), _mm256_extractf128_pd(half, 1));
-            return pair[0] + pair[1];
+    template <int N> static SNAPBEAM_FN double sum(const Pack<N> &x) {
+        if constexpr (N == 2) return x.v[0] + x.v[1];
+        else {
+            Pack<N / 2> half[2];
+            __builtin_memcpy(half, &x, sizeof x);
+            return sum(half[0] + half[1]);
         }
-#endif
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX2__)
-        if constexpr (W == 4) {
-            const __m256d v = (__m256d)x.v;
-            const __m128d pair = _mm_add_pd(_mm256_castpd256_pd128(v), _mm256_extractf128_pd(v, 1));
-            return pair[0] + pair[1];
-        }
-#endif
-        double s[W];
-        for (int l = 0; l < W; ++l) s[l] = x.v[l];
-        for (int half = W / 2; half > 0; half /= 2)
-            for (int l = 0; l < half; ++l) s[l] += s[l + half];
-        return s[0];
     }
+    static SNAPBEAM_FN double total(Cell x) { return sum(x); }
     static SNAPBEAM_FN void totals(Cell a, Cell b, double &of_a, double &of_b) {
 #if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
         if constexpr (W == 8) {
@@ -136,11 +123,7 @@ template <class L> SNAPBEAM_FN double element(const typename L::Cell *row, int i
     if constexpr (L::lanes > 1) return row[i / L::lanes].v[i % L::lanes];
     else return lane(row[i], l);
 }
-template <class L> SNAPBEAM_FN void set_element(typename L::Cell *row, int i, int l, double x) {
-    if constexpr (L::lanes > 1) set_lane(row[i / L::lanes], i % L::lanes, x);
-    else set_lane(row[i], l, x);
-}
-template <class L> SNAPBEAM_FN void set_plain(typename L::Plain *row, int i, int l, double x) {
+template <class L, class Row> SNAPBEAM_FN void set_element(Row &row, int i, int l, double x) {
     if constexpr (L::lanes > 1) set_lane(row[i / L::lanes], i % L::lanes, x);
     else set_lane(row[i], l, x);
 }

@@ -275,7 +275,8 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
 }
 
 // --- calls --------------------------------------------------------------------------------------------------------------
-static const Set &set_named(const std::string &name, const std::vector<Set> &have) {
+static const Set &set_named(const std::string &name) {
+    static const std::vector<Set> have = sets();
     if (name.empty()) return have.front();
     for (const Set &each : have)
         if (name == each.name) return each;
@@ -342,24 +343,29 @@ template <class Work> static void with_python(const Problem &p, Work work) {
     work();
 }
 
-static void integrate(nb::dict problem, nb::dict batch, const std::string &layout, const std::string &set, int threads, nb::object progress) {
-    Arguments of_problem(problem, "problem"), of_batch(batch, "batch", &of_problem);
+struct Call {  // the arguments of all calls, checked
+    Arguments of_problem, of_batch;
     Shared shared;
-    const Problem p = problem_of(of_problem);
-    const Batch b = batch_of(of_batch, p, shared);
-    if (threads < 1 || threads > 4096) throw nb::value_error("threads: must be 1 to 4096");
-    const std::vector<Set> have = sets();
-    const snapbeam::Kernel kernel = set_named(set, have).layouts[layout_named(layout)];
-    in_threads(threads < b.runs ? threads : b.runs, shared, b.runs, progress, [&] { with_python(p, [&] { kernel(p, b); }); });
+    Problem p;
+    Batch b;
+    Call(nb::dict problem, nb::dict batch) : of_problem(problem, "problem"), of_batch(batch, "batch", &of_problem), p(problem_of(of_problem)), b(batch_of(of_batch, p, shared)) {}
+
+    void run(snapbeam::Kernel kernel, int threads, nb::object progress) {
+        if (threads < 1 || threads > 4096) throw nb::value_error("threads: must be 1 to 4096");
+        in_threads(threads < b.runs ? threads : b.runs, shared, b.runs, progress, [&] { with_python(p, [&] { kernel(p, b); }); });
+    }
+};
+
+static void integrate(nb::dict problem, nb::dict batch, const std::string &layout, const std::string &set, int threads, nb::object progress) {
+    Call(problem, batch).run(set_named(set).layouts[layout_named(layout)], threads, progress);
 }
 
 static void integrate_tangents(nb::dict problem, nb::dict batch, nb::dict tangent, const std::string &set, int threads, nb::object progress) {
     using namespace snapbeam;
-    Arguments of_problem(problem, "problem"), of_batch(batch, "batch", &of_problem), a(tangent, "tangent", &of_batch);
-    Shared shared;
-    const Problem p = problem_of(of_problem);
-    Batch b = batch_of(of_batch, p, shared);
-    if (threads < 1 || threads > 4096) throw nb::value_error("threads: must be 1 to 4096");
+    Call call(problem, batch);
+    Arguments a(tangent, "tangent", &call.of_batch);
+    const Problem &p = call.p;
+    Batch &b = call.b;
     const size_t runs = size_t(b.runs), n = size_t(p.modes), channels = size_t(p.channels), K = DIRECTIONS;
     Tangent t{};
     t.q = a.array<double>("q", {runs, K, n}), t.p = a.array<double>("p", {runs, K, n});
@@ -373,17 +379,15 @@ static void integrate_tangents(nb::dict problem, nb::dict batch, nb::dict tangen
     t.statistics = a.array<double, true>("statistics", {runs, K, STATISTICS}, false);
     t.of_channels = a.array<double, true>("of_channels", {runs, K, channels, OF_CHANNEL}, false);
     b.tangent = &t;
-    const std::vector<Set> have = sets();
-    const Kernel kernel = set_named(set, have).tangents;
-    in_threads(threads < b.runs ? threads : b.runs, shared, b.runs, progress, [&] { with_python(p, [&] { kernel(p, b); }); });
+    call.run(set_named(set).tangents, threads, progress);
 }
 
 static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const std::string &layout, const std::string &set) {
     using namespace snapbeam;
-    Arguments of_problem(problem, "problem"), of_batch(batch, "batch", &of_problem), of_recorder(recorder, "recorder", &of_batch);
-    Shared shared;
-    const Problem p = problem_of(of_problem);
-    Batch b = batch_of(of_batch, p, shared);
+    Call call(problem, batch);
+    Arguments of_recorder(recorder, "recorder", &call.of_batch);
+    const Problem &p = call.p;
+    Batch &b = call.b;
     if (b.runs != 1) throw nb::value_error("batch: must be one run");
     Recorder r{};
     const size_t instants = of_recorder.length("times"), samples = of_recorder.length("rows"), impacts = of_recorder.length("impacts");
@@ -400,9 +404,6 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
     const long most[] = {r.instants, r.samples, r.impacts, 1000000, 1};  // instants passed, samples, impacts, steps of a contact, begun
     for (int i = 0; i < 5; ++i)
         if (r.marks[i] < 0 || r.marks[i] > most[i]) of_recorder.refuse("marks", "must count what is recorded");
-    const std::vector<Set> have = sets();
-    const Set &chosen = set_named(set, have);
-    const int which = layout_named(layout);
     const size_t saved = of_recorder.length("saved");
     // as many numbers as any layout of any width holds of a run
     const size_t wanted = (size_t(p.modes + 64) * 3 + size_t(p.channels) * (11 + OF_CHANNEL) + STATISTICS + 32) * 8;
@@ -410,15 +411,14 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
     r.saved = of_recorder.array<double, true>("saved", {saved}, false);
     r.budget = long(of_recorder.number("budget", 1.0, 2e9));
     b.recorder = &r;
-    in_threads(1, shared, 1, nb::none(), [&] { with_python(p, [&] { chosen.layouts[which](p, b); }); });
+    call.run(set_named(set).layouts[layout_named(layout)], 1, nb::none());
 }
 
 // For a GPU: a problem and a batch as bytes, whose arrays lie where *moved* says (addresses there by addresses here).
 static nb::tuple moved_arguments(nb::dict problem, nb::dict batch, nb::dict moved) {
-    Arguments of_problem(problem, "problem"), of_batch(batch, "batch", &of_problem);
-    Shared shared;
-    Problem p = problem_of(of_problem);
-    Batch b = batch_of(of_batch, p, shared);
+    Call call(problem, batch);
+    Problem &p = call.p;
+    Batch &b = call.b;
     const auto move = [&](auto *&at) {
         if (at) at = reinterpret_cast<std::remove_reference_t<decltype(at)>>(nb::cast<size_t>(moved[nb::int_(reinterpret_cast<size_t>(at))]));
     };

@@ -17,11 +17,6 @@
 
 namespace SNAPBEAM_SET {
 
-// Value and rate of what is observed at the beginning of a step, and its extremes.
-template <class L> struct Observed {
-    typename L::Number u, v;
-};
-
 template <class L> struct Totals {
     typedef typename L::Number Number;
     typedef typename L::Real Real;
@@ -33,7 +28,7 @@ template <class L> struct Totals {
     Held<Cell, CELLS> row;     // of the displacement observed
     bool shared;               // it is that of the first contact
     Number rest;
-    Observed<L> point, center;
+    struct { Number u, v; } point, center;  // value and rate of what is observed at the beginning of a step
     Number sum[snapbeam::STATISTICS];
     Real late, decide_energy, decide_reach, decide_crossings;
     Held<Plain, CELLS> swing_u, swing_v;  // weights of squared amplitudes, whose sums bound the errors of the cubics in a flight step
@@ -45,14 +40,6 @@ template <class L> struct Totals {
     void lay_out(const Structure<L> &structure, const Runs<L> &, Arena &arena) {
         s = &structure;
         row.take(arena, s->cells), swing_u.take(arena, s->cells), swing_v.take(arena, s->cells);
-    }
-    void clear(bool of_contact) {
-        shared = of_contact;
-        for (int i = 0; i < s->cells; ++i) row[i] = Cell(0.0), swing_u[i] = swing_v[i] = Plain(0.0);
-        rest = point.u = point.v = center.u = center.v = Number(0.0);
-        for (Number &x : sum) x = Number(0.0);
-        late = decide_energy = decide_reach = decide_crossings = Real(0.0);
-        modal_energy = high_energy = length = later = Number(0.0), most_u = most_v = Real(0.0);
     }
     template <class F> void visit(F number) {
         number(point.u), number(point.v), number(center.u), number(center.v);
@@ -69,7 +56,7 @@ template <class L> struct Totals {
             doubts_of_mode(h, s->problem->omega[m], of_u, of_v);
             const double at = observed[m] < 0.0 ? -observed[m] : observed[m], middle = s->problem->center[m] < 0.0 ? -s->problem->center[m] : s->problem->center[m];
             const double weight = 1.01 * double(s->problem->modes) * (at > middle ? at * at : middle * middle);
-            set_plain<L>(swing_u, s->place[m], l, weight * of_u * of_u), set_plain<L>(swing_v, s->place[m], l, weight * of_v * of_v);
+            set_element<L>(swing_u, s->place[m], l, weight * of_u * of_u), set_element<L>(swing_v, s->place[m], l, weight * of_v * of_v);
         }
         set_lane(rest, l, at_rest), set_lane(late, l, run[LAST_QUARTER]);
         set_lane(decide_energy, l, run[DECIDE_ENERGY]), set_lane(decide_reach, l, run[DECIDE_REACH]);
@@ -548,8 +535,7 @@ template <class L> struct Totals {
     // Largest penetration in a step in which it turns: where the rate, a cubic by its values and slopes, is zero.
     SNAPBEAM_SELDOM Number summit(const Runs<L> &z, const Channel<L> &c, Marks which) {
         Number a0 = -bend_at(z, c.row, false), a1 = signal_bend(z, c) - bend_at(z, c.row, true);
-        SNAPBEAM_LOOP
-        for (int i = 0; i < c.uses; ++i) a0 = fma(Number(c.factor[i]), z.signal[c.signal[i]].acceleration_at_begin(), a0);
+        a0 += sum_of_signals(z, c, [](const Signal<L> &one) { return one.acceleration_at_begin(); });
         const Cubic<Number> fall(-c.r0, -a0, -c.r1, -a1, z.h);
         const Number at = root(fall, Number(1.0), which);
         const Number mean = fma(at, fma(at, fma(at, Number(0.25) * fall.c3, Number(1.0 / 3.0) * fall.c2), Number(0.5) * fall.c1), fall.c0);

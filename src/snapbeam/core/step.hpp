@@ -133,39 +133,31 @@ SNAPBEAM_FN typename L::Cell product_rows(const Structure<L> &s, const typename 
     return along;
 }
 
+template <class L, class F> SNAPBEAM_FN typename L::Number sum_of_signals(const Runs<L> &z, const Channel<L> &c, F of) {
+    typename L::Number s = typename L::Number(0.0);
+    SNAPBEAM_LOOP
+    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), of(z.signal[c.signal[i]]), s);
+    return s;
+}
 // Sum of a channel's signals: displacement of a striker, force, load; acceleration of a base.
 template <class L> SNAPBEAM_FN typename L::Number signal_of(const Runs<L> &z, const Channel<L> &c) {
-    typename L::Number s = typename L::Number(0.0);
-    SNAPBEAM_LOOP
-    for (int i = 0; i < c.uses; ++i) {
-        const Signal<L> &one = z.signal[c.signal[i]];
-        s = fma(typename L::Number(c.factor[i]), c.law == BASE ? one.acceleration() : one.value_at(), s);
-    }
-    return s;
+    return sum_of_signals(z, c, [&](const Signal<L> &one) { return c.law == BASE ? one.acceleration() : one.value_at(); });
 }
 template <class L> SNAPBEAM_FN typename L::Number signal_slope(const Runs<L> &z, const Channel<L> &c) {
-    typename L::Number s = typename L::Number(0.0);
-    SNAPBEAM_LOOP
-    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), z.signal[c.signal[i]].slope(), s);
-    return s;
+    return sum_of_signals(z, c, [](const Signal<L> &one) { return one.slope(); });
 }
 template <class L> SNAPBEAM_FN typename L::Number signal_bend(const Runs<L> &z, const Channel<L> &c) {
-    typename L::Number s = typename L::Number(0.0);
-    SNAPBEAM_LOOP
-    for (int i = 0; i < c.uses; ++i) s = fma(typename L::Number(c.factor[i]), z.signal[c.signal[i]].acceleration(), s);
-    return s;
+    return sum_of_signals(z, c, [](const Signal<L> &one) { return one.acceleration(); });
 }
 // Acceleration along a row by the linear modes.
-template <class L> SNAPBEAM_FN typename L::Number linear_acceleration(const Structure<L> &s, const typename L::Cell *row, const typename L::Cell *q, const typename L::Cell *p) {
-    typedef typename L::Cell Cell;
+template <class L, class Cell = typename L::Cell> SNAPBEAM_FN typename L::Number linear_acceleration(const Structure<L> &s, const typename L::Cell *row, const typename L::Cell *q, const typename L::Cell *p) {
     Cell sum = Cell(0.0);
     for (int i = 0; i < s.size(); ++i) sum = fma(-row[i], fma(Cell(s.omega[i] * s.omega[i]), q[i], Cell(Cell(2.0) * s.sigma[i]) * p[i]), sum);
     return L::total(sum);
 }
 
 // Tension at q, where the cells of g.q are known: r = Gq and the factors of the acceleration.
-template <class L> SNAPBEAM_FN void tension(Runs<L> &z, const typename L::Cell *q, typename L::Cell gq) {
-    typedef typename L::Number Number;
+template <class L, class Number = typename L::Number> SNAPBEAM_FN void tension(Runs<L> &z, const typename L::Cell *q, typename L::Cell gq) {
     const Structure<L> &s = *z.s;
     typename L::Cell along = typename L::Cell(0.0);
     if constexpr (L::fixed == 1) {
@@ -195,8 +187,7 @@ template <class L> SNAPBEAM_FN void tension(Runs<L> &z, const typename L::Cell *
         }
     z.along_g = z.along_g * z.sign;
 }
-template <class L> SNAPBEAM_FN void acceleration_row(const Runs<L> &z, typename L::Cell *k) {
-    typedef typename L::Cell Cell;
+template <class L, class Cell = typename L::Cell> SNAPBEAM_FN void acceleration_row(const Runs<L> &z, typename L::Cell *k) {
     const Structure<L> &s = *z.s;
     const Cell along_g = Cell(z.along_g), along_r = Cell(z.along_r);
     for (int i = 0; i < s.size(); ++i) k[i] = fma(along_g, s.g[i], along_r * z.r[i]);
@@ -233,9 +224,8 @@ template <class L> SNAPBEAM_FN typename L::Marks changing(const Channel<L> &c) {
     return c.circuit ? c.follows : c.contact ? c.closed : FromBits<typename L::Marks>::of(~0u);
 }
 // Force of a channel at x and y; of a contact only where it acts.
-template <class L>
-SNAPBEAM_FN typename L::Number force_at(const Channel<L> &c, typename L::Number x, typename L::Number y) {
-    typedef typename L::Number Number;
+template <class L, class Number = typename L::Number>
+SNAPBEAM_FN Number force_at(const Channel<L> &c, typename L::Number x, typename L::Number y) {
     const Number f = with_law(c.law, [&](auto law) { return law.force(c.contact ? max(x, Number(0.0)) : x, y, c.numbers()); });
     return c.contact ? select(acting(c), f, Number(0.0)) : f;
 }
@@ -264,10 +254,9 @@ template <class T> struct Phi {
 };
 
 // One force that is linear in the velocity, exactly; *a* and *v* along its row, where |M B w| <= 1.
-template <class L>
+template <class L, class Number = typename L::Number>
 SNAPBEAM_FN void affine_kick(const Channel<L> &c, typename L::Number w, typename L::Number M, typename L::Number a, typename L::Number v,
                              typename L::Number tip, typename L::Number *impulse, typename L::Number *twice, typename L::Number *lost) {
-    typedef typename L::Number Number;
     const Number side = c.contact ? Number(1.0) : Number(-1.0), y0 = c.contact ? tip - v : v;
     const Number f0 = force_at(c, c.x, y0), elastic = force_at(c, c.x, Number(0.0));
     const Number B = side * (force_at(c, c.x, Number(1.0)) - elastic), decay = M * B, x = decay * w;  // f = f_e + side B y
@@ -291,8 +280,7 @@ template <class L> SNAPBEAM_FN typename L::Number product_seen(const Channel<L> 
     return c.circuit ? select(c.follows, c.along_M[j], c.M[j]) : c.M[j];
 }
 // A circuit that follows the beam: its x and g, *a* and *v* by along_p; own is its channel.
-template <class L> SNAPBEAM_FN void follow(const Runs<L> &z, Channel<L> &c, int own, typename L::Number &a, typename L::Number &v) {
-    typedef typename L::Number Number;
+template <class L, class Number = typename L::Number> SNAPBEAM_FN void follow(const Runs<L> &z, Channel<L> &c, int own, typename L::Number &a, typename L::Number &v) {
     const int n = z.s->size();
     Number by_p = dot<L>(c.along_p, z.k1, n);
     for (int j = 0; j < z.channels; ++j) {
@@ -306,8 +294,7 @@ template <class L> SNAPBEAM_FN void follow(const Runs<L> &z, Channel<L> &c, int 
 }
 
 // The part in the force of such a circuit, channel i of the block, of the other forces of the velocity.
-template <class L> SNAPBEAM_FN typename L::Number pulled_along(const Runs<L> &z, const Channel<L> &c, const typename L::Number *f, int i, int count) {
-    typedef typename L::Number Number;
+template <class L, class Number = typename L::Number> SNAPBEAM_FN Number pulled_along(const Runs<L> &z, const Channel<L> &c, const typename L::Number *f, int i, int count) {
     Number sum = Number(0.0);
     if (!c.circuit) return sum;
     for (int j = 0; j < count; ++j)
@@ -316,9 +303,7 @@ template <class L> SNAPBEAM_FN typename L::Number pulled_along(const Runs<L> &z,
 }
 
 // Forces that depend on velocities, together; the impulses of a kick of *w* seconds go into p.
-template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number w, int count, bool first) {
-    typedef typename L::Number Number;
-    typedef typename L::Real Real;
+template <class L, class Number = typename L::Number, class Real = typename L::Real> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number w, int count, bool first) {
     const Structure<L> &s = *z.s;
     const int n = s.size();
     Number *v = z.block, *a = v + z.channels, *y = a + z.channels, *slope = y + z.channels, *change = slope + z.channels;
@@ -417,8 +402,7 @@ template <class L> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number
 }
 
 // Work of what depends on time alone: a force that is constant in the kick, times the mean velocity along its row.
-template <class L> SNAPBEAM_FN void timed_work(Runs<L> &z, Channel<L> &c, typename L::Number w) {
-    typedef typename L::Number Number;
+template <class L, class Number = typename L::Number> SNAPBEAM_FN void timed_work(Runs<L> &z, Channel<L> &c, typename L::Number w) {
     const Structure<L> &s = *z.s;
     const int n = s.size();
     Number a = Number(0.0);
@@ -494,9 +478,7 @@ template <class L> struct Flow {
     }
 };
 
-template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
-    typedef typename L::Number Number;
-    typedef typename L::Real Real;
+template <class L, class Number = typename L::Number, class Real = typename L::Real> SNAPBEAM_FN void begin_step(Runs<L> &z) {
     z.dissipated = Number(0.0), z.direct = true;
     for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].begun), z.signal[i].acts = false;
     for (int j = 0; j < z.channels; ++j) {
@@ -512,9 +494,7 @@ template <class L> SNAPBEAM_FN void begin_step(Runs<L> &z) {
     for (int i = 0; i < z.s->size(); ++i) z.q1[i] = z.q[i], z.p1[i] = z.p[i], z.k1[i] = z.k[i];
 }
 
-template <class L> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
-    typedef typename L::Number Number;
-    typedef typename L::Cell Cell;
+template <class L, class Number = typename L::Number, class Cell = typename L::Cell> SNAPBEAM_FN void take_stage(Runs<L> &z, int stage) {
     const Structure<L> &s = *z.s;
     const int n = s.size();
     const bool last = stage == s.composition.flows;

@@ -97,7 +97,9 @@ template <class L> struct Structure {
         padded = cells * L::lanes;
         first.take(arena, p.blocks), count.take(arena, p.blocks);
         mode_first.take(arena, p.blocks), mode_count.take(arena, p.blocks), place.take(arena, p.modes);
-        Row *rows[] = {&omega, &sigma, &g, &shift, &far_force, &center, &high, &beam, &second};
+        constexpr int ROWS = 9;
+        Row *rows[ROWS] = {&omega, &sigma, &g, &shift, &far_force, &center, &high, &beam, &second};
+        const double *given[ROWS] = {p.omega, p.sigma, p.g, p.shift, p.far_force, p.center, p.high, p.beam, p.second};
         for (Row *row : rows) row->take(arena, cells);
         G.take(arena, long(cells) * padded);
         if (!arena.base && !KNOWN) return;
@@ -116,13 +118,8 @@ template <class L> struct Structure {
         fastest = 0.0;
         for (int i = 0; i < p.modes; ++i) {
             const int at = place[i];
-            set_coefficient<L>(omega, at, p.omega[i]), set_coefficient<L>(sigma, at, p.sigma[i]);
-            set_coefficient<L>(g, at, p.g[i]), set_coefficient<L>(center, at, p.center[i]);
-            if (p.shift) set_coefficient<L>(shift, at, p.shift[i]);
-            if (p.far_force) set_coefficient<L>(far_force, at, p.far_force[i]);
-            set_coefficient<L>(beam, at, p.beam[i]);
-            if (p.second) set_coefficient<L>(second, at, p.second[i]);
-            if (p.high) set_coefficient<L>(high, at, p.high[i]);
+            for (int k = 0; k < ROWS; ++k)
+                if (given[k]) set_coefficient<L>(*rows[k], at, given[k][i]);
             fastest = p.omega[i] > fastest ? p.omega[i] : fastest;
             for (int j = 0; j < p.modes; ++j) set_coefficient<L>(G + long(place[j]) * cells, at, p.G[long(i) * p.modes + j]);
         }
