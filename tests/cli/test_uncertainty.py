@@ -96,6 +96,17 @@ def test_design(tmp_path) -> None:
         ("design", SYSTEM, "objectives"),
         ("design", SYSTEM + '[design]\nobjectives = "speed"\n', "variables"),
         ("design", SYSTEM + DESIGN.replace("lower", "least"), "least"),
+        (
+            "design",
+            SYSTEM
+            + '[design]\nobjectives = {quantity = "peak_force", mean = true}\nvariables = {"drive.velocity_amplitude" = [0.005, 0.03]}',
+            "mean of a statistic is",
+        ),
+        (
+            "design",
+            SYSTEM + DESIGN.replace("lower", "mean"),
+            "quantity, lower, upper, probability; limits hold for a share",
+        ),
         ("design", "not toml", "TOML"),
     ],
 )

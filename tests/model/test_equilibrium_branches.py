@@ -180,7 +180,7 @@ def test_a_bifurcation_of_unstable_branches() -> None:
 def test_refusals() -> None:
     system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=1))
     for parameter, values, message in (
-        ("force.voltage", (0.0, 1.0), "parameter = 'force.voltage': must be a number that the system has"),
+        ("force.voltage", (0.0, 1.0), "parameter = 'force.voltage': must be a number that the potential energy"),
         ("model.modes", (1.0, 2.0), "parameter = 'model.modes': must be a number"),
         ("beam.buckling_level", (1e-4, 1e-5), "values"),
         ("beam.buckling_level", (-1e-4, 1e-4), "buckling_level = -0.0001"),

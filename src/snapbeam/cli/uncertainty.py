@@ -70,10 +70,12 @@ def taken(kind: Any, table: dict[str, Any], where: str, further: str = "") -> An
 
     from snapbeam.util.validation import InputError
 
-    known = [each.name for each in dataclasses.fields(kind)]
+    known = [each.name for each in dataclasses.fields(kind) if each.init]
     for name in table:
         if name not in known:
-            raise InputError(f"{where}.{name}: unknown; must be one of {', '.join([*known, *filter(None, [further])])}")
+            told = [*known, *filter(None, [further])]
+            instead = getattr(kind, "instead", {}).get(name, "")
+            raise InputError(f"{where}.{name}: unknown; must be one of {', '.join(told)}{instead and '; ' + instead}")
     try:
         return kind(**table)
     except TypeError as error:

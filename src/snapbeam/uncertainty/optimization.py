@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -161,6 +161,9 @@ class Objective:
     quantity: str
     quantile: float | None = None
     maximize: bool = False
+    instead: ClassVar[dict[str, str]] = {
+        "mean": 'leave it out, the mean of a statistic is the objective without quantile: {quantity = "peak_force"}'
+    }
 
     def __post_init__(self) -> None:
         kind = quantity_of(self.quantity).kind
@@ -254,6 +257,9 @@ class Constraint:
     upper: float | None = None
     probability: float = 0.95
     scale: str = field(default="", init=False, repr=False)
+    instead: ClassVar[dict[str, str]] = {
+        "mean": 'limits hold for a share of the systems: {quantity = "peak_force", upper = "5 N", probability = 0.5} for the median'
+    }
 
     def __post_init__(self) -> None:
         kind = quantity_of(self.quantity).kind
