@@ -401,7 +401,7 @@ _GRAVITY = 9.80665
 
 
 def base_and_load(dataset: xr.Dataset, axes: Collection[str] = ()) -> list[str]:
-    """The base excitation in Hz and g, and the load resistance of a harvester."""
+    """The base excitation in Hz, g and ms, and the load resistance of a harvester."""
     attrs, words = dataset.attrs, []
     omega = 2.0 * np.pi * attrs.get("reference_frequency", np.nan)
     unit = omega**2 * attrs.get("length_scale", np.nan)
@@ -415,6 +415,13 @@ def base_and_load(dataset: xr.Dataset, axes: Collection[str] = ()) -> list[str]:
             words.append(f"base {prefixed(value * omega / (2.0 * np.pi), 'Hz')}")
         elif name.endswith("amplitude") and np.isfinite(unit):
             words.append(f"{float(f'{value * unit / _GRAVITY:.3g}'):.6g} $g$")
+    for name, text in (
+        ("acceleration_g", "shock {:.6g} $g$"),
+        ("duration_ms", "{:.4g} ms"),
+        ("rms_g", "random {:.4g} $g$ rms"),
+    ):
+        if (value := fixed_value(dataset, f"base_excitation_{name}", axes)) is not None:
+            words.append(text.format(value))
     return words
 
 
