@@ -41,7 +41,7 @@ _DECADES = 10.0
 def wrapped(text: str, width: int = _LONGEST) -> str:
     """Text in lines, the unit or scale in parentheses at its end beside the word before it."""
     held = re.sub(r"\S+ \([^()]*\)$", lambda found: found[0].replace(" ", "\xa0"), text)
-    return textwrap.fill(held, width, break_long_words=False).replace("\xa0", " ")
+    return textwrap.fill(held, width, break_long_words=False, break_on_hyphens=False).replace("\xa0", " ")
 
 
 def axis_label(dataset: xr.Dataset, name: str) -> str:

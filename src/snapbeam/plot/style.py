@@ -415,13 +415,11 @@ def base_and_load(dataset: xr.Dataset, axes: Collection[str] = ()) -> list[str]:
             words.append(f"base {prefixed(value * omega / (2.0 * np.pi), 'Hz')}")
         elif name.endswith("amplitude") and np.isfinite(unit):
             words.append(f"{float(f'{value * unit / _GRAVITY:.3g}'):.6g} $g$")
-    for name, text in (
-        ("acceleration_g", "shock {:.6g} $g$"),
-        ("duration_ms", "{:.4g} ms"),
-        ("rms_g", "random {:.4g} $g$ rms"),
-    ):
-        if (value := fixed_value(dataset, f"base_excitation_{name}", axes)) is not None:
-            words.append(text.format(value))
+    of_shock = {"acceleration_g": "{:.6g} $g$", "duration_ms": "{:.4g} ms"}
+    for kind, texts in (("shock", of_shock), ("random", {"rms_g": "{:.4g} $g$ rms"})):
+        values = {name: fixed_value(dataset, f"base_excitation_{name}", axes) for name in texts}
+        told = [texts[name].format(value) for name, value in values.items() if value is not None]
+        words += [f"{kind} {', '.join(told)}"] if told else []
     return words
 
 
