@@ -60,7 +60,7 @@ def gradient(
     Example: snapbeam gradient system.toml --parameters velocity_amplitude,location --statistic peak_force,impulse
     --cycles 5 -o gradient.nc --plot gradient.png
     """  # fmt: skip
-    from snapbeam.model.parameters import parameters as table
+    from snapbeam.model.parameters import in_table
     from snapbeam.uncertainty.gradients import gradient as compute
     from snapbeam.util.validation import InputError
 
@@ -70,8 +70,8 @@ def gradient(
     check_outputs(output, plot, (".nc", ".csv", ".json"), "statistic,")
     system = settings.system
     if parameters is None:
-        numbers = [name for name, value in system.parameters.items() if isinstance(value, float) and value != 0.0]
-        known = [name for name in numbers if name in table() or not name.startswith("model.")]  # not those of matrices
+        own = in_table(system.parameters)
+        known = [name for name, value in own.items() if isinstance(value, float) and value != 0.0]
         raise InputError(f"parameters (--parameters): must name one or more of {', '.join(known)}")
     names = [settings.full_name(name.strip()) for name in parameters.split(",")]
     statistics = [name.strip() for name in statistic.split(",")]

@@ -314,12 +314,14 @@ def probability(
 def _default_axes(system: System) -> dict[str, Any]:
     """Axes of a map if none is named: the paper's plane of a struck beam; the one point of another system."""
     from snapbeam.model.parameter_file import DEFAULT_AXES, parsed_axis
-    from snapbeam.model.parameters import lookup
+    from snapbeam.model.parameters import in_table, lookup
     from snapbeam.util.validation import InputError
 
     if DEFAULT_AXES.keys() <= system.parameters.keys():
         return {name: parsed_axis(name, text) for name, text in DEFAULT_AXES.items()}
-    numbers = [name for name, each in system.parameters.items() if isinstance(each, float) and lookup(name).is_run]
+    numbers = [
+        name for name, each in in_table(system.parameters).items() if isinstance(each, float) and lookup(name).is_run
+    ]
     if not numbers:
         raise InputError("[contact]: missing, as is any other excitation; add one, and name the axes in [sweep]")
     return {numbers[0]: np.array([system.get(numbers[0])])}

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from snapbeam.model.integration import Integration
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameters import in_table, lookup
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.compute import CheckpointOptions
@@ -1032,7 +1032,7 @@ def _dataset(
     }  # fmt: skip
     if all(lookup(name).is_run for name in problem.names):  # otherwise the wells differ between designs
         attrs |= {"initial_well": trials.system.start_well, "initial_well_reason": trials.system.initial_well_reason}
-    attrs |= {f"fixed_{lookup(name).short}": +value for name, value in trials.system.parameters.items()
+    attrs |= {f"fixed_{lookup(name).short}": +value for name, value in in_table(trials.system.parameters).items()
               if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
     dataset = xr.Dataset(attrs=attrs)
     x, objectives, violation, distances = tried
