@@ -38,6 +38,11 @@ _DECADES = 10.0
 """Ratio of the maximum to the minimum above which geometric points have a logarithmic axis."""
 
 
+def written_unit(unit: str) -> str:
+    """A unit as figures write it: kΩ for kohm, µm for um."""
+    return re.sub(r"^(k|M|G|m)?ohm$", r"\1Ω", re.sub(r"^u(?=[a-zA-Z])", "µ", unit))
+
+
 def wrapped(text: str, width: int = _LONGEST) -> str:
     """Text in lines, the unit or scale in parentheses at its end beside the word before it."""
     held = re.sub(r"\S+ \([^()]*\)$", lambda found: found[0].replace(" ", "\xa0"), text)
