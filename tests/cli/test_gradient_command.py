@@ -155,3 +155,28 @@ def test_the_page_shows_what_the_command_prints(run) -> None:
     assert result.exit_code == 0, result.output
     printed = [line for line in result.stdout.splitlines() if not line.startswith("Written:")]
     assert printed == shown[2].splitlines()
+
+
+def test_commands_on_the_file_of_a_structure_of_matrices(tmp_path, monkeypatch) -> None:
+    """The file is an argument or --config; messages name what a structure without a beam has."""
+    monkeypatch.chdir(tmp_path)
+    model = sb.ReducedModel.from_matrices(
+        [[2e-3]], [[-800.0]], contact_shape=[1.0], base_shape=[1.0], nonlinear_stiffness=5e8, well_amplitude=[-1.26491106e-3],
+        length_scale=1.26491106e-3, damping_ratio=0.02
+    )  # fmt: skip
+    shock = sb.BaseExcitation(motion=sb.Shock(acceleration_g=50.0, duration_ms=5.0))
+    sb.System(model, base_excitation=shock).save("c.toml")
+
+    def say(*words: str) -> tuple[int, str]:
+        result = CliRunner().invoke(app, [*words])
+        return result.exit_code, " ".join(result.output.split())
+
+    code, said = say("gradient", "-c", "c.toml", "--cycles", "2", "--parameters", "acceleration_g")
+    assert code == 0 and "b per g" in said, said
+    code, said = say("gradient", "-c", "c.toml", "-o", "b.nc")
+    assert code == 2 and "one or more of model.damping_ratio, base_excitation.acceleration_g" in said
+    assert say("gradient", "c.toml", "-c", "c.toml") == (2, "error: FILE = 'c.toml' with --config: give one of the two")
+    code, said = say("equilibria", "-c", "c.toml", "--over", "thickness=1:2")
+    assert code == 2 and "it has none, since it has no beam" in said
+    code, said = say("info", "c.toml")
+    assert code == 2 and "is a parameter file, not a result" in said

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli.app import _COMMANDS, app
+from snapbeam.cli.short_help import ShortHelpCommand
 from snapbeam.model.parameter_file import Config, load_config
 
 RUNNER = CliRunner()
@@ -102,6 +103,7 @@ LEAVES = dict(leaves(typer.main.get_command(app)))
 def test_json_and_quiet_everywhere(command):
     flags = {flag for each in LEAVES[command].params for flag in each.opts}
     assert {"--json", "--quiet", "--force"} <= flags
+    assert isinstance(LEAVES[command], ShortHelpCommand), "takes --json without a file"
     assert ("--set" in flags) == ("--print-config" in flags), "what takes parameters prints them"
 
 
@@ -118,6 +120,8 @@ def test_json_goes_to_standard_output_alone(tmp_path):
     found = json.loads(result.stdout)
     assert found["summary"]["response_class"] in {kind.label for kind in sb.ResponseClass}
     assert set(found["summary"]) == {*sb.STATISTICS, "initial_well", "initial_well_reason"}
+    for bare in ([*words, "--json"], ["simulate", "--json", *SMALL]):
+        assert json.loads(RUNNER.invoke(app, bare).stdout)["summary"] == found["summary"]
     assert RUNNER.invoke(app, [*words, "--quiet"]).output == ""
     said = RUNNER.invoke(app, [*words, "--json", str(tmp_path / "a.json")])
     again = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))

@@ -48,7 +48,7 @@ SYSTEMS = {
     ),
     "matrices with wells": sb.System(
         sb.ReducedModel.from_matrices(
-            [[0.02]], [[-40.0]], contact_shape=[1.0], base_shape=[0.02], nonlinear_stiffness=2e7, elongation_matrix=[[1.0]],
+            [[0.02]], [[-40.0]], contact_shape=[1.0], base_shape=[1.0], nonlinear_stiffness=2e7, elongation_matrix=[[1.0]],
             well_amplitude=[-np.sqrt(40.0 / 2e7)], length_scale=1e-3, damping_ratio=0.02,
         ),
         base_excitation=SHAKEN, initial_well="upper",

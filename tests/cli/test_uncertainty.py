@@ -96,6 +96,17 @@ def test_design(tmp_path) -> None:
         ("design", SYSTEM, "objectives"),
         ("design", SYSTEM + '[design]\nobjectives = "speed"\n', "variables"),
         ("design", SYSTEM + DESIGN.replace("lower", "least"), "least"),
+        (
+            "design",
+            SYSTEM
+            + '[design]\nobjectives = {quantity = "peak_force", mean = true}\nvariables = {"drive.velocity_amplitude" = [0.005, 0.03]}',
+            "mean of a statistic is",
+        ),
+        (
+            "design",
+            SYSTEM + DESIGN.replace("lower", "mean"),
+            "quantity, lower, upper, probability; limits hold for a share",
+        ),
         ("design", "not toml", "TOML"),
     ],
 )
@@ -130,3 +141,36 @@ def test_tolerances_have_the_units_of_their_parameters() -> None:
     of = uncertainty_from_mapping(given).of
     assert of["beam.thickness"].standard_deviation == 5e-6 and of["beam.width"].half_width == 0.02
     assert (of["contact.gap"].low, of["contact.gap"].high, of["contact.stiffness"].sigma) == (1e-5, 3e-5, 0.2)
+
+
+def test_a_structure_of_matrices_is_designed_and_has_probabilities(tmp_path) -> None:
+    """Its constants, which are no parameters of the table, refused the result after the computation."""
+    text = """
+[model]
+mass = [[0.002]]
+stiffness = [[-800.0]]
+contact_shape = [1.0]
+base_shape = [1.0]
+nonlinear_stiffness = 5e8
+well_amplitude = [-0.00126491106]
+length_scale = 0.00126491106
+damping_ratio = 0.02
+[base_excitation]
+type = "shock"
+acceleration_g = 100
+duration_ms = 5
+[integration]
+cycles = 4
+[uncertainty]
+acceleration_g = {normal = 0.1, relative = true}
+[probability]
+runs = 8
+[design]
+objectives = {quantity = "peak_midspan_displacement"}
+variables = {damping_ratio = [0.01, 0.1]}
+settings = {population = 6, generations = 1, samples = 8, validation_samples = 20}
+"""
+    designs = tmp_path / "designs.nc"
+    result = run(tmp_path, text, "design", "-y", "-o", str(designs))
+    assert result.exit_code == 0 and designs.exists(), result.output
+    assert run(tmp_path, text, "probability", "-y", "-o", str(tmp_path / "p.nc")).exit_code == 0

@@ -112,3 +112,17 @@ def test_curves_over_a_labelled_part_of_a_stored_map(tmp_path) -> None:
     for name, status in (("contact.upper stop.gap", 0), ("contact.lower.gap", 2)):
         result = CliRunner().invoke(app, [*command, name])
         assert result.exit_code == status, result.output
+
+
+def test_an_axis_is_named_by_its_last_part() -> None:
+    """A drive has an acceleration too, but the axis of the file is that of the base."""
+    import xarray as xr
+
+    from snapbeam.cli.parameter_options import coordinate_on_axis
+
+    own = {
+        "frequency_ratio": "drive.frequency_ratio",
+        "base_excitation_acceleration_g": "base_excitation.acceleration_g",
+    }
+    dataset = xr.Dataset(coords={name: (name, [1.0, 2.0], {"parameter": full}) for name, full in own.items()})
+    assert coordinate_on_axis(dataset, "at", "acceleration_g=2g") == ("base_excitation_acceleration_g", 2.0)

@@ -180,7 +180,7 @@ def test_a_bifurcation_of_unstable_branches() -> None:
 def test_refusals() -> None:
     system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=1))
     for parameter, values, message in (
-        ("force.voltage", (0.0, 1.0), "parameter = 'force.voltage': must be a number that the system has"),
+        ("force.voltage", (0.0, 1.0), "parameter = 'force.voltage': must be a number that the potential energy"),
         ("model.modes", (1.0, 2.0), "parameter = 'model.modes': must be a number"),
         ("beam.buckling_level", (1e-4, 1e-5), "values"),
         ("beam.buckling_level", (-1e-4, 1e-4), "buckling_level = -0.0001"),
@@ -226,3 +226,19 @@ label = "magnet"
     assert refused.exit_code == 2
     refused = CliRunner().invoke(app, ["equilibria", "--config", "own.toml", "--over", "force.strength=1:2:3"])
     assert refused.exit_code == 2 and "must be first:last" in refused.output
+
+
+def test_branches_of_an_arch_over_its_thickness_take_few_reductions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At a bifurcation the correction ends where its residual is rounding, and the fork is where a mode has no stiffness."""
+    sizes = {"length": 500e-6, "width": 20e-6, "thickness": 2e-6}
+    beam = sb.Beam(**sizes, young_modulus=160e9, density=2330.0, axial_load=0.0)
+    arch = sb.System(sb.ReducedModel.from_beam(beam, 4, imperfection=sb.Imperfection(midspan_amplitude=6e-6)))
+    made, replace = [], sb.System.replace
+    monkeypatch.setattr(sb.System, "replace", lambda self, **new: (made.append(new), replace(self, **new))[1])
+    found = sb.model.equilibrium_branches(arch, "beam.thickness", (2.05e-6, 2.09e-6))
+    count = len(made)
+    assert count < 11 * found.sizes["point"]
+    for at in range(0, found.sizes["point"], 7):
+        own = found.isel(point=at)
+        terms = replace(arch, **{"beam.thickness": float(own.beam_thickness)}).potential.terms(own.amplitude.values)
+        assert np.abs(terms.sum(0)).max() < 1e-10 * np.abs(terms).max()

@@ -178,6 +178,19 @@ def test_base_that_moves_fixed_coordinates_acts_through_the_mass() -> None:
     np.testing.assert_allclose(model.mass @ model.base_shape, (mass @ np.ones(4))[:3], rtol=1e-12)
 
 
+@pytest.mark.parametrize("sparse", [False, True])
+def test_a_base_shape_that_was_multiplied_by_the_mass_is_told(sparse: bool) -> None:
+    mass, stiffness = strip(6)
+    rigid = np.tile([1.0, 0.0], mass.shape[0] // 2)
+    given = (mass, stiffness) if sparse else (mass.toarray(), stiffness.toarray())
+    with pytest.warns(sb.DiagnosticWarning, match=r"base_shape of 10 numbers .*is the mass matrix times"):
+        sb.ReducedModel.from_matrices(*given, contact_shape=rigid, base_shape=mass @ rigid, modes=2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for right in (rigid, -rigid, 0.3 * rigid, np.linspace(0.0, 1.0, rigid.size)):
+            sb.ReducedModel.from_matrices(*given, contact_shape=rigid, base_shape=right, modes=2)
+
+
 @pytest.mark.filterwarnings("ignore::snapbeam.DiagnosticWarning")
 def test_penalties_without_mass_and_in_sparse_matrices() -> None:
     mass, stiffness = strip(50, clamped=False)

@@ -119,3 +119,28 @@ def test_a_style_sets_widths_and_text_and_can_be_taken_back(name, width):
         assert 25.4 * new_figure("double").get_figwidth() == pytest.approx(190.0)
     with pytest.raises(sb.InputError, match="name"):
         sb.plot.plot_style("poster")
+
+
+def test_heading_has_the_shock_or_the_random_vibration_of_the_base() -> None:
+    import xarray as xr
+
+    from snapbeam.plot.style import base_and_load
+
+    shock = {"base_excitation_acceleration_g": 1000.0, "base_excitation_duration_ms": 0.2}
+    assert base_and_load(xr.Dataset(attrs=shock)) == ["shock 1000 $g$, 0.2 ms"]
+    assert base_and_load(xr.Dataset(attrs=shock), ["base_excitation_acceleration_g"]) == ["shock 0.2 ms"]
+    assert base_and_load(xr.Dataset(attrs={"base_excitation_rms_g": 0.6})) == ["random 0.6 $g$ rms"]
+
+
+def test_units_are_written_with_their_symbols() -> None:
+    from snapbeam.plot.axes import written_unit
+
+    assert [written_unit(each) for each in ("kohm", "ohm", "um", "uW", "mm", "1", "u")] == [
+        "kΩ",
+        "Ω",
+        "µm",
+        "µW",
+        "mm",
+        "1",
+        "u",
+    ]

@@ -78,7 +78,7 @@ def test_curves_over_an_axis_have_an_interval_each(shaken) -> None:
         drawn = np.asarray(line.get_ydata(), dtype=float)
         assert drawn / drawn[0] == pytest.approx(means[at].values / float(means[at, 0]))
     ax = sb.plot.plot_statistic(layers, "harvested_power", over="base_excitation.rms_g")
-    assert [each.get_label() for each in ax.lines] == ["1000 Ω", "10 kΩ", "100 kΩ"]
+    assert [each.get_label() for each in ax.lines] == ["$R$ = 1000 Ω", "$R$ = 10 kΩ", "$R$ = 100 kΩ"]
     with pytest.raises(InputError, match="is not an axis of the figure"):
         sb.plot.plot_statistic(layers, "harvested_power", over="beam.thickness")
 

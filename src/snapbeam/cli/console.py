@@ -66,7 +66,7 @@ _OUTPUT_OPTIONS: ContextVar[_OutputOptions] = ContextVar("asked", default=_Outpu
 _JSON = Annotated[
     Path | None,
     typer.Option(
-        "--json", help="JSON file to write the results to; - writes them to standard output instead of text.",
+        "--json", help="JSON file to write the results to; without a name, or with -, standard output instead of text.",
         rich_help_panel="Output", metavar="FILE",
     ),
 ]  # fmt: skip

@@ -26,8 +26,8 @@ _COLUMNS = ("statistic", "parameter", "derivative", "unit", "error", "way", "gro
 @with_parameters(*ALL)
 def gradient(
     given: Any,
-    config: Annotated[
-        Path | None, typer.Argument(help="TOML parameter file; options override it.", metavar="FILE")
+    file: Annotated[
+        Path | None, typer.Argument(help="TOML parameter file, as --config; options override it.", metavar="FILE")
     ] = None,
     parameters: Annotated[
         str | None,
@@ -60,14 +60,18 @@ def gradient(
     Example: snapbeam gradient system.toml --parameters velocity_amplitude,location --statistic peak_force,impulse
     --cycles 5 -o gradient.nc --plot gradient.png
     """  # fmt: skip
+    from snapbeam.model.parameters import in_table
     from snapbeam.uncertainty.gradients import gradient as compute
     from snapbeam.util.validation import InputError
 
-    settings = configured(given | {"config": config})
+    if file is not None and given["config"] is not None:
+        raise InputError(f"FILE = {str(file)!r} with --config: give one of the two")
+    settings = configured(given | {"config": file or given["config"]})
     check_outputs(output, plot, (".nc", ".csv", ".json"), "statistic,")
     system = settings.system
     if parameters is None:
-        known = [name for name, value in system.parameters.items() if isinstance(value, float) and value != 0.0]
+        own = in_table(system.parameters)
+        known = [name for name, value in own.items() if isinstance(value, float) and value != 0.0]
         raise InputError(f"parameters (--parameters): must name one or more of {', '.join(known)}")
     names = [settings.full_name(name.strip()) for name in parameters.split(",")]
     statistics = [name.strip() for name in statistic.split(",")]

@@ -33,7 +33,13 @@ def info(
     """
     from snapbeam.cli.console import open_result
     from snapbeam.cli.summary import class_table, parameter_table, status_lines
+    from snapbeam.util.validation import InputError
 
+    if file.suffix.lower() == ".toml":
+        raise InputError(
+            f"file = {str(file)!r}: is a parameter file, not a result; snapbeam simulate --config FILE --print-config "
+            "prints its parameters, snapbeam equilibria --config FILE its structure"
+        )
     dataset = open_result(file)
     if export is not None:
         _export(dataset, export)

@@ -834,7 +834,8 @@ def coordinate_on_axis(dataset: xr.Dataset, option: str, text: str) -> tuple[str
 
     name, value = _assignment(text, option)
     axes = {str(dim): dataset[dim].attrs["parameter"] for dim in dataset.dims if "parameter" in dataset[dim].attrs}
-    row = lookup(named_in(name, {split_name(full)[0]: {} for full in axes.values()}))
+    last = [full for full in axes.values() if split_name(full)[1] == name]
+    row = lookup(last[0] if len(last) == 1 else named_in(name, {split_name(full)[0]: {} for full in axes.values()}))
     dim = next((each for each, full in axes.items() if full in (row.name, ratio_of(row.name))), None)
     if dim is None:
         raise InputError(

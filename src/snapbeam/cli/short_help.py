@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import textwrap
+from itertools import zip_longest
 from typing import Any
 
 from typer.core import TyperCommand, TyperGroup
@@ -28,6 +29,14 @@ def wants_all(ctx: Any) -> None:
 
 class ShortHelpCommand(TyperCommand):
     """A command whose ``--help`` fits on a screen; ``--help-all`` lists every option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; ``--json`` without a file is ``--json -``."""
+        words = []
+        for word, following in zip_longest(args, args[1:], fillvalue="--"):
+            bare = word == "--json" and following != "-" and following.startswith("-")
+            words += [word, "-"] if bare else [word]
+        return super().parse_args(ctx, words)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help: every option, or the usual ones."""

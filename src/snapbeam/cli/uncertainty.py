@@ -70,10 +70,12 @@ def taken(kind: Any, table: dict[str, Any], where: str, further: str = "") -> An
 
     from snapbeam.util.validation import InputError
 
-    known = [each.name for each in dataclasses.fields(kind)]
+    known = [each.name for each in dataclasses.fields(kind) if each.init]
     for name in table:
         if name not in known:
-            raise InputError(f"{where}.{name}: unknown; must be one of {', '.join([*known, *filter(None, [further])])}")
+            told = [*known, *filter(None, [further])]
+            instead = getattr(kind, "instead", {}).get(name, "")
+            raise InputError(f"{where}.{name}: unknown; must be one of {', '.join(told)}{instead and '; ' + instead}")
     try:
         return kind(**table)
     except TypeError as error:
@@ -312,12 +314,14 @@ def probability(
 def _default_axes(system: System) -> dict[str, Any]:
     """Axes of a map if none is named: the paper's plane of a struck beam; the one point of another system."""
     from snapbeam.model.parameter_file import DEFAULT_AXES, parsed_axis
-    from snapbeam.model.parameters import lookup
+    from snapbeam.model.parameters import in_table, lookup
     from snapbeam.util.validation import InputError
 
     if DEFAULT_AXES.keys() <= system.parameters.keys():
         return {name: parsed_axis(name, text) for name, text in DEFAULT_AXES.items()}
-    numbers = [name for name, each in system.parameters.items() if isinstance(each, float) and lookup(name).is_run]
+    numbers = [
+        name for name, each in in_table(system.parameters).items() if isinstance(each, float) and lookup(name).is_run
+    ]
     if not numbers:
         raise InputError("[contact]: missing, as is any other excitation; add one, and name the axes in [sweep]")
     return {numbers[0]: np.array([system.get(numbers[0])])}

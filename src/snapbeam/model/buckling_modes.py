@@ -389,6 +389,8 @@ def checked_structure(given: StructureMatrices) -> dict[str, Any]:
             ratio = ratio[: free.size]  # the others are those of the fixed coordinates
         count = free.size
     _require_mass(mass)
+    if rows["base_shape"] is not None:
+        _tell_multiplied(rows["base_shape"], mass)
     if given.modes is not None:
         modes = integer("modes", given.modes, 1, min(MAX_MODES, count))
         if rows["well_amplitude"] is not None and rows["well_amplitude"].any():
@@ -523,14 +525,33 @@ def _release(rows: dict[str, _Array | None], fixed: NDArray[np.bool_], mass: Any
     if base is not None and base[fixed].any():
         free = np.flatnonzero(~fixed)
         across = mass[free][:, np.flatnonzero(fixed)] @ base[fixed]
-        own = mass[free][:, free]
-        if is_sparse(own):
-            from scipy.sparse.linalg import spsolve
+        rows["base_shape"] = base[free] + _solved(mass[free][:, free], across)
 
-            solved = spsolve(own.tocsc(), across)
-        else:
-            solved = np.linalg.solve(own, across)
-        rows["base_shape"] = base[free] + solved
+
+def _solved(mass: Any, right: _Array) -> _Array:
+    if is_sparse(mass):
+        from scipy.sparse.linalg import spsolve
+
+        return np.asarray(spsolve(mass.tocsc(), right))
+    return np.linalg.solve(mass, right)
+
+
+def _tell_multiplied(base: _Array, mass: Any) -> None:
+    """Warn of a base_shape m r where r moves each coordinate by 0 or 1, but m r does not."""
+
+    def is_rigid(row: _Array) -> bool:
+        size = np.abs(row)
+        return bool(size.any() and (np.minimum(size, np.abs(size - 1.0)) < 1e-6).all() and size.max() > 0.5)
+
+    if is_rigid(base):
+        return
+    moved = _solved(mass, base)
+    if is_rigid(moved):
+        message = (
+            f"base_shape of {base.size} numbers up to {np.abs(base).max():g}: is the mass matrix times a motion of each coordinate "
+            "by 0 or 1, and is multiplied by the mass matrix once more; give that motion, without the mass matrix"
+        )
+        tell([Diagnostic("multiplied-base-shape", message, {"largest": float(np.abs(base).max())})])
 
 
 def _stretching(matrix: _Array) -> _Array:

@@ -89,11 +89,11 @@ def _amplitude(
 
 def _gap(kappa: _Array, gamma: float, origin: int, shift: float) -> _Array:
     """kappa_i + gamma s, exact for the mode whose pole is near."""
-    with np.errstate(divide="ignore"):
-        at: _Array = (kappa if origin < 0 else kappa - kappa[origin]) + gamma * shift
+    at: _Array = (kappa if origin < 0 else kappa - kappa[origin]) + gamma * shift
     return at
 
 
+@np.errstate(divide="ignore")
 def _roots(kappa: _Array, force: _Array, gamma: float) -> list[tuple[int, float, bool]]:
     """The roots of the secular equation, each as a pole and the distance from it, and whether h rises there."""
     pushed = np.flatnonzero(force != 0.0)
@@ -102,15 +102,16 @@ def _roots(kappa: _Array, force: _Array, gamma: float) -> list[tuple[int, float,
     edges = ([] if poles and kappa[poles[0]] == 0.0 else [-1]) + poles
     place = {i: 0.0 if i < 0 else -float(kappa[i]) / gamma for i in edges}
 
+    squares = squares[pushed]
+    from_pole = {i: (kappa if i < 0 else kappa - kappa[i])[pushed] for i in edges}
+
     def value(origin: int, shift: float) -> float:
-        gap = _gap(kappa, gamma, origin, shift)[pushed]
-        with np.errstate(divide="ignore"):
-            return float(np.sum(squares[pushed] / gap**2)) - place[origin] - shift
+        gap = from_pole[origin] + gamma * shift
+        return float((squares / gap**2).sum()) - place[origin] - shift
 
     def slope(origin: int, shift: float) -> float:
-        gap = _gap(kappa, gamma, origin, shift)[pushed]
-        with np.errstate(divide="ignore"):
-            return -2.0 * gamma * float(np.sum(squares[pushed] / gap**3)) - 1.0
+        gap = from_pole[origin] + gamma * shift
+        return -2.0 * gamma * float((squares / gap**3).sum()) - 1.0
 
     found: list[tuple[int, float, bool]] = []
     for left, right in pairwise(edges):

@@ -88,9 +88,14 @@ def equilibrium_branches(
     row = system.parameter(parameter)
     name = row.name
     if row.quantity.kind is not float or not isinstance(system.parameters.get(ratio_of(name)), float):
+        of_energy = ("beam.", "boundary.", "imperfection.", "force")
+        own = [
+            key for key, value in system.parameters.items() if isinstance(value, float) and key.startswith(of_energy)
+        ]
+        none = "none, since it has no beam, no imperfection and no force; change its matrices instead"
         raise InputError(
-            f"parameter = {shown(parameter)}: must be a number that the system has; it has "
-            f"{', '.join(key for key, value in system.parameters.items() if isinstance(value, float))}"
+            f"parameter = {shown(parameter)}: must be a number that the potential energy of the system has; it has "
+            f"{', '.join(own) or none}"
         )
     low, high = interval("values", values)
     for end in (low, high):

@@ -39,6 +39,10 @@ _NEWTON = 12
 _LEAST_NORM = 40
 """Steps of minimum norm, whose convergence is linear at a singular point."""
 _CONVERGED = 1e-12
+_BALANCED = 1e-15
+"""Residual over the forces of the structure, up to which it is rounding."""
+_STALE = 1e-3
+"""Step of Newton's method, scaled, up to which the derivative by the parameter is not computed anew."""
 _UNCOUPLED = 1e-6
 """Share of the row of the force in the direction that loses its stiffness, up to which a path branches off there."""
 _ASIDE = 4e-3
@@ -235,10 +239,11 @@ class _Tracer:
         """The potential that gives the stiffness at a point."""
         return self.family.at(self.value(y))
 
-    def _jacobian(self, y: _Array) -> _Array:
-        """Derivatives of the scaled residual, shape (N, N + 1)."""
+    def _jacobian(self, y: _Array, push: _Array | None = None) -> _Array:
+        """Derivatives of the scaled residual, shape (N, N + 1), that by the value from *push* if it is given."""
         stiffness = self.length * self.potential(y)._tangent(self.amplitude(y))
-        push = self.family.push(self.amplitude(y), self.value(y))
+        if push is None:
+            push = self.family.push(self.amplitude(y), self.value(y))
         return np.column_stack((stiffness, -self.unit * push)) * self.balance[:, None]
 
     def point(self, y: _Array, along: _Array) -> _Point:
@@ -254,21 +259,26 @@ class _Tracer:
 
         Without *normal*, by steps of minimum norm: at a singular point no plane is across all paths.
         """
-        y = guess
+        y, push, moved = guess, None, math.inf
         for _ in range(_NEWTON if normal is not None else _LEAST_NORM):
             try:
                 if not self.potential(y)._holds(self.amplitude(y)):
                     return None
                 residual = self.family.residual(self.amplitude(y), self.value(y)) * self.balance
+                if normal is None and np.abs(residual).max() <= _BALANCED:
+                    return y  # at a singular point rounding moves it for ever
+                if push is None or moved > _STALE:
+                    push = self.family.push(self.amplitude(y), self.value(y))
+                jacobian = self._jacobian(y, push)
                 if normal is None:
-                    step = lstsq(self._jacobian(y), residual, rcond=1e-9)
+                    step = lstsq(jacobian, residual, rcond=1e-9)
                 else:
-                    system = np.vstack((self._jacobian(y), normal))
+                    system = np.vstack((jacobian, normal))
                     step = np.linalg.solve(system, np.append(residual, normal @ (y - guess)))
             except (np.linalg.LinAlgError, InputError):
                 return None
-            y = y - step
-            if np.abs(step).max() <= _CONVERGED * max(1.0, float(np.abs(y).max())):
+            y, moved = y - step, float(np.abs(step).max())
+            if moved <= _CONVERGED * max(1.0, float(np.abs(y).max())):
                 return y if self.potential(y)._holds(self.amplitude(y)) else None
         return y if normal is None else None
 

@@ -250,6 +250,11 @@ def short_names() -> dict[str, str]:
     return {row.short: name for name, row in _known().items()}
 
 
+def in_table(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of the parameters of the table, without those of a structure that is given by its matrices."""
+    return {name: value for name, value in values.items() if row_of(name) is not None}
+
+
 def lookup(name: str) -> Parameter:
     """The row of a parameter, by its dotted name or by the name that datasets use, in its physical unit too.
 

@@ -576,7 +576,7 @@ class ReducedModel(Wells):
         instance("beam", beam, Beam, "a Beam")
         count = integer("modes", modes, 1, MAX_MODES)
         shapes = beam.buckling_modes(count)
-        k = shapes.wavenumber
+        k, midspan_shape = shapes.wavenumber, shapes.shape(0.5 * beam.length)
         if isinstance(shapes, BucklingModes):
             mass = beam.mass_per_length * (np.eye(count) + _coupling(shapes.parity)) / np.outer(k, k)
         else:
@@ -587,7 +587,7 @@ class ReducedModel(Wells):
         if isinstance(shapes, BucklingModes):
             equilibrium[0] = -math.pi * beam.buckling_level / math.sqrt(2.0 * beam.length)
         else:
-            equilibrium[0] = -beam.buckling_level / float(shapes.shape(0.5 * beam.length)[0])
+            equilibrium[0] = -beam.buckling_level / float(midspan_shape[0])
         if beam.is_buckled:
             stiffness = beam.bending_stiffness * (k**2 - k[0] ** 2) - gamma * equilibrium[0] ** 2
         else:
@@ -602,10 +602,10 @@ class ReducedModel(Wells):
             force = beam.bending_stiffness * k**2 * initial + imperfection.transverse_load(shapes, beam)
             # an initial shape acts as a transverse force, and as a load of gamma s0 more
             stiffness = stiffness - gamma * float(initial @ initial)
-            found = landscape_of(stiffness, gamma, force, shapes.shape(0.5 * beam.length))
+            found = landscape_of(stiffness, gamma, force, midspan_shape)
             equilibrium = found.lower.amplitude
             if length_scale is None:
-                height = abs(float(shapes.shape(0.5 * beam.length) @ found.deepest.amplitude))
+                height = abs(float(midspan_shape @ found.deepest.amplitude))
                 length_scale = height if height > 0.0 else None
         return cls(
             mass=mass,
@@ -614,7 +614,7 @@ class ReducedModel(Wells):
             well_amplitude=equilibrium,
             length_scale=length_scale,
             given_damping_ratio=damping_ratios(damping_ratio, count),
-            midspan_shape=shapes.shape(0.5 * beam.length),
+            midspan_shape=midspan_shape,
             beam=beam,
             given_reference_frequency=None
             if reference_frequency is None

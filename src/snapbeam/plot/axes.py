@@ -38,10 +38,15 @@ _DECADES = 10.0
 """Ratio of the maximum to the minimum above which geometric points have a logarithmic axis."""
 
 
-def wrapped(text: str, width: int) -> str:
+def written_unit(unit: str) -> str:
+    """A unit as figures write it: kΩ for kohm, µm for um."""
+    return re.sub(r"^(k|M|G|m)?ohm$", r"\1Ω", re.sub(r"^u(?=[a-zA-Z])", "µ", unit))
+
+
+def wrapped(text: str, width: int = _LONGEST) -> str:
     """Text in lines, the unit or scale in parentheses at its end beside the word before it."""
     held = re.sub(r"\S+ \([^()]*\)$", lambda found: found[0].replace(" ", "\xa0"), text)
-    return textwrap.fill(held, width, break_long_words=False).replace("\xa0", " ")
+    return textwrap.fill(held, width, break_long_words=False, break_on_hyphens=False).replace("\xa0", " ")
 
 
 def axis_label(dataset: xr.Dataset, name: str) -> str:
@@ -58,7 +63,7 @@ def axis_label(dataset: xr.Dataset, name: str) -> str:
     _, unit = _scaled(dataset, name)
     if unit:
         text = f"{text.rpartition(' (')[0] or text} ({unit})"
-    return wrapped(text, _LONGEST)
+    return wrapped(text)
 
 
 def _scaled(dataset: xr.Dataset, name: str) -> tuple[float, str]:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from snapbeam.model.parameters import lookup
+from snapbeam.plot.axes import wrapped
 from snapbeam.plot.style import SERIES_COLORS, contains, frame, legend_below
 from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.validation import checked, choice
@@ -194,7 +195,7 @@ def plot_equilibrium_branches(
                     crossings[at] / size, heights[at] / prefix,
                     marker, markerfacecolor="white", markeredgecolor="#000000", markersize=4.5, linestyle="", label=words,
                 )  # fmt: skip
-        ax.set_xlabel(label)
+        ax.set_xlabel(wrapped(label))
         ax.set_ylabel(f"{'First natural frequency' if frequency else 'Displacement at mid-span'} ({unit})")
         ax.legend(handles=_in_order(handles), loc="best")
     return ax

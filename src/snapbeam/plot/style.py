@@ -401,7 +401,7 @@ _GRAVITY = 9.80665
 
 
 def base_and_load(dataset: xr.Dataset, axes: Collection[str] = ()) -> list[str]:
-    """The base excitation in Hz and g, and the load resistance of a harvester."""
+    """The base excitation in Hz, g and ms, and the load resistance of a harvester."""
     attrs, words = dataset.attrs, []
     omega = 2.0 * np.pi * attrs.get("reference_frequency", np.nan)
     unit = omega**2 * attrs.get("length_scale", np.nan)
@@ -415,6 +415,11 @@ def base_and_load(dataset: xr.Dataset, axes: Collection[str] = ()) -> list[str]:
             words.append(f"base {prefixed(value * omega / (2.0 * np.pi), 'Hz')}")
         elif name.endswith("amplitude") and np.isfinite(unit):
             words.append(f"{float(f'{value * unit / _GRAVITY:.3g}'):.6g} $g$")
+    of_shock = {"acceleration_g": "{:.6g} $g$", "duration_ms": "{:.4g} ms"}
+    for kind, texts in (("shock", of_shock), ("random", {"rms_g": "{:.4g} $g$ rms"})):
+        values = {name: fixed_value(dataset, f"base_excitation_{name}", axes) for name in texts}
+        told = [texts[name].format(value) for name, value in values.items() if value is not None]
+        words += [f"{kind} {', '.join(told)}"] if told else []
     return words
 
 

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from snapbeam.model.parameters import PHYSICAL, lookup
 from snapbeam.model.quantity import split_name
 from snapbeam.model.quasi_static import quasi_static_objection
-from snapbeam.plot.axes import AXIS_LABELS, axis_label, dress, edges_of, is_geometric, positions, wrapped
+from snapbeam.plot.axes import AXIS_LABELS, axis_label, dress, edges_of, is_geometric, positions, wrapped, written_unit
 from snapbeam.plot.map import in_order, quasi_static_along
 from snapbeam.plot.style import (
     CLASS_COLORS,
@@ -132,7 +132,7 @@ def _label(dataset: xr.Dataset, name: str) -> str:
     row = lookup(labels["parameter"]) if "parameter" in labels else None
     if f"fixed_{short}" in dataset.attrs or (row is not None and labels.get("units") == row.quantity.unit):
         return axis_label(dataset, short)
-    unit, words = str(labels.get("units", "1")), in_symbols(str(labels.get("long_name", name)))
+    unit, words = written_unit(str(labels.get("units", "1"))), in_symbols(str(labels.get("long_name", name)))
     words = re.sub("(?<=[a-z])_(?=[a-z])", " ", words)  # names of statistics in it
     words = scale_text(dataset.attrs, words) if "over $b" in words else words
     return wrapped(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}", 44)

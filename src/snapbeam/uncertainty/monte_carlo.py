@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from snapbeam.dynamics.flow import InitialConditions, held_in_space
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameter_axes import unit_of
-from snapbeam.model.parameters import PHYSICAL, lookup, physical_names, ratio_of, row_of
+from snapbeam.model.parameters import PHYSICAL, in_table, lookup, physical_names, ratio_of, row_of
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.model.state import amplitude_scale
 from snapbeam.model.system import System
@@ -139,7 +139,7 @@ class Trials:
         return self.of_columns(columns, progress)
 
     def _any_parameter(self) -> tuple[str, ...]:
-        own = self.system.parameters
+        own = in_table(self.system.parameters)
         return tuple(name for name in own if isinstance(own[name], float) and lookup(name).is_run)[:1]
 
     def of_columns(self, columns: Columns, progress: Progress | None = None) -> dict[str, NDArray[Any]]:

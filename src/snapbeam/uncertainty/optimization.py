@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from snapbeam.model.integration import Integration
-from snapbeam.model.parameters import lookup
+from snapbeam.model.parameters import in_table, lookup
 from snapbeam.model.system import System
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.compute import CheckpointOptions
@@ -161,6 +161,9 @@ class Objective:
     quantity: str
     quantile: float | None = None
     maximize: bool = False
+    instead: ClassVar[dict[str, str]] = {
+        "mean": 'leave it out, the mean of a statistic is the objective without quantile: {quantity = "peak_force"}'
+    }
 
     def __post_init__(self) -> None:
         kind = quantity_of(self.quantity).kind
@@ -254,6 +257,9 @@ class Constraint:
     upper: float | None = None
     probability: float = 0.95
     scale: str = field(default="", init=False, repr=False)
+    instead: ClassVar[dict[str, str]] = {
+        "mean": 'limits hold for a share of the systems: {quantity = "peak_force", upper = "5 N", probability = 0.5} for the median'
+    }
 
     def __post_init__(self) -> None:
         kind = quantity_of(self.quantity).kind
@@ -1026,7 +1032,7 @@ def _dataset(
     }  # fmt: skip
     if all(lookup(name).is_run for name in problem.names):  # otherwise the wells differ between designs
         attrs |= {"initial_well": trials.system.start_well, "initial_well_reason": trials.system.initial_well_reason}
-    attrs |= {f"fixed_{lookup(name).short}": +value for name, value in trials.system.parameters.items()
+    attrs |= {f"fixed_{lookup(name).short}": +value for name, value in in_table(trials.system.parameters).items()
               if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
     dataset = xr.Dataset(attrs=attrs)
     x, objectives, violation, distances = tried
