@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 from scipy.signal import butter, lfilter
 from scipy.signal.windows import tukey
+from scipy.special import logsumexp
 from scipy.stats import chi2
 
 from snapbeam.lab.decay.poles import Line
@@ -41,12 +42,11 @@ _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
 _START = 20.0  # cycles of the start that a filter shapes
 _CONTRADICTS = 40.0  # chi-square of what a start or a drive that no model describes to the noise leaves
 _SPREADS = 2.0  # standard deviations of chi-square that a start leaves by chance
-_DESCRIBED = 1.2  # times its noise up to which what a start leaves is noise
 _PASSES = 0.05  # of the drive that a filter must let pass for it to be seen at all
 _BETWEEN = 0.02  # of a start, which filters between those that are tried leave
-_POSSIBLE = 3.0  # chi-square by which a filter may be worse than none, or than the best, and be there
-_SHOWS = 12.0  # chi-square by which noise or start alone show a filter, whatever the other says
-_UNSEEN = 0.002  # of the amplitude, up to which a filter that nothing shows is not thought of
+_CERTAIN = 20.0  # logarithm of the odds that noise or start alone may give
+_WHITE = 0.2  # probability of white noise
+_UNSEEN = 0.2  # of the standard error, up to which a filter that nothing shows is not thought of
 _BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
 _CONSTANT = 4  # cycles on either side of a jump
 _FADES = (8.0, 30.0)  # rates of starts that are not over, over the length
@@ -117,7 +117,7 @@ def one_sided(samples: SignalSamples, rest: int, first: int, last: int, fit: Sin
 class Record(NamedTuple):
     """A record as detectors see it: its steady part, the sine fitted to it and what that leaves, and its cycles.
 
-    ``early`` are the cycles before its start, ``moving`` the record from there on.
+    ``early`` are the cycles before its start, ``moving`` the record from ``lead`` samples before it on.
     """
 
     fit: SineFit
@@ -128,6 +128,7 @@ class Record(NamedTuple):
     cycles: NDArray[np.complex128]
     early: NDArray[np.complex128]
     moving: SignalSamples
+    lead: int
     clipped: bool
 
 
@@ -362,7 +363,7 @@ def _filters(record: Record) -> list[Hypothesis]:
     """
     drive = record.fit.frequency
     noise = _noise_misfit(record)
-    plain = noise(None, False)
+    plain = float(noise(None).min())
     # behind a notch at its own frequency the drive is gone but for the change of its amplitude, and it is there
     candidates = [one for one in _candidates(drive) if abs(one.response(drive)) > _PASSES]
     start, certain = _start_gains(record, candidates)
@@ -379,7 +380,7 @@ def _filters(record: Record) -> list[Hypothesis]:
             "wanted": 20.0 * drive,
             "delay_ms": 1e3 * order / (2.0 * math.pi * one.centre),
         }
-        shown = plain - noise(one, False)
+        shown = plain - float(noise(one).min())
         # a notch rings where its noise has a hole
         seen = one.kind == "notch" or shown > -_CONTRADICTS
         gain = shown + max(gain, -_CONTRADICTS) if seen else shown
@@ -390,53 +391,57 @@ def _filters(record: Record) -> list[Hypothesis]:
 
 
 def _hidden_filters(record: Record) -> list[Hypothesis]:
-    """The largest loss by a high-pass that noise and start do not exclude: in the standard error, and no doubt.
+    """The loss by a high-pass that noise and start do not exclude: in the standard error, and no doubt.
 
-    It is possible where both together are not against it, or where one of them shows it, whatever the other says: noise
-    may hold the end of a transient, and a start may be of any kind, so what no filter explains of it excuses one.  White
-    noise behind a filter was coloured with the filter's own corner, a coincidence that is as rare as the filter would
-    have coloured white noise much: the loss is taken with the root of that probability.
+    It is the root of the mean square of what a filter takes, each as probable as noise and start make it, for as many
+    records behind one as others.  The colour of the noise is any of those tried, so what noise behind a filter shows, white
+    most of all, has little weight where it takes the one colour that the filter makes look so.  What no filter explains of a
+    start excuses one, for it is of a kind that is not modelled.
     """
     if not record.early.size:
         return []
     drive = record.fit.frequency
     filters = [one for one in _candidates(drive) if one.kind == "high_pass"]
     misfit = _noise_misfit(record)
-    noise = np.array([misfit(one, False) for one in filters]) - misfit(None, False)
+    noise = np.array([_weight(misfit(one)) for one in (None, *filters)])
     start, unexplained, freedom = _free_start(record, filters)
-    described = 1.0 + unexplained / freedom
     excused = min(float(start.min()), 0.0) + max(unexplained - _SPREADS * math.sqrt(2.0 * freedom), 0.0)
     against = np.maximum(start, excused) - max(0.0, excused)
-    both = np.minimum(noise, _CONTRADICTS) + np.maximum(against, -_CONTRADICTS)
-    possible = both < min(float(both.min()), 0.0) + _POSSIBLE
-    possible |= noise < min(float(noise.min()) + _POSSIBLE, -_SHOWS)
-    possible |= start < min(float(start.min()) + _POSSIBLE + unexplained, -_SHOWS)
-    possible &= (noise < _CONTRADICTS) | ((start < -_CONTRADICTS) & (described < _DESCRIBED))
+    odds = np.clip(noise[1:] - noise[0], -_CERTAIN, _CERTAIN) - np.clip(0.5 * against, -_CERTAIN, _CERTAIN)
+    odds = np.exp(odds) / len(filters)
     loss = np.array([1.0 / abs(one.response(drive)) - 1.0 for one in filters])
-    taken = np.where(possible, loss, 0.0)
-    if misfit(None, True) - misfit(None, False) < _SHOWS:
-        white = np.array([misfit(one, True) for one in filters]) - misfit(None, True)
-        taken *= np.sqrt(_SHOWS / np.maximum(white, _SHOWS))
-    most = int(np.argmax(taken))
-    if taken[most] < _UNSEEN:
+    share = odds * loss**2 / (1.0 + odds.sum())
+    taken = math.sqrt(float(share.sum()))
+    if taken < _UNSEEN * record.fit.amplitude_se / record.fit.amplitude:
         return []
-    numbers = {"corner": filters[most].centre, "limit": 0.05 * drive}
-    numbers |= {"loss_percent": 100.0 * loss[most] / (1.0 + loss[most]), "taken_percent": 100.0 * taken[most]}
-    return [Hypothesis("high_pass_possible", math.inf, 1, float(taken[most]), numbers=numbers)]
+    most = int(np.argmax(share))
+    numbers = {"corner": filters[most].centre, "limit": 0.05 * drive, "taken_percent": 100.0 * taken}
+    numbers["loss_percent"] = 100.0 * float(loss[most] / (1.0 + loss[most]))
+    return [Hypothesis("high_pass_possible", math.inf, 1, taken, numbers=numbers)]
+
+
+def _weight(misfit: _Array) -> float:
+    """Logarithm of the likelihood of noise, by its misfit with each colour, the first of which is white."""
+    weights = np.full(misfit.size, (1.0 - _WHITE) / max(misfit.size - 1, 1))
+    weights[0] = _WHITE
+    return float(logsumexp(-0.5 * misfit, b=weights)) if misfit.size > 1 else 0.0
 
 
 def _free_start(record: Record, filters: list[_Filter]) -> tuple[_Array, float, int]:
     """Chi-square by which filters fit the first cycles worse than none, what the best leaves beyond noise, and the freedom.
 
     The motion behind each is a sine of any amplitude and phase that change over a cycle: its start at once, the tail behind
-    a filter is no such sine.  Noise is what the same sine leaves of the end of the record.
+    a filter is no such sine.  It starts within a few samples of the onset, for those that a late one leaves out are all that a
+    filter has seen before.  Noise is what the same sine leaves of the end of the record.
     """
     fit, moving = record.fit, record.moving
     every = max(int(moving.sampling_frequency / (40.0 * fit.frequency)), 1)
-    size = min(int(_START * moving.sampling_frequency / fit.frequency), moving.values.size) // every
+    ahead = record.lead // every
+    begin = record.lead - ahead * every
+    size = min(int(_START * moving.sampling_frequency / fit.frequency), moving.values.size - begin) // every
     first, last = (
         (part - fit.offset).reshape(size, every).mean(1)
-        for part in (moving.values[: size * every], moving.values[-size * every :])
+        for part in (moving.values[begin : begin + size * every], moving.values[-size * every :])
     )
     rate = moving.sampling_frequency / every
     cycles = np.arange(size) * fit.frequency / rate
@@ -445,28 +450,34 @@ def _free_start(record: Record, filters: list[_Filter]) -> tuple[_Array, float, 
     course = BSpline.design_matrix(inside, np.pad(knots, 3, mode="edge"), 3).toarray()
     turn = np.exp(2j * math.pi * cycles)[:, None]
     waves = np.hstack([course * turn, turn**2, turn**3])
-    columns = np.hstack([waves.real, waves.imag])
-    freedom = size - columns.shape[1] - 2
+    # what it does within the sample in which it starts
+    columns = np.hstack([waves.real, waves.imag, np.eye(size, 1)])
+    freedom = size - columns.shape[1] - 1
     if freedom < 100:
         return np.zeros(len(filters)), 0.0, 1
 
-    def left(values: _Array, one: _Filter | None) -> float:
+    def left(values: _Array, one: _Filter | None, starts: range = range(1)) -> float:
         passed = columns if one is None else one.passed(columns, rate)
-        own = np.linalg.qr(np.hstack([passed, np.ones((size, 1))]))[0]
-        rest = (values - own @ (own.T @ values))[1:]
-        return float(rest @ rest)
+        rests = []
+        for late in starts:
+            design = np.vstack([np.zeros((late, columns.shape[1])), passed[: size - late]])
+            own = np.linalg.qr(np.hstack([design, np.ones((size, 1))]))[0]
+            rest = values - own @ (own.T @ values)
+            rests.append(float(rest @ rest))
+        return min(rests)
 
-    plain = left(first, None)
+    starts = range(ahead + 2)
+    plain = left(first, None, starts)
     colour = noise_colour(record.left, moving.sampling_frequency, fit.frequency) ** 2
     unit = colour * max(left(last, None) / freedom, 1e-12 * fit.amplitude**2)
-    worse = (np.array([left(first, one) for one in filters]) - plain) / unit
+    worse = (np.array([left(first, one, starts) for one in filters]) - plain) / unit
     return worse, max(plain / unit - freedom / colour + min(float(worse.min()), 0.0), 0.0), freedom
 
 
-def _noise_misfit(record: Record) -> Callable[[_Filter | None, bool], float]:
-    """Twice the negative logarithm of Whittle's likelihood of the noise behind a response, least over its colours.
+def _noise_misfit(record: Record) -> Callable[[_Filter | None], _Array]:
+    """Twice the negative logarithm of Whittle's likelihood of the noise behind a response, for each of its colours.
 
-    The function that is returned takes the response, and True for noise that is white before it.
+    The first is white.
     """
     rate, drive = record.part.sampling_frequency, record.fit.frequency
     left = record.left[min(round(_TAIL * rate / drive), record.left.size // 4) :]
@@ -485,7 +496,7 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None, bool], float]:
         used &= np.abs(freq - line) > 1.5 * rate / n
     freq, power = freq[used], power[used]
     if freq.size < 2 * _LINES or not power.min() > 1e-18 * n * record.fit.amplitude**2:
-        return lambda one, white: 0.0  # a computed signal has no noise that a filter shapes
+        return lambda one: np.zeros(1)  # a computed signal has no noise that a filter shapes
     # neighbours that differ in frequency by less than 1 % are averaged
     steps = np.arange(math.log(freq[-1] / freq[0]) / 0.00996)
     edges = np.unique(np.searchsorted(freq, freq[0] * 1.01**steps))
@@ -495,19 +506,21 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None, bool], float]:
     colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
     slope, knee = np.meshgrid([0.5, 1.0], np.geomspace(0.03, 3.0, 17))
     bent = ((freq / drive) ** 2 + knee.reshape(-1, 1) ** 2) ** (-0.5 * slope.reshape(-1, 1))
-    colours = np.vstack([np.ones_like(freq), colours, bent])
+    # a resonance of the bench
+    height, width, centre = np.meshgrid([1.0, 3.0, 10.0], [0.25, 0.5, 1.0], np.geomspace(0.1, 12.0, 24))
+    away = np.log(freq / drive / centre.reshape(-1, 1)) / width.reshape(-1, 1)
+    humps = 1.0 + height.reshape(-1, 1) * np.exp(-0.5 * away**2)
+    colours = np.vstack([np.ones_like(freq), colours, bent, humps])
     falling = colours[:, 0] >= colours[:, -1]
     shapes = np.log(colours) @ count
     weights = count / colours
 
-    def misfit(one: _Filter | None, white: bool) -> float:
+    def misfit(one: _Filter | None) -> _Array:
         kept = np.ones_like(freq) if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
-        total = count.sum() * np.log(weights @ (power / kept) / count.sum()) + shapes
-        if white:
-            total = total[:1]
-        elif one is not None and one.kind == "low_pass":
-            total = total[falling]  # noise that rises and is filtered again would explain any hill
-        return 2.0 / lines * (float(total.min()) + float(count @ np.log(kept)))
+        total: _Array = count.sum() * np.log(weights @ (power / kept) / count.sum()) + shapes + count @ np.log(kept)
+        if one is not None and one.kind == "low_pass":
+            total[~falling] = np.inf  # noise that rises and is filtered again would explain any hill
+        return 2.0 / lines * total
 
     return misfit
 
@@ -518,7 +531,7 @@ def _start_gains(record: Record, filters: list[_Filter]) -> tuple[list[float], f
     A low-pass makes a start alike to a gentle one, so it is not judged by it.  With it, what the best notch explains
     whatever the shape of the start is.
     """
-    fit, moving = record.fit, record.moving
+    fit, moving = record.fit, record.moving.part(slice(record.lead, None))
     every = max(int(moving.sampling_frequency / (40.0 * fit.frequency)), 1)
     count = min(int(_START * moving.sampling_frequency / fit.frequency), moving.values.size)
     time = moving.time[:count:every] - moving.time[0]

@@ -65,6 +65,7 @@ SNR_LIMIT = 15.0
 _STEADY = 0.03  # share by which the cycles of a steady motion may stray
 _SAME_LINE = 0.02  # of the frequency by which the highest line may differ
 _BRIDGED = 5  # frames
+_LEAD = 0.1  # cycles by which a start may lie before its onset
 
 
 def _late_fit(samples: SignalSamples, first: int, last: int, frequency: float) -> SineFit:
@@ -640,8 +641,9 @@ def measure_drive(
     left = part.values - steady.waveform(part.time)
     left[~sound_samples(left.size, flaws)] = 0.0
     others = tuple(line.frequency for line in (*lines.hum, *lines.beside))
-    whole = samples.part(slice(*np.searchsorted(samples.time, (start, stop)).tolist()))
-    record = Record(steady, part, left, others, times, cycles, early, whole, clipping.found)
+    lead, at, end = np.searchsorted(samples.time, (start - _LEAD * period, start, stop)).tolist()
+    whole = samples.part(slice(lead, end))
+    record = Record(steady, part, left, others, times, cycles, early, whole, at - lead, clipping.found)
     errors = find_errors(record)
     kinds = {one.kind for one in errors if one.matters}
     if kinds & {"samples_lost", "beat", "interpolated", "gain", "sign", "few_bits"}:
