@@ -45,6 +45,7 @@ _SPREADS = 2.0  # standard deviations of chi-square that a start leaves by chanc
 _PASSES = 0.05  # of the drive that a filter must let pass for it to be seen at all
 _BETWEEN = 0.02  # of a start, which filters between those that are tried leave
 _CERTAIN = 20.0  # logarithm of the odds that noise or start alone may give
+_BELIEVED = 0.5  # of the chi-square of a start, for starts are of more kinds than those that are modelled
 _WHITE = 0.2  # probability of white noise
 _UNSEEN = 0.2  # of the standard error, up to which a filter that nothing shows is not thought of
 _BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
@@ -407,7 +408,7 @@ def _hidden_filters(record: Record) -> list[Hypothesis]:
     start, unexplained, freedom = _free_start(record, filters)
     excused = min(float(start.min()), 0.0) + max(unexplained - _SPREADS * math.sqrt(2.0 * freedom), 0.0)
     against = np.maximum(start, excused) - max(0.0, excused)
-    odds = np.clip(noise[1:] - noise[0], -_CERTAIN, _CERTAIN) - np.clip(0.5 * against, -_CERTAIN, _CERTAIN)
+    odds = sum(np.clip(one, -_CERTAIN, _CERTAIN) for one in (noise[1:] - noise[0], -0.5 * _BELIEVED * against))
     odds = np.exp(odds) / len(filters)
     loss = np.array([1.0 / abs(one.response(drive)) - 1.0 for one in filters])
     share = odds * loss**2 / (1.0 + odds.sum())

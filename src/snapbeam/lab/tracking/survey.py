@@ -183,6 +183,7 @@ _CLIPPED_SHIFT = 0.5  # px by which the edge of an overexposed object may lie of
 _STEP = 0.25  # px
 _REACH = 5.0
 _LEAST = 200  # windows
+_GRAIN = 4  # columns that share a grain of texture
 _CERTAIN = 30.0  # chi-square by which a bent edge must be worse than a straight one
 _LIKELY = 0.4  # |log gamma| of a curve that is taken before stronger ones
 _CENTRES = 24  # tried on either side of 0
@@ -208,7 +209,7 @@ def edge_shape(
     level = (data * sign).mean(-1) - contrast * model.mean(-1)
     share = (data * sign - level[:, None]) / contrast[:, None]
     places = np.stack(np.nonzero(good))
-    groups = (places[0], places[1], np.floor(centre[good] - centre[good].min()).astype(np.intp))
+    groups = (places[0], places[1] // _GRAIN, np.floor(centre[good] - centre[good].min()).astype(np.intp))
     x, y, error = _binned(offset, share, groups)
     if x.size < 24 or clipped > CLIPPED:
         return unknown
@@ -278,7 +279,7 @@ def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
 def _binned(offset: Floats, share: Floats, groups: tuple[NDArray[np.intp], ...]) -> tuple[Floats, Floats, Floats]:
     """Mean offset, mean share and its standard error in steps of a fraction of a pixel.
 
-    Windows of one frame, one column or one row may be off together, by uneven light, speckle or noise of rows: the
+    Windows of one frame, of columns side by side or of one row may be off together, by uneven light, texture or noise: the
     error is the largest of those with the windows of a group as one.
     """
     index = np.floor((offset + _REACH) / _STEP).astype(int)
