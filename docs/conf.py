@@ -140,24 +140,13 @@ _BRIEF = tuple(
 """Names and modules of which the reference has signature and summary only."""
 
 
-def _statements(code: str) -> set[str]:
-    """Statements of a preamble in one form, and the one that makes its system at once."""
-    body = ast.parse(code).body
-    made = {node.targets[0].id: node.value for node in body if isinstance(node, ast.Assign)}
-    at_once = f"system = {ast.unparse(made['system'])}" if "system" in made else ""
-    for name in ("model", "shaker"):
-        if name in made:
-            at_once = re.sub(rf"\b{name}\b(?!=)", ast.unparse(made[name]), at_once)
-    return {*map(ast.unparse, body), at_once}
-
-
 def shorten(app: Any, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
     """Leave out of a docstring what the page states once, and all but the summary of names that are listed only."""
     if name in _BRIEF or name.startswith(tuple(f"{each}." for each in _BRIEF)):
         lines[:] = lines[: lines.index("")] if "" in lines else lines
         return
     code = _PREAMBLES.get(app.env.docname, "")
-    stated = _statements(code)
+    stated = set(map(ast.unparse, ast.parse(code).body))
     bound = {
         each.asname or each.name
         for node in ast.walk(ast.parse(code))
@@ -180,7 +169,8 @@ def shorten(app: Any, what: str, name: str, found: Any, options: Any, lines: lis
                 isinstance(node, (ast.Import, ast.ImportFrom))
                 and {each.asname or each.name for each in node.names} <= bound
             )
-            if imported or (leading and node is not None and ast.unparse(node) in stated):
+            own = any(name.rpartition(".")[2] + "(" in line for line in lines[position:end])
+            if imported or (leading and not own and node is not None and ast.unparse(node) in stated):
                 position = end
                 continue
             leading = False

@@ -328,9 +328,9 @@ def support_tables() -> str:
 
     questions = _questions()
     reasons: list[str] = []
-    rows: list[list[str]] = []
+    alike: dict[tuple[str, ...], list[str]] = {}
     for name, system in _parts().items():
-        row = [name]
+        row: list[str] = []
         for ask in questions.values():
             try:
                 row.append(ask(system) or "yes")
@@ -338,7 +338,7 @@ def support_tables() -> str:
                 reason = _without_names(str(error))
                 reasons += [reason] if reason not in reasons else []
                 row.append(f"no ({reasons.index(reason) + 1})")
-        rows.append(row)
+        alike.setdefault(tuple(row), []).append(name)
     refused = []
     for words, make in _refused_systems().items():
         try:
@@ -349,7 +349,7 @@ def support_tables() -> str:
             raise AssertionError(f"{words}: no longer refused; remove it from this table")
     listed = "\n".join(f"{i}. {_plain_text(reason)}" for i, reason in enumerate(reasons, 1))
     return (
-        _table(("system", *questions), rows)
+        _table(("systems", *questions), [("; ".join(names), *answers) for answers, names in alike.items()])
         + f"\nThe numbers are those of the reasons:\n\n{listed}\n\n"
         + "These systems are refused as a whole, when they are made or when a run of them is assembled:\n\n"
         + _table(("system", "reason"), [(words, _plain_text(reason)) for words, reason in refused])

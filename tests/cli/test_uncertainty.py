@@ -102,3 +102,31 @@ def test_design(tmp_path) -> None:
 def test_refusals(tmp_path, command: str, text: str, words: str) -> None:
     result = run(tmp_path, text, command)
     assert result.exit_code == 2 and words in result.output.replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ('"contact.gap" = {normal = "10 kg"}', "uncertainty.contact.gap: the unit 'kg' does not fit; must be in m"),
+        ('"contact.gap" = {uniform = [1e-5, 2e-5]}', "uncertainty.contact.gap: half_width"),
+        ("[probability]\nruns = 4\naxes = 3", "probability.axes: unknown; must be one of"),
+        ("[probability]\nruns = 4\nhalf_width = 0.2", "probability.runs = 4: give either runs or half_width"),
+    ],
+)
+def test_a_wrong_tolerance_or_question_is_named(tmp_path, section: str, words: str) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text(SYSTEM + section)
+    result = CliRunner().invoke(app, ["probability", str(file), "-y"])
+    assert result.exit_code == 2 and words in " ".join(result.output.split())
+
+
+def test_tolerances_have_the_units_of_their_parameters() -> None:
+    from snapbeam.uncertainty.distributions import uncertainty_from_mapping
+
+    given = {
+        "beam.thickness": {"normal": "5 um"}, "beam.width": {"uniform": "2 %", "relative": True},
+        "contact.gap": {"range": ["10 um", "0.03 mm"]}, "contact.stiffness": {"lognormal": "20 %"},
+    }  # fmt: skip
+    of = uncertainty_from_mapping(given).of
+    assert of["beam.thickness"].standard_deviation == 5e-6 and of["beam.width"].half_width == 0.02
+    assert (of["contact.gap"].low, of["contact.gap"].high, of["contact.stiffness"].sigma) == (1e-5, 3e-5, 0.2)

@@ -321,7 +321,9 @@ def test_supported_combinations():
         [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("| ")]
         for part in re.split("These systems are refused as a whole.*", text)
     )
-    answers = {row[0]: dict(zip(first[0][1:], row[1:], strict=True)) for row in first[2:]}
+    assert len({tuple(row[1:]) for row in first[2:]}) == len(first[2:])
+    answers = {name: dict(zip(first[0][1:], row[1:], strict=True)) for row in first[2:] for name in row[0].split("; ")}
+    assert len(answers) > 40
     assert {value for row in answers.values() for value in row.values()} >= {
         "yes",
         "crossings",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
+import snapbeam as sb
 from snapbeam.model.contact.base import LAWS, ContactLaw
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
@@ -179,3 +181,42 @@ def test_a_law_without_force_is_refused_by_name() -> None:
                 return 5e4 * penetration**2
 
     assert "half_done" not in LAWS
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearOfAnyScope(ContactLaw):
+    """A law whose constant was declared without a scope."""
+
+    rigidity: float = sb.quantity("N/m", "rigidity", low=0.0)
+    name = "linear_of_any_scope"
+
+    @staticmethod
+    def force(law, penetration):
+        return law.rigidity * penetration
+
+    @staticmethod
+    def energy(law, penetration):
+        return 0.5 * law.rigidity * penetration * penetration
+
+    @staticmethod
+    def slope(law, penetration):
+        return law.rigidity
+
+
+del LAWS["linear_of_any_scope"]
+
+
+def test_a_constant_of_an_own_law_may_be_of_the_model(monkeypatch) -> None:
+    """A linear law is a spring of the package without its damper, alone and along an axis."""
+    monkeypatch.setitem(LAWS, LinearOfAnyScope.name, LinearOfAnyScope)
+    model = sb.ReducedModel.from_beam(sb.Beam(length=0.2, thickness=5e-4, width=0.012, density=2700.0, young_modulus=70e9, buckling_level=6e-4), modes=2)  # fmt: skip
+    shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2).striker()
+    own, built_in = (
+        sb.System(model, contacts=[sb.Contact(law, shaker)])
+        for law in (LinearOfAnyScope(rigidity=1e5), sb.KelvinVoigt(linear_stiffness=1e5, linear_damping=0.0))
+    )
+    cycles = sb.Integration(cycles=2)
+    expected = sb.sweep(built_in, {"contact.linear_stiffness": [1e4, 1e5]}, cycles).peak_force.values
+    found = sb.sweep(own, {"contact.rigidity": [1e4, 1e5]}, cycles).peak_force.values
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+    assert sb.simulate(own, cycles).summary.peak_force == pytest.approx(expected[1], rel=1e-3)

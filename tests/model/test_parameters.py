@@ -44,7 +44,8 @@ def test_every_quantity_of_every_class_is_in_it(section: str) -> None:
         for name, item in quantities(kind).items():
             own = TABLE[f"{section}.{name}"].quantity
             if section == "base_excitation" and kind is not sb.BaseExcitation:
-                assert own.long_name == f"{item.long_name}, of the base"
+                comma = "," if " over " in item.long_name else ""
+                assert own.long_name == f"{item.long_name}{comma} of the base"
                 own = dataclasses.replace(own, long_name=item.long_name)
             if name == "location" and section == "force":
                 own = dataclasses.replace(own, closed=item.closed)

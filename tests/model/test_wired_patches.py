@@ -169,3 +169,11 @@ def test_a_file_that_wires_what_does_not_fit(tmp_path, wiring, capacitance, mess
     file.write_text(FILE.format(wiring=wiring, capacitance=capacitance))
     with pytest.raises(InputError, match=message):
         sb.System.load(file)
+
+
+def test_equal_descriptions_with_rows_are_equal_and_others_are_not() -> None:
+    one, two = (sb.model.PiezoelectricPatches.wired(patches(), "series", resistance=LOAD) for _ in range(2))
+    assert one == two and hash(one[0]) == hash(two[0])
+    assert one != sb.model.PiezoelectricPatches.wired(patches()[::-1], "series", resistance=LOAD)
+    same, again, other = (sb.LocalSpring(stiffness=1.0, shape=shape) for shape in ([1.0, 2.0], (1, 2), [1.0, 3.0]))
+    assert same == again != other

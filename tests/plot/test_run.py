@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import snapbeam as sb
 from snapbeam.plot.run import plot_run
 from snapbeam.plot.style import save_figure
 from snapbeam.util.validation import InputError
@@ -120,3 +121,27 @@ def test_the_curve_between_samples_is_that_of_scipy(seed):
     kept = np.isfinite(y)
     dense, curve = _smooth(x, y)
     assert np.allclose(curve, PchipInterpolator(x[kept], y[kept])(dense), rtol=0.0, atol=1e-13)
+
+
+def test_a_structure_given_by_matrices_between_two_stops_on_a_random_base():
+    """Both stops are drawn, over time; no location and no beam is told of."""
+    model = sb.ReducedModel.from_matrices(
+        [[2.0]], [[1.1e4]], contact_shape=[1.0], base_shape=[1.0], length_scale=2e-3, damping_ratio=0.05
+    )
+    stops = [
+        sb.Contact(sb.KelvinVoigt(linear_stiffness=5e5, linear_damping=40.0), sb.Striker(drive=sb.FixedStop(), side=side, gap=1e-3))
+        for side in ("above", "below")
+    ]  # fmt: skip
+    base = sb.RecordedAcceleration.from_psd([(5, 0.01), (100, 0.01)], duration_s=2.0, seed=1, ramp_up_s=0.1)
+    system = sb.System(model, contacts=stops, base_excitation=sb.BaseExcitation(motion=base))
+    ax = sb.plot.plot_run(sb.simulate(system, sb.Integration(cycles=10)))
+    assert sorted({float(line.get_ydata()[0]) for line in ax.get_lines() if np.ptp(line.get_ydata()) < 1e-9}) == [
+        -0.5,
+        0.0,
+        0.5,
+    ]
+    figure = ax.figure
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["structure, centre", "structure, at the striker", "strikers"]
+    assert "x_" not in figure.axes[0].get_title() + str(figure._suptitle)
+    assert any(each.get_xlabel().startswith("Time (") for each in figure.axes)

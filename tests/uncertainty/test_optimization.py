@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 import pytest
 from small import small_system
@@ -281,3 +283,32 @@ def test_intervals_of_objectives_cover() -> None:
 def test_refusals(make, words: str) -> None:
     with pytest.raises(InputError, match=words):
         make()
+
+
+@pytest.mark.filterwarnings("ignore:constraints. no reported design is known to satisfy them")
+def test_a_search_that_was_stopped_goes_on_from_its_checkpoint(tmp_path) -> None:
+    """The resumed search is the uninterrupted one, and computes none of the runs that the stopped one had computed."""
+    effort = sb.uncertainty.OptimizerSettings(
+        generations=4, population=6, samples=8, validation_samples=20, candidates=2, refinements=2
+    )
+    arguments = (
+        small_system(frequency_ratio=0.02, location=0.3), {"velocity_amplitude": (0.005, 0.03)}, "velocity_amplitude",
+        sb.uncertainty.Constraint(quantity="snap", lower=0.8), SPREAD, effort,
+    )  # fmt: skip
+
+    def stop(done: int, total: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    def computed(folder: str, progress=None) -> tuple[int, object]:
+        tally, found = sb.SweepReport(), None
+        keeping = sb.CheckpointOptions(tmp_path / folder, report=tally)
+        with contextlib.suppress(KeyboardInterrupt):
+            found = sb.uncertainty.optimize_design(*arguments, integration=HOW, checkpoint=keeping, progress=progress)
+        return tally.runs, found
+
+    whole, expected = computed("whole")
+    first, nothing = computed("stopped", stop)
+    rest, resumed = computed("stopped")
+    assert nothing is None and 0 < first < whole and first + rest == whole
+    assert resumed.drop_attrs().equals(expected.drop_attrs())

@@ -107,3 +107,17 @@ def test_the_nearest_number_whatever_the_exponent(text, value):
 
 def test_a_product_beyond_all_numbers_is_infinite():
     assert number_in_unit("1e308 GPa", "Pa") == np.inf
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [("2330 kg/m3", "kg/m^3", 2330.0), ("2.33 g/cm3", "kg/m^3", 2330.0), ("3 mm2", "m^2", 3e-6),
+     ("4 km/s^2", "g", 4000.0 / 9.80665), ("9.80665 m/s2", "g", 1.0), ("50 mg", "g", 0.05)],
+)  # fmt: skip
+def test_a_power_without_a_sign_and_an_acceleration_where_g_is_wanted(text: str, unit: str, value: float) -> None:
+    assert number_in_unit(text, unit) == pytest.approx(value, rel=1e-14)
+
+
+def test_an_exponent_of_no_whole_number_is_not_split() -> None:
+    with pytest.raises(InputError, match="does not fit"):
+        number_in_unit("3 m/s2.5", "m/s^2")

@@ -211,7 +211,7 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None, 
     """Print the critical points over a parameter, and write the branches and their figure."""
     from snapbeam.model.equilibrium_branches import equilibrium_branches
     from snapbeam.model.parameters import lookup
-    from snapbeam.util.si_prefixes import prefixed
+    from snapbeam.util.si_prefixes import WITH_PREFIX, prefixed
     from snapbeam.util.validation import InputError, choice
 
     if variable is not None:
@@ -229,7 +229,7 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None, 
     console = out()
 
     def shown(value: float) -> str:
-        return f"{value:.6g}{'' if unit == '1' else ' ' + unit}"
+        return prefixed(value, unit, 6) if unit in WITH_PREFIX else f"{value:.6g}{'' if unit == '1' else ' ' + unit}"
 
     columns = ("kind", "value", "displacement", "branch", "outcome")
     for kind, value, place, branch, outcome in zip(

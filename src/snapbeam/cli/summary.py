@@ -19,8 +19,8 @@ from snapbeam.model.parameters import lookup, parameters
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.plot.units import in_units, ratio_name, scale_text
 from snapbeam.sweeps.seeds import mean_over_seeds, seed_axes
-from snapbeam.util.si_prefixes import prefixed
-from snapbeam.util.status_codes import ResponseClass, RunStatus, wells_of
+from snapbeam.util.si_prefixes import WITH_PREFIX, prefixed
+from snapbeam.util.status_codes import ResponseClass, RunStatus, is_of_matrices, wells_of
 from snapbeam.util.validation import InputError, printable
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def map_summary(
             low = point = notch
     else:
         first = np.unravel_index(int(np.argmax(interwell)), interwell.shape)
-        point = _point(response, dict(zip(response.dims, first, strict=True)))
+        point = _point(response, dict(zip(response.dims, first, strict=True)), attrs)
     best = _highest(dataset, variable)
     if best is not None:
         point = best[0]
@@ -107,7 +107,7 @@ def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any],
     means = mean_over_seeds(dataset) if seeds else dataset
     values = means[name]
     at = np.unravel_index(int(np.nanargmax(values.values)), values.shape)
-    point = _point(values, dict(zip(values.dims, at, strict=True)))
+    point = _point(values, dict(zip(values.dims, at, strict=True)), dataset.attrs)
     where = ", ".join(coordinate_text(dataset, each, point[each]) for each in point)
     facts: dict[str, Any] = {"variable": name, "value": float(values.values[at]), "point": dict(point)}
     line = f"Highest {statistic_text(means, name, values.values[at])}"
@@ -163,8 +163,6 @@ _DRIVING = ("drive", "base_excitation", "axial_load", "force")
 _STRENGTH = re.compile("amplitude|velocity|acceleration|displacement|force$|change")
 """Names of the parameters of an excitation that its strength follows from."""
 _NORMALISED = re.compile(r" over (b[^,]*)")
-_WITH_PREFIX = frozenset(("m", "m/s", "s", "N", "N/m", "Pa", "Hz", "ohm", "F", "H", "V", "A", "W", "J"))
-"""Units that take a prefix of the SI."""
 
 
 def _drives(parameter: str) -> bool:
@@ -229,7 +227,7 @@ def value_text(dataset: xr.Dataset, name: str, value: Any, digits: int = 4) -> s
 
 def _with_unit(value: float, unit: str, long_name: str, digits: int) -> str:
     """Return a value with its unit, or with what the words say that it is over."""
-    if unit in _WITH_PREFIX:
+    if unit in WITH_PREFIX:
         return prefixed(value, unit, digits)
     unit = unit_words(unit, long_name)
     text = f"{value:.{digits}g}"
@@ -287,13 +285,13 @@ def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
         return None
     amounts = dataset[raised].broadcast_like(response).transpose(*response.dims).values
     at = np.unravel_index(np.argmin(np.where(interwell, amounts, np.inf)), response.shape)
-    return _point(response, dict(zip(response.dims, at, strict=True)))
+    return _point(response, dict(zip(response.dims, at, strict=True)), dataset.attrs)
 
 
-def _point(values: xr.DataArray, index: dict[Any, Any]) -> dict[str, Any]:
+def _point(values: xr.DataArray, index: dict[Any, Any], attrs: Any) -> dict[str, Any]:
     """Return the coordinates of a point of a map: those of its axes, and the paper's."""
     point = values.isel(index)
-    in_unit = {ratio_name(str(name)) for name in values.dims}
+    in_unit = {ratio_name(str(name)) for name in values.dims} | ({"location"} if is_of_matrices(attrs) else set())
     names = [str(name) for name in values.coords if name in values.dims or name in {*_PAPER} - in_unit]
     return {name: point[name].item() for name in names}
 

@@ -64,8 +64,8 @@ def read(file: Path, section: str, law: list[str] | None = None) -> tuple[Config
     return config, uncertainty, question
 
 
-def taken(kind: Any, table: dict[str, Any], where: str) -> Any:
-    """An instance of a dataclass from a table of its fields; unknown names raise an error."""
+def taken(kind: Any, table: dict[str, Any], where: str, further: str = "") -> Any:
+    """An instance of a dataclass from a table of its fields; unknown names raise an error, which names *further* ones."""
     import dataclasses
 
     from snapbeam.util.validation import InputError
@@ -73,7 +73,7 @@ def taken(kind: Any, table: dict[str, Any], where: str) -> Any:
     known = [each.name for each in dataclasses.fields(kind)]
     for name in table:
         if name not in known:
-            raise InputError(f"{where}.{name}: unknown; must be one of {', '.join(known)}")
+            raise InputError(f"{where}.{name}: unknown; must be one of {', '.join([*known, *filter(None, [further])])}")
     try:
         return kind(**table)
     except TypeError as error:
@@ -283,7 +283,12 @@ def probability(
     }
     options |= {"outcomes": outcome} if outcome else {}
     options |= {"statistics": statistic} if statistic else {}
-    runs: Any = asked["runs"] if set(asked) == {"runs"} else taken(SamplingPlan, asked, "probability")
+    count = asked.pop("runs", None)
+    if asked or count is None:
+        plan = taken(SamplingPlan, asked, "probability", "outcomes, statistics, quantiles, runs; axes are in [sweep]")
+        if count is not None:
+            raise InputError(f"probability.runs = {count!r}: give either runs or {', '.join(asked)}")
+    runs: Any = plan if count is None else count
     axes = settings.axes() or _default_axes(settings.system)
     if plot is not None and not 1 <= sum(np.size(each) > 1 for each in axes.values()) <= 2:
         raise InputError(
@@ -299,7 +304,8 @@ def probability(
              if name not in dataset["runs"].dims and each.size <= 4000}  # fmt: skip
     told = in_units(dataset)
     add_json(results=small, axes={str(dim): told[dim].values for dim in told["runs"].dims if dim in told.coords})
-    drawn = outcome_named(outcome[0])[0] if outcome else str(dataset.attrs["watched_outcome"])
+    asked_for = options.get("outcomes") if "outcome" not in asked else None
+    drawn = outcome_named(asked_for[0])[0] if asked_for else str(dataset.attrs["watched_outcome"])
     finish(dataset, output, plot, lambda ds: plot_probability(ds, drawn), _lines_probability(told, elapsed))
 
 

@@ -91,6 +91,23 @@ template <int W> struct Mask {
 #endif
 };
 
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+template <> struct Mask<8> {  // in a mask register
+    __mmask8 m;
+    SNAPBEAM_FN void set(int l, bool on) { m = __mmask8((m & ~(1u << l)) | unsigned(on) << l); }
+    friend SNAPBEAM_FN Mask operator&(Mask a, Mask b) { return {__mmask8(a.m & b.m)}; }
+    friend SNAPBEAM_FN Mask operator|(Mask a, Mask b) { return {__mmask8(a.m | b.m)}; }
+    friend SNAPBEAM_FN Mask operator!(Mask a) { return {__mmask8(~a.m)}; }
+};
+#define SNAPBEAM_COMPARE(NAME, OPERATOR, HOW)                                                                              \
+    friend SNAPBEAM_FN Mask<W> NAME(Pack a, Pack b) {                                                                      \
+        if constexpr (W == 8) return {_mm512_cmp_pd_mask((__m512d)a.v, (__m512d)b.v, HOW)};                                \
+        else return {a.v OPERATOR b.v};                                                                                    \
+    }
+#else
+#define SNAPBEAM_COMPARE(NAME, OPERATOR, HOW) SNAPBEAM_BINARY(Mask<W>, NAME, m, OPERATOR)
+#endif
+
 template <int W> struct Pack {
     typename Vectors<W>::Reals v;
     SNAPBEAM_FN Pack() = default;
@@ -106,16 +123,17 @@ template <int W> struct Pack {
     SNAPBEAM_BINARY(Pack, operator-, v, -)
     SNAPBEAM_BINARY(Pack, operator*, v, *)
     SNAPBEAM_BINARY(Pack, operator/, v, /)
-    SNAPBEAM_BINARY(Mask<W>, operator<, m, <)
-    SNAPBEAM_BINARY(Mask<W>, operator>, m, >)
-    SNAPBEAM_BINARY(Mask<W>, operator<=, m, <=)
-    SNAPBEAM_BINARY(Mask<W>, operator>=, m, >=)
-    SNAPBEAM_BINARY(Mask<W>, differ, m, !=)
+    SNAPBEAM_COMPARE(operator<, <, _CMP_LT_OQ)
+    SNAPBEAM_COMPARE(operator>, >, _CMP_GT_OQ)
+    SNAPBEAM_COMPARE(operator<=, <=, _CMP_LE_OQ)
+    SNAPBEAM_COMPARE(operator>=, >=, _CMP_GE_OQ)
+    SNAPBEAM_COMPARE(differ, !=, _CMP_NEQ_UQ)
     SNAPBEAM_FN Pack &operator+=(Pack b) { return *this = *this + b; }
     SNAPBEAM_FN Pack &operator-=(Pack b) { return *this = *this - b; }
     SNAPBEAM_FN Pack &operator*=(Pack b) { return *this = *this * b; }
 };
 #undef SNAPBEAM_BINARY
+#undef SNAPBEAM_COMPARE
 
 SNAPBEAM_FN bool differ(double a, double b) { return a != b; }
 
@@ -123,7 +141,10 @@ SNAPBEAM_FN bool differ(double a, double b) { return a != b; }
 SNAPBEAM_FN double select(bool m, double a, double b) { return m ? a : b; }
 template <int W> SNAPBEAM_FN Pack<W> select(Mask<W> m, Pack<W> a, Pack<W> b) {
     Pack<W> r;
-#if defined(SNAPBEAM_VECTORS)
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+    if constexpr (W == 8) r.v = (typename Vectors<W>::Reals)_mm512_mask_blend_pd(m.m, (__m512d)b.v, (__m512d)a.v);
+    else r.v = m.m ? a.v : b.v;
+#elif defined(SNAPBEAM_VECTORS)
     r.v = m.m ? a.v : b.v;
 #else
     for (int l = 0; l < W; ++l) r.v[l] = m.m[l] ? a.v[l] : b.v[l];
@@ -136,9 +157,6 @@ template <class M, class T> SNAPBEAM_FN void assign(M m, T &to, T from) { to = s
 // --- masks as bits: which runs of a pack --------------------------------------------------------------------------------
 SNAPBEAM_FN unsigned bits(bool m) { return m; }
 template <int W> SNAPBEAM_FN unsigned bits(Mask<W> m) {
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
-    if constexpr (W == 8) return _mm512_cmplt_epi64_mask((__m512i)m.m, _mm512_setzero_si512());
-#endif
 #if defined(SNAPBEAM_VECTORS) && defined(__AVX2__)
     if constexpr (W == 4) return unsigned(_mm256_movemask_pd((__m256d)m.m));
 #endif
@@ -146,12 +164,15 @@ template <int W> SNAPBEAM_FN unsigned bits(Mask<W> m) {
     for (int l = 0; l < W; ++l) b |= unsigned(m.m[l] != 0) << l;
     return b;
 }
+#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+SNAPBEAM_FN unsigned bits(Mask<8> m) { return m.m; }
+#endif
 template <class M> SNAPBEAM_FN bool any(M m) { return bits(m) != 0; }
 template <class M> struct FromBits;
 template <> struct FromBits<bool> { static SNAPBEAM_FN bool of(unsigned b) { return b & 1u; } };
 template <int W> struct FromBits<Mask<W>> {
     static SNAPBEAM_FN Mask<W> of(unsigned b) {
-        Mask<W> m;
+        Mask<W> m{};
         for (int l = 0; l < W; ++l) m.set(l, b >> l & 1u);
         return m;
     }
@@ -163,7 +184,7 @@ template <int W> SNAPBEAM_FN double lane(const Pack<W> &x, int l) { return x.v[l
 SNAPBEAM_FN void set_lane(double &x, int, double y) { x = y; }
 template <int W> SNAPBEAM_FN void set_lane(Pack<W> &x, int l, double y) { x.v[l] = y; }
 SNAPBEAM_FN bool lane(bool m, int) { return m; }
-template <int W> SNAPBEAM_FN bool lane(const Mask<W> &m, int l) { return m.m[l] != 0; }
+template <int W> SNAPBEAM_FN bool lane(const Mask<W> &m, int l) { return bits(m) >> l & 1u; }
 SNAPBEAM_FN void set_lane(bool &m, int, bool on) { m = on; }
 template <int W> SNAPBEAM_FN void set_lane(Mask<W> &m, int l, bool on) { m.set(l, on); }
 

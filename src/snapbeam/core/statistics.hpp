@@ -3,8 +3,8 @@
 // Two points are observed: the beam at the (first) striker, and its centre.  Between the ends of a step the cubic through values and
 // rates gives extremes and crossings.  Modes that swing within a step make it wrong by at most
 //
-//   |r_i| h (omega_i h)^3/384 A_i of the displacement, A_i the amplitude of p_i, and by |r_i| (omega_i h)^4/384 A_i of the velocity, a
-//   cubic through its own values and accelerations,
+//   |r_i| h (omega_i h)^3/384 A_i of the displacement, A_i the amplitude of p_i, and by |r_i| (omega_i h)^5/13400 A_i of the velocity, a
+//   quartic by its values, accelerations and mean,
 //
 // and 2.5/(omega_i) and 2.5 of the amplitude.  Where this may raise an extreme, the motion is followed inside the step (events.hpp).
 //
@@ -217,14 +217,22 @@ template <class L> struct Totals {
         sum[ENERGY_TIME] = fma(half, energy + modal_energy, sum[ENERGY_TIME]), sum[HIGH_ENERGY_TIME] = fma(half, high + high_energy, sum[HIGH_ENERGY_TIME]);
     }
 
-    SNAPBEAM_FN void widen(Marks ok, snapbeam::Statistic low, snapbeam::Statistic high, Number u0, Number v0, Number u1, Number v1, Number h) {
-        // on [0, 1] a cubic exceeds its ends by at most 4/27 of their slopes
-        const Number high_end = max(u0, u1), low_end = min(u0, u1), zero = Number(0.0), reach = Number(0.1482) * h;
-        const Marks may = ok & ((fma(reach, max(v0, zero) - min(v1, zero), high_end) > sum[high]) | (fma(reach, min(v0, zero) - max(v1, zero), low_end) < sum[low]));
-        if (!any(may)) return;
-        const Cubic<Number> up(u0, v0, u1, v1, h), down(-u0, -v0, -u1, -v1, h);
-        assign(ok, sum[high], max(sum[high], crest(up, v0, v1)));
-        assign(ok, sum[low], min(sum[low], -crest(down, -v0, -v1)));
+    // Bounds of a cubic on a step: where it turns inside, it exceeds its ends by at most 4/27 of their slopes.
+    struct Reach {
+        Number high, low;
+        SNAPBEAM_FN Reach(Number u0, Number v0, Number u1, Number v1, Number h) {
+            const Number bump = Number(0.1482) * h * (v0 - v1), zero = Number(0.0);
+            high = max(u0, u1) + select((v0 > zero) & (v1 < zero), bump, zero), low = min(u0, u1) + select((v0 < zero) & (v1 > zero), bump, zero);
+        }
+    };
+    SNAPBEAM_FN Reach widen(Marks ok, snapbeam::Statistic low, snapbeam::Statistic high, Number u0, Number v0, Number u1, Number v1, Number h) {
+        const Reach reach(u0, v0, u1, v1, h);
+        if (any(ok & ((reach.high > sum[high]) | (reach.low < sum[low])))) {
+            const Cubic<Number> up(u0, v0, u1, v1, h), down(-u0, -v0, -u1, -v1, h);
+            assign(ok, sum[high], max(sum[high], crest(up, v0, v1)));
+            assign(ok, sum[low], min(sum[low], -crest(down, -v0, -v1)));
+        }
+        return reach;
     }
     // The rate of a cubic, a parabola with the mean m: v_0 + 2 a s - 6 b s (1 - s), a = (v_1 - v_0)/2, b = (v_0 + v_1)/2 - m.
     struct Rate {
@@ -264,32 +272,60 @@ template <class L> struct Totals {
         assign(once, sum[SIDE], -side);
     }
 
+    // What is missed at the end of a step that is followed inside, and varies slowly: c(x) = v x^2 (3 - 2 x) + lift x^2 (1 - x)^2 of the
+    // rate at the fraction x of the step, with the integral u that the displacement lacks.
+    struct Missed {
+        Number u, v, h;
+        SNAPBEAM_FN Number lift() const { return Number(30.0) * (u / h - Number(0.5) * v); }
+        SNAPBEAM_FN void add(Real x, Number &to_u, Number &to_v, Number &to_a) const {
+            const Number s = Number(x), rest = Number(1.0) - s, square = s * s, bump = s * rest;
+            to_u += h * square * s * fma(v, Number(1.0) - Number(0.5) * s, lift() * (Number(1.0 / 3.0) - s * (Number(0.5) - Number(0.2) * s)));
+            to_v += fma(v, square * (Number(3.0) - s - s), lift() * bump * bump);
+            to_a += bump * fma(Number(6.0), v, Number(2.0) * lift() * (rest - s)) / h;
+        }
+    };
     // The extremes of what is observed, followed inside the step.
-    SNAPBEAM_SELDOM void follow(const Runs<L> &z, Marks near, Cell *memory) {
+    SNAPBEAM_SELDOM void follow(const Runs<L> &z, Marks near, Number end_u, Number end_v, Number end_c, Number end_cv, Cell *memory) {
         using namespace snapbeam;
-        Inside<L, Cell, Number> inside;
-        inside.begin(z, memory);
         const int n = s->size();
-        Number u = point.u, v = point.v, a = inside.bend(*s, row), c = center.u, cv = center.v, ca = inside.bend(*s, s->center);
-        const Number point_rest = z.sign * rest, center_rest = Number(z.sign * Real(s->problem->center_rest));
-        for (;;) {
-            const Marks within = near & (inside.share < inside.parts);
-            if (!any(within)) break;
-            inside.advance(*s);
-            const Number h = inside.part;
-            const Number u1 = point_rest + dot<L>(row, inside.q, n), v1 = dot<L>(row, inside.p, n), a1 = inside.bend(*s, row);
-            const Number c1 = center_rest + dot<L>(s->center, inside.q, n), cv1 = dot<L>(s->center, inside.p, n), ca1 = inside.bend(*s, s->center);
-            widen(within, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u, v, u1, v1, h), widen(within, MIN_CENTER, MAX_CENTER, c, cv, c1, cv1, h);
-            speed_peak(within, PEAK_VELOCITY, v, a, v1, a1, h), speed_peak(within, PEAK_CENTER_VELOCITY, cv, ca, cv1, ca1, h);
-            u = u1, v = v1, a = a1, c = c1, cv = cv1, ca = ca1;
+        const Number zero = Number(0.0), point_rest = z.sign * rest, center_rest = Number(z.sign * Real(s->problem->center_rest));
+        Missed of_point = {zero, zero, max(z.h, Number(1e-300))}, of_center = of_point;
+        for (int pass = 0; pass < 2; ++pass) {
+            Inside<L, Cell, Number> inside;
+            inside.begin(z, memory);
+            Number u = point.u, v = point.v, a = inside.bend(*s, row), c = center.u, cv = center.v, ca = inside.bend(*s, s->center);
+            for (;;) {
+                const Marks within = near & (inside.share < inside.parts);
+                if (!any(within)) break;
+                inside.advance(*s);
+                const Number h = inside.part;
+                Number u1 = point_rest + dot<L>(row, inside.q, n), v1 = dot<L>(row, inside.p, n), c1 = center_rest + dot<L>(s->center, inside.q, n), cv1 = dot<L>(s->center, inside.p, n);
+                if (pass == 0) {
+                    const Marks last = within & (!(inside.share < inside.parts));
+                    assign(last, of_point.u, end_u - u1), assign(last, of_point.v, end_v - v1), assign(last, of_center.u, end_c - c1), assign(last, of_center.v, end_cv - cv1);
+                    continue;
+                }
+                Number a1 = inside.bend(*s, row), ca1 = inside.bend(*s, s->center);
+                of_point.add(inside.share / inside.parts, u1, v1, a1), of_center.add(inside.share / inside.parts, c1, cv1, ca1);
+                widen(within, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u, v, u1, v1, h), widen(within, MIN_CENTER, MAX_CENTER, c, cv, c1, cv1, h);
+                speed_peak(within, PEAK_VELOCITY, u1 - u, v, a, v1, a1, h), speed_peak(within, PEAK_CENTER_VELOCITY, c1 - c, cv, ca, cv1, ca1, h);
+                u = u1, v = v1, a = a1, c = c1, cv = cv1, ca = ca1;
+            }
         }
     }
-    static SNAPBEAM_CALLED Number speed_on(Number v0, Number a0, Number v1, Number a1, Number h) {
-        const Cubic<Number> up(v0, a0, v1, a1, h), down(-v0, -a0, -v1, -a1, h);
-        return max(crest(up, a0, a1), crest(down, -a0, -a1));
+    // Largest speed: of the quartic through rates and accelerations at both ends that goes as far as was *moved*, the cubic and
+    // lift s^2 (1 - s)^2, at the extreme of the cubic.
+    static SNAPBEAM_CALLED Number speed_on(Number moved, Number v0, Number a0, Number v1, Number a1, Number h) {
+        const Number side = select(a0 > Number(0.0), Number(1.0), Number(-1.0)), ends = max(abs(v0), abs(v1));
+        const auto turns = side * a1 < Number(0.0);
+        if (!any(turns)) return ends;
+        const Cubic<Number> speed(side * v0, side * a0, side * v1, side * a1, h);
+        const Number mean = fma(Number(0.5), v0 + v1, h * (a0 - a1) * Number(1.0 / 12.0)), lift = Number(30.0) * side * (moved / h - mean);
+        const Number at = speed.summit(), bump = at * (Number(1.0) - at);
+        return max(ends, select(turns, fma(lift * bump, bump, speed.at(at)), ends));
     }
-    SNAPBEAM_FN void speed_peak(Marks which, snapbeam::Statistic k, Number v0, Number a0, Number v1, Number a1, Number h) {
-        assign(which, sum[k], max(sum[k], speed_on(v0, a0, v1, a1, h)));
+    SNAPBEAM_FN void speed_peak(Marks which, snapbeam::Statistic k, Number moved, Number v0, Number a0, Number v1, Number a1, Number h) {
+        assign(which, sum[k], max(sum[k], speed_on(moved, v0, a0, v1, a1, h)));
     }
 
     // Statistics of a user, before the step is added.
@@ -333,12 +369,12 @@ template <class L> struct Totals {
         const Marks changed = ok & differ(h, length);
         if (s->problem->high && any(changed)) correct(z, changed, h, false);
         count_crossings(z, ok, c0 - level, cv0, c1 - level, cv1);
-        widen(ok, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u0, v0, u1, v1, h), widen(ok, MIN_CENTER, MAX_CENTER, c0, cv0, c1, cv1, h);
+        const Reach reach = widen(ok, MIN_DISPLACEMENT, MAX_DISPLACEMENT, u0, v0, u1, v1, h), center_reach = widen(ok, MIN_CENTER, MAX_CENTER, c0, cv0, c1, cv1, h);
         const Number per = select(h > zero, Number(1.0) / h, zero);
         const Rate rate(u0, v0, u1, v1, per), center_rate(c0, cv0, c1, cv1, per);
         Number speed = rate.most, center_speed = center_rate.most;
-        const Real slack = Real(1e-5), wider = Real(1.05), bound_u = sqrt(most_u), bound_v = sqrt(most_v);
-        const Real high = value(max(u0, u1)), low = value(min(u0, u1)), center_high = value(max(c0, c1)), center_low = value(min(c0, c1));
+        const Real slack = Real(1e-4), wider = Real(1.05), bound_u = sqrt(most_u), bound_v = sqrt(most_v);
+        const Real high = value(reach.high), low = value(reach.low), center_high = value(center_reach.high), center_low = value(center_reach.low);
         Marks near = ok & ((fma(wider, value(speed), bound_v) > so_far(PEAK_VELOCITY)) | (fma(wider, value(center_speed), bound_v) > so_far(PEAK_CENTER_VELOCITY)) |
                            (high + bound_u > so_far(MAX_DISPLACEMENT)) | (low - bound_u < so_far(MIN_DISPLACEMENT)) |
                            (center_high + bound_u > so_far(MAX_CENTER)) | (center_low - bound_u < so_far(MIN_CENTER)));
@@ -347,9 +383,9 @@ template <class L> struct Totals {
             Real doubt, speed_doubt, center_doubt, center_speed_doubt;
             doubts(z, amplitude, doubt, speed_doubt, center_doubt, center_speed_doubt);
             const Marks higher = asked & ((fma(wider, value(speed), speed_doubt) > so_far(PEAK_VELOCITY)) | (fma(wider, value(center_speed), center_speed_doubt) > so_far(PEAK_CENTER_VELOCITY)));
-            if (any(higher)) {  // with the accelerations at both ends the error of a speed is of fourth order
-                assign(higher, speed, speed_on(v0, bend_at(z, row, false), v1, bend_at(z, row, true), h));
-                assign(higher, center_speed, speed_on(cv0, bend_at(z, s->center, false), cv1, bend_at(z, s->center, true), h));
+            if (any(higher)) {  // with the accelerations at both ends the error of a speed is of fifth order
+                assign(higher, speed, speed_on(u1 - u0, v0, bend_at(z, row, false), v1, bend_at(z, row, true), h));
+                assign(higher, center_speed, speed_on(c1 - c0, cv0, bend_at(z, s->center, false), cv1, bend_at(z, s->center, true), h));
             }
             const Real span = so_far(MAX_DISPLACEMENT) - so_far(MIN_DISPLACEMENT), center_span = so_far(MAX_CENTER) - so_far(MIN_CENTER);
             near = (value(speed) + speed_doubt > so_far(PEAK_VELOCITY)) & (speed_doubt > slack * so_far(PEAK_VELOCITY));
@@ -361,7 +397,7 @@ template <class L> struct Totals {
         assign(ok & (!near), sum[PEAK_VELOCITY], max(sum[PEAK_VELOCITY], speed));
         assign(ok & (!near), sum[PEAK_CENTER_VELOCITY], max(sum[PEAK_CENTER_VELOCITY], center_speed));
         if (any(near)) {
-            follow(z, near, memory);
+            follow(z, near, u1, v1, c1, cv1, memory);
             assign(near, sum[PEAK_VELOCITY], max(sum[PEAK_VELOCITY], abs(v1)));
             assign(near, sum[PEAK_CENTER_VELOCITY], max(sum[PEAK_CENTER_VELOCITY], abs(cv1)));
         }
@@ -377,7 +413,7 @@ template <class L> struct Totals {
     // Errors of the cubics over a step of h, by the amplitude of a mode.
     template <class T> static SNAPBEAM_FN void doubts_of_mode(T h, T omega, T &of_u, T &of_v) {
         const T w = h * omega, w3 = w * w * w;
-        of_u = h * min(w3 * T(1.0 / 384.0), T(2.5) / max(w, T(1.0))), of_v = min(w3 * w * T(1.0 / 384.0), T(2.5));
+        of_u = h * min(w3 * T(1.0 / 384.0), T(2.5) / max(w, T(1.0))), of_v = min(w3 * w * w * T(1.0 / 13400.0), T(2.5));
     }
     // The same of the points observed, by the amplitudes of all modes.
     SNAPBEAM_FN void doubts(const Runs<L> &z, Plain *amplitude, Real &u, Real &v, Real &c, Real &cv) {
@@ -421,7 +457,7 @@ template <class L> struct Totals {
             const Number v0 = dot<L>(c.row, z.p, s->size()), v1 = dot<L>(c.row, z.p1, s->size());
             Number speed = max(abs(v0), abs(v1));
             const Marks higher = acts & (Real(1.3) * value(speed) * value(c.P[0]) > value(c.sums[PEAK_FORCE]));
-            if (any(higher)) assign(higher, speed, speed_on(v0, bend_at(z, c.row, false), v1, bend_at(z, c.row, true), z.h));
+            if (any(higher)) assign(higher, speed, speed_on(dot<L>(c.row, z.q1, s->size()) - dot<L>(c.row, z.q, s->size()), v0, bend_at(z, c.row, false), v1, bend_at(z, c.row, true), z.h));
             most = c.P[0] * speed;
         }
         assign(acts, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], most));

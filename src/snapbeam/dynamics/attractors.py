@@ -217,10 +217,9 @@ class Attractors:
     def unseen_share(self, confidence: float = 0.95) -> float:
         """Upper bound of the share of initial states that go to attractors that were not found.
 
-        It is a bound of the basin volume in the sampled region, for states drawn at random from that region, and not
-        of the number of attractors.  If all *n* states are decided it is 1 - (1 - *confidence*)^(1/n), about 3/n at
-        95 % (the rule of three).  Undecided states count as states that may go to an attractor that was not found
-        (Clopper and Pearson).
+        It bounds the basin volume in the sampled region, for random states, not the number of attractors. If all *n*
+        states are decided it is 1 - (1 - *confidence*)^(1/n), about 3/n at 95 % (the rule of three). Undecided states
+        count as unseen (Clopper and Pearson).
         """
         level = within("confidence", confidence, 0.0, 1.0)
         lost, count = int((self.labels == UNDECIDED).sum()), self.labels.size
@@ -301,13 +300,12 @@ def find_attractors(
     """Find the attractors that many states lead to, and verify each; other states are undecided.
 
     A periodic attractor is verified if shooting converges from the last state of a run and every multiplier is inside
-    the unit circle, at accuracy level "reference" too.  A chaotic attractor is verified if its largest exponent exceeds
+    the unit circle, at accuracy level "reference" too. A chaotic attractor is verified if its largest exponent exceeds
     0 by three standard errors and none of its states leaves it in *check_periods* more periods.
 
-    If *states* is a number, the sampled region is the following, in the dimensionless coordinates of the flow:
-    ``amplitude[1]`` is uniform in [-1.4, 1.4] and ``velocity[1]`` in [-0.6, 0.6]; to this a random vibration of each
-    linear mode j is added, of at most 0.2 omega_1/omega_j in amplitude and 0.2 in velocity.  ``unseen_share`` is a
-    bound for this region.  Give states of your own to sample another one, such as the plane of a basin plot.
+    For a number of *states* the sampled region is, in the dimensionless coordinates of the flow: ``amplitude[1]``
+    uniform in [-1.4, 1.4] and ``velocity[1]`` in [-0.6, 0.6], plus a random vibration of each linear mode j of at most
+    0.2 omega_1/omega_j in amplitude and 0.2 in velocity. ``unseen_share`` is a bound for this region.
 
     Parameters
     ----------
@@ -316,26 +314,24 @@ def find_attractors(
     states : array_like of shape (states, d), or int
         Initial states, or their number in the region above.
     transient : int, optional
-        Periods to leave out; by default 16 time constants of the slowest mode, at least 1000 and at most
-        20,000 periods.
+        Periods to leave out; by default 16 time constants of the slowest mode, in [1000, 20,000].
     max_periods : int
-        Longest period, in periods of the drive, that is looked for.
+        Longest period to look for, in periods of the drive.
     check_periods : int
         Periods over which a chaotic attractor must not end.
     rng : int, numpy.random.Generator or None
-        Seed of the initial states; a generator, which gives one; None takes one from the system.
+        Seed of the initial states, or a generator that gives one.
     tolerance : float
         Tolerance of the orbits, as in :func:`periodic_orbit`.
     integration : Integration, optional
         Solver settings.
     progress : callable, optional
-        Called as ``progress(done, total)`` with parts of the work; True writes a line to standard error.
+        Called as ``progress(done, total)`` with parts of the work; True prints it.
 
     Returns
     -------
     Attractors
-        ``attractors.unseen_share()`` bounds the share of initial states that go to attractors that were not
-        found; ``attractors.termination_reason`` gives the reason why states are undecided.
+        The attractors, with ``unseen_share()`` and ``termination_reason``, why states are undecided.
 
     See Also
     --------

@@ -63,54 +63,52 @@ def backbone_curve(
 ) -> xr.Dataset:
     """Compute a backbone curve: free periodic motions without damping and excitation, over their energy.
 
-    Each motion begins and turns back at rest: a nonlinear normal mode.  About a well the curve begins at a
-    natural frequency with a vanishing amplitude; across both wells it begins with three times the energy of the
-    barrier and is followed in both directions.  The equations are integrated with DOP853 of SciPy over half a
-    period, with tangents; Newton's method and steps of arc length follow the curve.  Floquet multipliers
-    determine the stability.
+    Each motion begins and turns back at rest (a nonlinear normal mode). About a well the curve begins at a natural
+    frequency with a vanishing amplitude; across both wells it begins at three times the energy of the barrier, in both
+    directions. DOP853 of SciPy integrates half a period with tangents; Newton's method and steps of arc length follow
+    the curve; Floquet multipliers give the stability.
 
-    Local forces act with their conservative parts.  The circuits of harvesters are open, so that no current flows and
-    nothing is lost: piezoelectric layers stiffen the beam, a coil has no force.  Strikers stand still; one with a mass moves
-    on its suspension.
+    Local forces act with their conservative parts. Circuits of harvesters are open: piezoelectric layers stiffen the
+    beam, a coil has no force. Strikers stand still; one with a mass moves on its suspension.
 
     Parameters
     ----------
     system : System
-        Damping is ignored.  Its strikers are each a :class:`~snapbeam.FixedStop` under an elastic contact law.
+        System without excitation; damping is ignored. Each striker is a :class:`~snapbeam.FixedStop` under an elastic
+        law.
     well : {"lower", "upper", "both"}
         Motion about a well, or across both.
     mode : int
-        Linear mode in which the motion about a well begins, 1 for the lowest; not used across both wells.
+        Linear mode with which the motion about a well begins, 1 for the lowest.
     amplitude_limit : float
-        The curve ends where the centre of the beam is this many length scales away from its middle position.
+        Displacement of the centre from its middle position, in length scales, at which the curve ends.
     lowest_frequency_ratio : float
-        The curve ends where the frequency is this many first natural frequencies: in a well, the period grows without bound
-        towards the barrier.
+        Frequency over the first natural frequency at which the curve ends: towards the barrier the period grows without
+        bound.
     max_points : int
         Maximum number of points of the curve.
     max_step : float
-        Maximum arc length between two points, in length scales and in half periods over pi/omega_1.  Near an internal
-        resonance the curve has a narrow tongue; a short step follows it, a long one passes it.
+        Maximum arc length between two points, in length scales and in half periods over pi/omega_1. A short step
+        follows the tongue of an internal resonance, a long one passes it.
     progress : callable or bool, optional
-        Called as ``progress(done, total)`` with points; True writes a line to standard error.
+        Called as ``progress(done, total)`` with points; True prints it.
 
     Returns
     -------
     xarray.Dataset
         Variables over ``point``: ``frequency`` (Hz), ``frequency_ratio``, ``energy`` (J, above the well),
-        ``min_midspan`` and ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``; over
-        ``point`` and ``mode`` ``participation``, the share of each linear mode in the mean kinetic energy; where the
-        motion turns back, ``initial_amplitude`` over ``point`` and ``buckling_mode``, and ``initial_shift`` of strikers
-        with mass over ``striker``; over ``point`` and ``multiplier`` their size and angle.  The attribute ``end`` gives
-        the reason why the curve ends: among others at an equilibrium or where the two turning points meet, since from
-        there on the same motions would follow again.
+        ``min_midspan`` and ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``.
+        ``participation`` over ``point`` and ``mode`` is the share of each linear mode in the mean kinetic energy.
+        ``initial_amplitude`` over ``point`` and ``buckling_mode`` and, for strikers with mass, ``initial_shift`` over
+        ``striker`` are those at rest; size and angle of the multipliers are over ``multiplier``. The attribute ``end``
+        is the reason why the curve ends.
 
     Raises
     ------
     InputError
-        For a system with an excitation, a lossy contact, a striker that nothing holds, or without two wells if both are requested.
+        For an excitation, a lossy contact, a free striker, or ``well="both"`` without two wells.
     OrbitNotFoundError
-        If no motion is found where the curve begins.
+        If no first motion is found.
 
     See Also
     --------
@@ -118,10 +116,10 @@ def backbone_curve(
 
     Notes
     -----
-    With one mode the frequencies are those of elliptic integrals: for U = -k x^2/2 + g x^4/4 and the mass m the period
-    about a well is 2 K(1 - x_1^2/x_0^2) / (x_0 sqrt(g/2m)), with turning points x_1 < x_0 (Kovacic and Brennan, The Duffing
-    Equation, Wiley, 2011, chapter 4).  The cost grows with the square of the number of modes and with the highest
-    frequency; use up to about 12.
+    With one mode the periods are elliptic integrals: for U = -k x^2/2 + g x^4/4 and the mass m, about a well
+    2 K(1 - x_1^2/x_0^2) / (x_0 sqrt(g/2m)), with turning points x_1 < x_0 (Kovacic and Brennan, The Duffing Equation,
+    Wiley, 2011, chapter 4).  The cost grows with the square of the number of modes and with the highest frequency; use up
+    to about 12.
 
     Examples
     --------

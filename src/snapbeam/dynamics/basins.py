@@ -49,15 +49,15 @@ def basins_of_attraction(
 ) -> xr.Dataset:
     """Compute the attractor that each state of a plane goes to.
 
-    A state goes to a periodic attractor once it is in a ball about one of its points in which the flow contracts (see
-    :class:`~snapbeam.dynamics.attractors.Ball`).  It goes to a chaotic attractor if it is among its points at eight
-    consecutive checks and at the end.  All other states are undecided after *periods*, -1.  The tip's mid-position is
-    fixed in space.  If more than 5 % of the states are undecided, a warning is given.
+    A state goes to a periodic attractor once it is in a ball about one of its points in which the flow contracts
+    (:class:`~snapbeam.dynamics.attractors.Ball`). It goes to a chaotic attractor if it is among its points at eight
+    consecutive checks and at the end. All other states are undecided after *periods*, -1; more than 5 % of them give a
+    warning. The tip's mid-position is fixed in space.
 
-    Near a fractal border the error of the integration changes labels.  Every state with a neighbour of another
-    label, and a random sample of 300 others, is therefore integrated at half the step too.  ``sensitive`` marks
-    the states whose label changes; the attribute ``sensitive_share`` is the share of such states of the plane,
-    with its interval at 95 % (Wilson, for the sampled part).  If it exceeds 1 %, a warning is given.
+    Near a fractal border the error of the integration changes labels. Every state with a neighbour of another label,
+    and 300 random others, are therefore integrated at half the step too. ``sensitive`` marks changed labels;
+    ``sensitive_share`` is their share of the plane, with its 95 % interval (Wilson, for the sampled part). Above 1 % it
+    gives a warning.
 
     Parameters
     ----------
@@ -66,23 +66,21 @@ def basins_of_attraction(
     grid : mapping of str to array_like
         Two coordinates with their values, such as ``{"amplitude[1]": ..., "velocity[1]": ...}``, strictly increasing.
     fixed_coordinates : State or array_like of shape (d,), optional
-        The other coordinates; by default those of a beam at rest in the well in which a run starts.
+        The other coordinates; by default those of a beam at rest in the well of the start.
     periods : int, optional
-        Maximum number of periods of the drive.  By default 16 time constants of the slowest decay, at least 200 and at most 20,000
-        periods; the decay is that of the slowest mode, min(zeta_j omega_j), or of a perturbation of one of the
-        periodic attractors, if that is slower.
+        Maximum number of periods of the drive. By default 16 time constants of the slowest decay, in [200, 20,000]:
+        that of the slowest mode, min(zeta_j omega_j), or of a slower perturbation of a periodic attractor.
     every : int
         Periods between two checks.
     progress : callable, optional
-        Called as ``progress(done, total)`` with periods; True writes a line to standard error.
+        Called as ``progress(done, total)`` with periods; True prints it.
 
     Returns
     -------
     xarray.Dataset
-        ``basin`` over the two coordinates, the number of the attractor; ``captured_after``, in periods; ``sensitive``, 1
-        for a label that changes at half the step, 0 for one that does not, -1 for one that was not tested, as of a map that
-        has no step.  The attribute ``undecided`` is the share of undecided states, ``termination_reason`` the number of
-        periods and its rule; ``sensitive_share``, ``sensitive_share_low`` and ``sensitive_share_high``.
+        ``basin`` over the two coordinates, the number of the attractor; ``captured_after``, in periods; ``sensitive``:
+        1 changed, 0 unchanged, -1 not tested. Attributes: ``undecided``, the share of undecided states;
+        ``termination_reason``; ``sensitive_share``, ``sensitive_share_low`` and ``sensitive_share_high``.
 
     See Also
     --------
@@ -317,14 +315,14 @@ def _labels(labels: ArrayLike) -> NDArray[np.int64]:
 def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     """Basin entropy and boundary basin entropy (Daza et al., Sci. Rep. 6 (2016) 31416).
 
-    The grid is cut into boxes of *box* points a side; in each, with shares p_j of the labels, the entropy is
-    S = -sum p_j ln p_j.  S_b is its mean over all boxes, S_bb over those that hold a border.  Undecided points are left
-    out of the shares; the bounds hold for whichever of the labels present they have.
+    In each box of *box* points a side, with shares p_j of the labels, the entropy is S = -sum p_j ln p_j. S_b is its
+    mean over all boxes, S_bb over those that hold a border. Undecided points are left out; the bounds hold for any of
+    the present labels in their place.
 
     Parameters
     ----------
     labels : array_like of int
-        A grid of any dimension, such as basins or the classes of a map; a negative label is undecided.
+        Grid of any dimension of basins or classes; negative: undecided.
     box : int
         Points along a side; incomplete boxes are ignored.
 
@@ -518,13 +516,13 @@ def dynamical_integrity(
 ) -> Integrity:
     """Global and local integrity measure and integrity factor of one basin in a window.
 
-    The definitions are those of Soliman and Thompson (J. Sound Vib. 135 (1989) 453) and Rega and Lenci (Nonlinear Anal.
-    63 (2005) 902).  The rim of the window counts as a border.  Undecided points count as outside the basin.
+    Definitions: Soliman and Thompson (J. Sound Vib. 135 (1989) 453) and Rega and Lenci (Nonlinear Anal. 63 (2005) 902).
+    The rim of the window counts as a border, undecided points as outside the basin.
 
     Parameters
     ----------
     labels : array_like of int
-        Number of the basin of every point of a grid of any dimension; negative: undecided.
+        Basins over a grid of any dimension; negative: undecided.
     label : int
         Label of the basin.
     attractor : tuple of int, optional

@@ -326,44 +326,44 @@ def bifurcation_curve(
 ) -> xr.Dataset:
     """Follow a fold, flip, Neimark-Sacker point or grazing of periodic orbits in two parameters, to both sides.
 
-    Points of codimension two are located on the way: cusps, fold-flips (multipliers +1 and -1), generalized flips, the
-    resonances 1:1 to 1:4, and grazing at a bifurcation.  Where the grazing approach is the only contact, its force is left out on
-    the grazing curve, so that the orbit is defined on both sides of it.  With other impacts under Newton's law, the orbit on a
-    grazing curve keeps a gap of 1e-6 b.
+    Points of codimension two are located: cusps, fold-flips (multipliers +1 and -1), generalized flips, the resonances
+    1:1 to 1:4, and grazing at a bifurcation. If the grazing approach is the only contact, a grazing curve leaves its
+    force out, so that the orbit is defined on both sides. With other impacts under Newton's law the orbit keeps a gap
+    of 1e-6 b.
 
     Parameters
     ----------
     special_point : SpecialPoint
-        Special point of a branch (:func:`continuation`), where the curve begins.
+        First point of the curve, of a branch (:func:`continuation`).
     names : (str, str)
-        Two parameters that can differ between runs, by dotted name or the name in datasets.
+        Two parameters that can differ between runs.
     bounds : pair of pairs of float
         Minimum and maximum value of each.
     max_points : int
-        Points at most, to either side.
+        Maximum number of points to either side.
     step, max_step : float
-        First and maximum distance between points, in units of the well's amplitude for the state and of the range
-        for each parameter; between 1e-6 and 1.
+        First and maximum distance between points, in units of the well's amplitude for the state and of the range for
+        each parameter; between 1e-6 and 1.
     tolerance : float
         Tolerance of the orbit and of the condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light
-        impacts make the multipliers rough, which the errors then contain.
+        impacts make the multipliers rough.
     progress : callable, optional
-        Called as ``progress(done, total)`` with points; True writes a line to standard error.
+        Called as ``progress(done, total)`` with points; True prints it.
 
     Returns
     -------
     xarray.Dataset
-        Variables over ``point``: both parameters, their errors at these steps, the state, the multipliers, impacts,
-        residual.  Over ``special_point``: kind and parameters of points of codimension two.  On a grazing curve the
-        attribute ``kept_gap`` is the gap of its orbits over b, and ``contact_force`` tells whether they have one;
-        without it the multipliers are those of the motion without contact.
+        Variables over ``point``: both parameters, their errors, the state, the multipliers, impacts, residual. Over
+        ``special_point``: kind and parameters of points of codimension two. On a grazing curve the attribute
+        ``kept_gap`` is the gap over b; ``contact_force`` is "left out" if the
+        multipliers are those of the motion without contact.
 
     Raises
     ------
     InputError
-        If the type of the point is not supported, or a parameter, its bounds or a step is out of range.
+        If the type of the point is not supported, or a number is out of range.
     OrbitNotFoundError
-        If not even the first point is found with both parameters.
+        If the first point is not found with both parameters.
 
     See Also
     --------

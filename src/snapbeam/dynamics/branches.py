@@ -413,31 +413,29 @@ def continuation(
 ) -> Branch:
     """Follow a periodic orbit, stable or not, along one parameter.
 
-    Folds, period doublings (flips), Neimark-Sacker bifurcations, branch points and grazing are located between
-    the orbits that they are found between.  The branch ends at a limit of the parameter, when it closes, at
-    *max_points* orbits, or where no orbit is found, as under a law of restitution where it grazes;
-    ``branch.termination_reason`` gives the reason.
+    Folds, period doublings (flips), Neimark-Sacker bifurcations, branch points and grazing are located. The branch ends
+    at a limit of the parameter, when it closes, at *max_points* orbits, or where no orbit is found, such as at grazing
+    under a law of restitution; ``branch.termination_reason`` gives the reason.
 
     Parameters
     ----------
     orbit : PeriodicOrbit
-        Orbit to begin with, of :func:`periodic_orbit` or of a branch.
+        First orbit, of :func:`periodic_orbit` or of a branch.
     name : str
-        Parameter, by dotted name or the name in datasets.
+        Parameter, by any of its names.
     bounds : pair of float
         Minimum and maximum value.
     direction : {"up", "down"}
         Direction of the parameter at first.
     max_points : int
-        Orbits at most.
+        Maximum number of orbits.
     step, max_step : float
         First and maximum distance between orbits, in units of the well's amplitude for the state and of the range
         for the parameter; between 1e-8 and 1.
     tolerance : float
         Tolerance of the orbits, as in :func:`periodic_orbit`.
     progress : callable, optional
-        Called as ``progress(done, total)`` with orbits, of which there are at most *max_points*; True writes a line to
-        standard error.
+        Called as ``progress(done, total)`` with orbits; True prints it.
 
     Returns
     -------
@@ -502,13 +500,12 @@ def switch_branch(
 ) -> PeriodicOrbit:
     """Find an orbit of the branch that begins at a flip or a branch point, *size* away from it.
 
-    At a flip it has twice the period.  Newton's method searches on the plane at that distance along the
-    critical eigenvector.
+    At a flip it has twice the period. Newton's method searches at that distance along the critical eigenvector.
 
     Parameters
     ----------
     special_point : SpecialPoint
-        Flip or branch point of a branch (:func:`continuation`).
+        Flip or branch point of a branch.
     name, bounds
         Parameter and its limits, as in :func:`continuation`.
     size : float
@@ -522,7 +519,7 @@ def switch_branch(
     Raises
     ------
     InputError
-        For a special point at which no other branch begins.
+        If no other branch begins at the point.
     OrbitNotFoundError
         If there is none at that distance; try another.
 

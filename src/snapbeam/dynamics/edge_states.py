@@ -110,34 +110,33 @@ def edge_tracking(
 ) -> EdgeState:
     """Follow the border between snapping and not (Skufca, Yorke and Eckhardt, Phys. Rev. Lett. 96 (2006) 174101).
 
-    Bisection between *u1* and *u2* finds two states of different outcome that are *bisect_threshold* apart.  Both are
-    integrated until their distance is *diverge_threshold*; then the bisection starts again between them.
+    Bisection between *u1* and *u2* finds two states of different outcome, *bisect_threshold* apart. Both are integrated
+    until they are *diverge_threshold* apart; then the bisection repeats.
 
     Parameters
     ----------
     system : System, or a Flow
         System, or any other flow.
     u1, u2 : State or array_like of shape (d,)
-        A state from which the beam does not leave its well within *horizon* periods, and one from which it does.
+        State from which the beam does not leave its well within *horizon* periods, and one from which it does.
     periods : int
-        Number of periods for which the border is followed.
+        Periods to follow the border.
     horizon : int
-        Periods after which the outcome is evaluated.
+        Periods until the outcome is evaluated.
     bisect_threshold, diverge_threshold : float
-        Distances in units of the well's amplitude.  The bisection also stops where rounding leaves no state between the
-        two. *diverge_threshold* must be at most a tenth of the distance between *u1* and *u2*.
+        Distances in units of the well's amplitude; the second is at most a tenth of the distance between *u1* and *u2*.
+        The bisection also stops at rounding.
     outcome : callable, optional
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
     integration : Integration, optional
         Solver settings.
     progress : callable, optional
-        Called as ``progress(done, total)`` with periods; True writes a line to standard error.
+        Called as ``progress(done, total)`` with periods; True prints it.
 
     Returns
     -------
     EdgeState
-        Edge state, with the unstable periodic orbit that the motion settles on, if it does; ``termination_reason``
-        gives the reason why it stopped.
+        Edge state, with the unstable periodic orbit on which the motion settles, if any, and ``termination_reason``.
 
     See Also
     --------

@@ -31,21 +31,18 @@ _Array = NDArray[np.float64]
 class InitialConditions:
     """Random initial conditions near the start of the system, or with another phase of the drive.
 
-    Initial condition s follows from the seed and s only.
-
     Parameters
     ----------
     count : int
         Number of initial conditions, at least 1.
     displacement : float
-        Root mean square of the mid-span displacement, m: every linear mode vibrates with equal mean energy.  0 for none;
-        by default the error of reading a position to a pixel of the paper's camera.  An initial condition that would
-        press the beam into the tip is mirrored about the beam at rest, because the overlap would add contact energy.
+        Root mean square of the mid-span displacement, m, with equal mean energy in every linear mode; by default the
+        error of reading a position to a pixel of the paper's camera. A start that would press the beam into the tip is
+        mirrored about the beam at rest.
     phase : bool
-        Sample the phase of the drive in the half of its cycle in which the tip moves away, so that it does
-        not press the beam at rest.  For a single striker with a sinusoidal motion.
+        Sample the phase of a sinusoidal drive of a single striker, in the half cycle in which the tip moves away.
     seed : int
-        Seed of the initial conditions: number s comes from Philox with the key (seed, s).
+        Seed: number s comes from Philox with the key (seed, s).
 
     See Also
     --------

@@ -62,11 +62,11 @@ class LifetimeSettings:
     Parameters
     ----------
     delay : float, optional
-        Delay t0, cycles: earlier ends are not counted.  By default the first end after which a test does not reject the
-        exponential at 1 %; at most half of the ends are left out.  That end itself is not counted.
+        Delay t0, cycles: earlier ends are not counted. By default the first end after which a test does not reject the
+        exponential at 1 %; at most half of the ends are left out.
     settling_cycles : float
-        Cycles without a zero crossing after which snap-through counts as ended, greater than 0.  A run with a crossing
-        in its last *settling_cycles* cycles is censored: its lifetime is known only to be longer.
+        Cycles without a zero crossing after which snap-through counts as ended, greater than 0. A later crossing
+        censors a run: its lifetime is longer.
     confidence : float
         Confidence level of the intervals, in (0, 1).
 
@@ -319,37 +319,35 @@ def lifetime_map(
 ) -> xr.Dataset:
     """Compute the lifetime of snap-through and the probability of each final well, over any parameters.
 
-    Every point is run from many initial conditions, with the tip's mid-position fixed in space.  Snap-through lasts
-    until the last zero crossing of mid-span.  The fraction that still snaps, exp(-(t - delay)/lifetime), is fitted to
-    the runs that ended and to those that did not (:func:`~snapbeam.dynamics.lifetimes.fit_lifetime`).
+    Every point is run from many initial conditions, with the tip's mid-position fixed in space. Snap-through lasts
+    until the last zero crossing of mid-span. The survivors exp(-(t - delay)/lifetime) are fitted to the runs that ended
+    and to those that did not (:func:`~snapbeam.dynamics.lifetimes.fit_lifetime`).
 
     Parameters
     ----------
     system : System
-        System whose lifetimes are computed.
+        System to run.
     axes : optional
-        Parameters and their values, as in :func:`snapbeam.sweep`; by default one point, the system itself.
+        Parameters and values, as in :func:`snapbeam.sweep`; the system itself by default.
     integration : Integration, optional
-        1000 cycles by default. Early termination is always used, also if ``integration.early_termination`` is
-        False.
+        Solver settings, 1000 cycles by default. Runs always end early.
     initial_conditions : InitialConditions or int
-        Starts of each point, the same for all of them.
+        Starts of each point.
     settings : LifetimeSettings, optional
         Delay, settling cycles and confidence.
     after : array_like of int, optional
-        Cycles n for the probability that a run still snaps then; an eighth, a quarter and a half of the cycles, and
-        all of them less ``settling_cycles``, by default.
+        Cycles n for the probability that a run still snaps then; by default an eighth, a quarter and a half of the
+        cycles, and all less ``settling_cycles``.
     checkpoint, cluster, progress
-        Folder, cluster and report of progress, as in :func:`snapbeam.sweep`.
+        Folder, cluster and report, as in :func:`snapbeam.sweep`.
 
     Returns
     -------
     xarray.Dataset
-        Variables over the axes, times in cycles: ``lifetime`` with ``lifetime_low`` and ``lifetime_high``, ``delay``,
-        ``goodness`` (the probability of so great a distance from an exponential), ``runs_ended``, ``runs_snapping``,
-        ``runs_never`` (never crossed) and ``runs_failed``; ``end_probability`` over ``well`` and
-        ``snapping_probability`` over ``after``, each with ``_low`` and ``_high``; and for every ``start``:
-        ``last_snap``, ``well`` the run ended about, ``final_well_proven`` and ``status``.
+        Variables over the axes, times in cycles: ``lifetime``, ``delay``, ``goodness`` (probability of so great a
+        distance from an exponential), ``runs_ended``, ``runs_snapping``, ``runs_never`` (never crossed),
+        ``runs_failed``; ``end_probability`` over ``well``; ``snapping_probability`` over ``after``; intervals ``_low``
+        and ``_high``. For every ``start``: ``last_snap``, ``well`` at the end, ``final_well_proven``, ``status``.
 
     Raises
     ------

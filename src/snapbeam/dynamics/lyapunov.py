@@ -47,11 +47,9 @@ def lyapunov_spectrum(
 ) -> xr.Dataset:
     """The largest Lyapunov exponents, by tangents with a QR factorisation at every whole period.
 
-    The linearised time steps of the run advance k small changes, which are orthonormalised once a period (Benettin,
-    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9).  The
-    exponents are the logarithms of the growth, divided by the time.  A run that snaps and then settles has two kinds: those
-    of the transient, and those of the settled motion.  Set ``transient=0`` to obtain both: the default transient is
-    usually longer than the snap-through.
+    The linearised time steps advance k small changes, orthonormalised once a period (Benettin, Galgani, Giorgilli and
+    Strelcyn, Meccanica 15 (1980) 9); the exponents are the rates of their logarithmic growth. A run that snaps and then
+    settles has exponents of the transient and of the settled motion; ``transient=0`` gives both.
 
     Parameters
     ----------
@@ -62,25 +60,24 @@ def lyapunov_spectrum(
     periods : int
         Periods of the drive to average over.
     transient : int, optional
-        Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
+        Periods before them; by default 16 time constants of the slowest mode, in [200, 20,000].
     states : State or array_like of shape (runs, d), optional
-        States where the runs begin; the system's start by default.
+        Starts of the runs; the system's start by default.
     axes : mapping, optional
-        Parameters that may differ between the runs of an ensemble, each with its values: a map of exponents, every
-        point from the first state.
+        Parameters that may differ between runs, each with its values: a map of exponents, all from the first state.
     integration : Integration, optional
         Solver settings.
     progress : callable, optional
-        Called as ``progress(done, total)`` with periods; True writes a line to standard error.
+        Called as ``progress(done, total)`` with periods; True prints it.
 
     Returns
     -------
     xarray.Dataset
         ``exponent`` (1/s, over ``exponent_number`` and the axes or runs) with ``exponent_error``, one standard error
-        from the means of blocks; ``exponent_snapping`` and ``exponent_settled``, of the periods before and after the
-        last crossing (NaN if there are none), with ``periods_snapping``; and, without axes, ``running``, the estimate
-        after each period, and the attribute ``period`` (s); with axes ``excitation_period`` (s) of each point: multiply by
-        it for exponents per period.
+        from the means of blocks. ``exponent_snapping`` and ``exponent_settled`` are of the periods before and after the
+        last crossing (NaN if none), with ``periods_snapping``. Without axes, ``running`` is the estimate after each
+        period and the attribute ``period`` is in s; with axes ``excitation_period`` (s) is that of each point. Exponent
+        times period is the exponent per period.
 
     Raises
     ------
@@ -294,13 +291,13 @@ def largest_lyapunov(
     system, periods, transient, states, integration, progress
         System, run lengths, start and settings, as in :func:`lyapunov_spectrum`.
     distance : float
-        Distance to which the trajectories are brought back, in units of the well's amplitude; in [1e-12, 1e-3].
+        Distance that is restored, in units of the well's amplitude; in [1e-12, 1e-3].
 
     Returns
     -------
     xarray.Dataset
-        ``exponent`` (1/s) and ``exponent_error`` over ``run``.  An exponent is NaN, with a warning, if the two
-        trajectories become equal to rounding within a period; the attribute ``merged`` counts such runs.
+        ``exponent`` (1/s) and ``exponent_error`` over ``run``; NaN, with a warning, if the trajectories become equal to
+        rounding within a period. The attribute ``merged`` counts such runs.
 
     See Also
     --------

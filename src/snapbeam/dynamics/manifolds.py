@@ -257,14 +257,13 @@ def invariant_manifold(
 ) -> xr.Dataset:
     """One-dimensional stable or unstable manifold of a saddle orbit, in the stroboscopic section.
 
-    Points are so close that neighbours are at most *max_distance* apart and the curve turns by at most *max_turn* between them;
-    between two points it is then off the chord by about max_distance max_turn/8.
+    Neighbours are at most *max_distance* apart and the curve turns by at most *max_turn* between them; it is then off
+    the chord by about max_distance max_turn/8.
 
     Parameters
     ----------
     orbit : PeriodicOrbit
-        Saddle orbit, with one multiplier outside the unit circle for the unstable manifold, with one inside for the
-        stable one.
+        Saddle orbit: one multiplier outside the unit circle for the unstable manifold, one inside for the stable one.
     stability : {"unstable", "stable"}
         Manifold to compute.
     max_arclength : float
@@ -276,25 +275,24 @@ def invariant_manifold(
     max_points : int
         Maximum number of points of each branch.
     max_seconds : float, optional
-        Time after which both branches end as they are, s; no limit by default.  Points of a stable manifold take longer, since each is
-        sought by Newton's method.
+        Time limit, s, after which both branches end; none by default. Points of a stable manifold take longer (Newton's
+        method).
     progress : callable, optional
-        Called as ``progress(share)`` with the share of the length; True writes a line with the time left to standard error.
+        Called as ``progress(share)`` with the share of the length; True prints it with the time left.
 
     Returns
     -------
     xarray.Dataset
         Variables over ``point``: ``state`` over ``coordinate``, ``side`` (-1 or 1: the branch), ``arclength`` along the
-        branch and ``age`` (applications of the return map of the orbit, or its inverse, since the fundamental segment;
-        of the map of twice its period for a negative multiplier).  The attributes have the multiplier, the estimated
-        distance from the chord, ``chord_error``, and for each branch the reason for its end: ``max_arclength`` if it is
-        complete, ``max_seconds`` if the time was over.
+        branch, ``age`` (applications of the return map or its inverse since the fundamental segment; of twice the
+        period for a negative multiplier). Attributes: the multiplier, the estimated distance from the chord
+        ``chord_error``, and for each branch the reason for its end, ``max_arclength`` or ``max_seconds``.
 
     Raises
     ------
     InputError
-        If the manifold does not have one dimension, and for a stable one under Newton's law, whose map has no inverse where the beam
-        sticks to the tip.
+        If the manifold does not have one dimension, or is a stable one under Newton's law, whose map has no inverse
+        where the beam sticks to the tip.
 
     See Also
     --------
@@ -464,16 +462,16 @@ def homoclinic_tangency(
 ) -> xr.Dataset:
     """Bracket of the value of a parameter at which the manifolds of a saddle begin to cross.
 
-    Up to *max_arclength* the stable and the unstable manifold cross at one end of the bracket and do not at the other; it is halved
-    until its width is *tolerance* times that of *bounds*.  A homoclinic tangency is where chaotic transients and fractal basin
-    boundaries begin (Guckenheimer and Holmes, Nonlinear Oscillations, Springer, 1983, section 4.5).
+    Up to *max_arclength* the manifolds cross at one end of the bracket only; it is halved to *tolerance* times the
+    width of *bounds*. There chaotic transients and fractal basin boundaries begin (Guckenheimer and Holmes, Nonlinear
+    Oscillations, Springer, 1983, section 4.5).
 
     Parameters
     ----------
     orbit : PeriodicOrbit
-        A saddle of a map of the plane, which is followed to each value.
+        Saddle of a map of the plane.
     name : str
-        Parameter, by dotted name or the name in datasets.
+        Parameter, by any of its names.
     bounds : pair of float
         Values with and without crossing, in either order of size.
     max_arclength, max_distance, max_turn : float
@@ -481,24 +479,24 @@ def homoclinic_tangency(
     tolerance : float
         Width of the bracket over that of *bounds*, between 1e-9 and 0.5.
     max_seconds : float, optional
-        Time after which the search ends with the bracket that it has, s; no limit by default.  Each value takes the time of two
-        manifolds, about ten seconds for a struck beam.
+        Time limit of the search, s; none by default. Each value takes the time of two manifolds, about ten seconds for
+        a struck beam.
     progress : callable, optional
-        Called as ``progress(share)`` with the share of the values; True writes a line with the time left to standard error.
+        Called as ``progress(share)`` with the share of the values; True prints it with the time left.
 
     Returns
     -------
     xarray.Dataset
-        Variables over ``value``, each value that was tried: ``crosses``.  ``bracket`` over ``manifolds`` ("apart",
-        "crossing"): the nearest values without and with crossing, NaN where none was found.  The attribute
-        ``termination_reason`` is ``tolerance``; otherwise the bracket is wider than asked for, with a
-        :class:`~snapbeam.DiagnosticWarning`: ``max_seconds``, manifolds that cross at both *bounds* or at neither, a
-        manifold that ended before *max_arclength* without a crossing, or a value, not the first, without the saddle.
+        Variables over ``value``, each value that was tried: ``crosses``. ``bracket`` over ``manifolds`` ("apart",
+        "crossing"): the nearest values, NaN where none was found. The attribute ``termination_reason`` is
+        ``tolerance``; otherwise the bracket is wider, with a :class:`~snapbeam.DiagnosticWarning`: ``max_seconds``, a
+        crossing at both *bounds* or at neither, a manifold that ended before *max_arclength*, or a later value without
+        the saddle.
 
     Raises
     ------
     InputError
-        If the orbit is no saddle of the plane.
+        If the orbit is not a saddle of the plane.
     OrbitNotFoundError
         If the saddle is not found at the lower bound.
 

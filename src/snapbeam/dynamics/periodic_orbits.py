@@ -194,31 +194,29 @@ def periodic_orbit(
 ) -> PeriodicOrbit:
     """Find the periodic orbit near a state, stable or not, by Newton shooting with exact tangents.
 
-    The tip's mid-position is fixed in space, where it is at the system's start.  Solves P^m(x) = x for the map P over
-    one period of the drive.
+    Solves P^m(x) = x for the map P over one period of the drive. The tip's mid-position is fixed in space.
 
     Parameters
     ----------
     system : System, or a Flow
         System, or any other flow.
     guess : State, array_like of shape (d,) or PeriodicOrbit, optional
-        A state near the orbit, at the phase; the system's start by default.
+        State near the orbit; the system's start by default.
     period : int
-        Periods of the drive after which it closes, m.
+        Periods of the drive after which the orbit closes, m.
     integration : Integration, optional
-        ``accuracy="reference"`` by default: an orbit is only as accurate as the steps.
+        Solver settings; ``accuracy="reference"`` by default, since an orbit is only as accurate as the steps.
     phase : float, optional
-        Phase of the drive at which the orbit is seen, rad.  By default that at which a run begins; under a law that
-        is not smooth, where a contact is near that, the phase farthest from all contacts.  ``orbit.flow.phase``
-        contains it.
+        Phase of the drive at which the orbit is seen, rad: by default that at which a run begins or, under a law that
+        is not smooth with a contact near it, the phase farthest from all contacts.
     transient : int
-        Transient periods to integrate from the guess, so that it approaches the attractor.
+        Periods to integrate from the guess first.
     tolerance : float
-        Maximum coordinate that may remain, in units of the well's amplitude and of omega_1 times it; at most 1e-3.
+        Maximum residual of a coordinate, in units of the well's amplitude and of omega_1 times it; at most 1e-3.
     iterations : int
-        Maximum number of iterations of Newton's method.  It also stops where no step reduces the residual.
+        Maximum number of Newton iterations.
     deflate : sequence of PeriodicOrbit
-        Orbits that are known and are not to be found again.
+        Known orbits that are not to be found again.
 
     Returns
     -------

@@ -54,15 +54,15 @@ def poincare_section(
     system : System
         System to simulate.
     section : {"stroboscopic", "impact"} or tuple
-        Instants of the section: once a period of the drive; at the onset of every impact; or ``(variable, level,
-        direction)`` with a variable of a run (``"midspan_displacement"``, ``"displacement_at_striker"``, their
-        velocities or ``"penetration_normalised"``), a level in its unit and ``"up"``, ``"down"`` or ``"both"``.
+        Instants: once a period of the drive, the onset of every impact, or ``(variable, level, direction)`` with a
+        variable of a run (``"midspan_displacement"``, ``"displacement_at_striker"``, their velocities or
+        ``"penetration_normalised"``), a level in its unit and ``"up"``, ``"down"`` or ``"both"``.
     periods : int
-        Periods of the drive to look at.
+        Periods to record.
     transient : int, optional
-        Periods before them; by default 16 time constants of the slowest mode, at least 200 and at most 20,000.
+        Periods before them; by default 16 time constants of the slowest mode, in [200, 20,000].
     phase : float, optional
-        Phase of the primary excitation, rad, for the stroboscopic section; that at the start by default.
+        Phase of the primary excitation, rad, of the stroboscopic section; that at the start by default.
     integration : Integration, optional
         Solver settings.
 
@@ -70,10 +70,9 @@ def poincare_section(
     -------
     xarray.Dataset
         Variables over ``point``: ``time`` (s, since the transient), ``drive_phase`` (rad), displacements and velocities
-        of the contact point and the centre as of a run, ``modal_amplitude`` and ``modal_velocity`` over ``mode``.
-        Passages of a level are found between 128 samples a period and placed on it by the run itself; the attribute
-        ``level_error`` is the maximum distance from the level, in its unit.  The attribute ``termination_reason``
-        states the transient that was left out and its rule, and why the search for passages stopped.
+        of the contact point and the centre, ``modal_amplitude`` and ``modal_velocity`` over ``mode``. Passages of a
+        level are found between 128 samples a period; the attribute ``level_error`` is the maximum distance from the
+        level. ``termination_reason`` states the transient and why the search stopped.
 
     See Also
     --------

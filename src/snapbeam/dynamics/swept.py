@@ -75,38 +75,38 @@ def bifurcation_diagram(
 ) -> xr.Dataset:
     """Compute a bifurcation diagram: states once a period over one parameter that is swept up and down.
 
-    Each sweep continues from the last state.  The sweeps differ where attractors coexist (hysteresis); runs from many
-    initial conditions show further attractors.
+    Each sweep continues from the last state: sweeps differ where attractors coexist. Random initial conditions show
+    further attractors.
 
     Parameters
     ----------
     system : System
         System whose parameter is swept.
     name : str
-        Parameter, by dotted name or the name in datasets.
+        Parameter, by any of its names.
     values : array_like
         Values of the parameter, strictly increasing, in its unit.
     integration : Integration, optional
         Solver settings.
     sweeps : sequence of {"up", "down"}
-        Directions of the sweeps, one after the other.
+        Directions in their order.
     initial_conditions : InitialConditions or int
-        Initial conditions at every value, in addition to the sweeps; none by default.
+        Further starts at every value; none by default.
     periods : pair of int
-        Transient periods to discard at each value, and periods to record. None discards 16 time constants of
-        the slowest mode, at least 200 and at most 20,000 periods.
+        Periods to discard and to record at each value. None discards 16 time constants of the slowest mode, in [200,
+        20,000].
     grazing : bool
-        Sample every approach within four of the recorded periods densely: ``clearance``, ``min_penetration``.
+        Sample every approach in four of the recorded periods densely: ``clearance``, ``min_penetration``.
     progress : callable, optional
-        Called as ``progress(done, total)`` with values; True writes a line to standard error.
+        Called as ``progress(done, total)`` with values; True prints it.
 
     Returns
     -------
     xarray.Dataset
         Variables over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of
-        the centre and of the contact point at the phase of the start; over ``sweep`` and the parameter:
-        ``impacts_per_period``, ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that failed are
-        NaN, as are all that follow them in their sweep; ``failed`` marks them.
+        the centre and of the contact point, at the phase of the start. Over ``sweep`` and the parameter:
+        ``impacts_per_period``, ``crossings_per_period``, ``minimal_period`` (0: none seen) and ``failed``. Failed runs
+        and those after them in their sweep are NaN.
 
     See Also
     --------
@@ -247,38 +247,37 @@ def hysteresis(
 ) -> xr.Dataset:
     """Compute every statistic over one parameter, swept up and then down, and carry the state on.
 
-    Each value is one run of :func:`snapbeam.simulate` that begins with the last state of the run before it: modes, phase
-    of the excitation, strikers and the circuit of a harvester.  If an excitation does not repeat, such as a record, a
-    chirp or noise, every excitation restarts at each value, and only the state of the structure is carried on: all
-    values are exposed to the same excitation.  The statistics whose names end in ``last_quarter`` leave out the
-    transient of a value, if it is over after three quarters of its run.
+    Each value is one run of :func:`snapbeam.simulate` from the last state before it: modes, phase of the excitation,
+    strikers and circuit. An excitation that does not repeat (a record, a chirp, noise) restarts at each value, and only
+    the state of the structure is carried on. Statistics named ``last_quarter`` leave out a transient that is over after
+    three quarters of a run.
 
     Parameters
     ----------
     system : System
-        Its initial state is that of the first value of the first sweep.
+        System, in the initial state of the first value.
     name : str
-        Parameter, by dotted name or the name in datasets.
+        Parameter, by any of its names.
     values : array_like
         Values of the parameter, strictly increasing, in its unit.
     integration : Integration, optional
-        Solver settings; ``cycles`` is the length of the run at each value.
+        Solver settings; ``cycles`` at each value.
     sweeps : sequence of {"up", "down"}
-        Directions, one after the other; the second begins with the last state of the first.
+        Directions in their order.
     progress : callable, optional
-        Called as ``progress(done, total)`` with values; True writes a line to standard error.
+        Called as ``progress(done, total)`` with values; True prints it.
 
     Returns
     -------
     xarray.Dataset
-        The :data:`snapbeam.STATISTICS` over ``sweep`` and the parameter.  After a run that failed, the other runs of the
-        sweeps have the status NOT_RUN, the class UNKNOWN, and NaN.
+        The :data:`snapbeam.STATISTICS` over ``sweep`` and the parameter. The runs after a failed one have the status
+        NOT_RUN, the class UNKNOWN, and NaN.
 
     Raises
     ------
     InputError
-        Before the first run: if *name* is not a numeric parameter, a value is out of range or exceeds the recorded
-        motion, or a tip moves under an excitation that does not repeat, because the restart would shift the tip by a jump.
+        Before the first run, if *name* is not a numeric parameter, a value is out of range or exceeds the recorded
+        motion, or a restart would shift the tip by a jump.
 
     See Also
     --------

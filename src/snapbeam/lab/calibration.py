@@ -323,15 +323,12 @@ class Residual:
 class Calibration:
     """A calibrated beam.
 
-    ``beam`` is the result; ``values`` and ``standard_errors`` contain the fitted parameters by name (SI), in
-    the order of ``correlation``; a parameter that the data do not determine has no entry in ``standard_errors``
-    and is named in ``undetermined``.  ``scatter`` is the root of chi-square per degree of freedom by which
-    standard errors were raised, 1 if the data agree.  ``well_frequency``, ``start_well_frequency``,
-    ``gauge_well_frequency`` [Hz] are the first frequency about a well of the result, of the beam the fit
-    started from, and of the result with the gauge's geometry; ``either_well`` contains the buckling level [m]
-    from each well alone. ``imperfection``, if requested, gives each well its own first frequency; ``beam`` then
-    has the corresponding buckling level. ``remarks`` describe the result, ``diagnostics`` list doubtful
-    results.
+    ``beam`` is the result; ``values`` and ``standard_errors`` are by name (SI), in the order of ``correlation``. A
+    parameter that the data do not determine is in ``undetermined`` instead of ``standard_errors``. ``scatter`` is the
+    root of chi-square per degree of freedom that raised the errors, or 1. ``well_frequency``, ``start_well_frequency``,
+    ``gauge_well_frequency`` [Hz] are the first about a well of the result, of the start, and of the result with the
+    gauge's geometry; ``either_well`` is the buckling level [m] from each well alone. ``imperfection``, if requested,
+    gives each well its own frequency. ``remarks`` describe the result, ``diagnostics`` list doubtful results.
 
     Examples
     --------
@@ -419,17 +416,14 @@ def calibrate(
     ----------
     measured : Measurements
     beam : Beam
-        Nominal beam, which is the start of the fit; parameters that are not fitted keep its values.  Its own
-        frequencies are compared with the measured ones in the diagnostics.
+        Nominal beam, the start of the fit; its frequencies are compared with the measured ones.
     fit : tuple of str, optional
-        Which of thickness, young_modulus, density, length and buckling_level to fit.  By default the
-        thickness if there are frequencies of the straight beam, and the buckling level if there are any
-        about a well.
+        Names among thickness, young_modulus, density, length and buckling_level. By default the thickness, if there are
+        frequencies of the straight beam, and the buckling level, if there are any about a well.
     modes : int
-        Number of buckling modes of the model, which is that used for maps.
+        Number of buckling modes.
     imperfection : {"midspan_amplitude", "point_load", "uniform_load"}, optional
-        Imperfection, fitted last to the first frequencies about both wells; the parameter file then has a
-        section ``[imperfection]``.  Equal wells by default.
+        Imperfection, fitted last to the first frequencies about both wells; none by default.
 
     Returns
     -------
@@ -437,10 +431,9 @@ def calibrate(
 
     Notes
     -----
-    Weighted least squares in the logarithms of the parameters (``scipy.optimize.least_squares``).  The
-    covariance is that of the linearised fit, raised by chi-square per degree of freedom where that exceeds 1.
-    A combination of parameters to which no measured frequency responds is found from the singular values of
-    the sensitivities; its parameters stay as near to the start as they can and get no standard error.
+    Weighted least squares in the logarithms of the parameters (``scipy.optimize.least_squares``), with the covariance of the
+    linearised fit, raised by chi-square per degree of freedom above 1.  Parameters of a combination to which no frequency
+    responds (singular values of the sensitivities) stay near the start and get no standard error.
 
     Examples
     --------

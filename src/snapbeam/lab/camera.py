@@ -25,13 +25,13 @@ _LARGEST_PIXEL = 0.01  # m
 class Recording:
     """Frames of a camera on demand, with the scales that turn them into metres and seconds.
 
-    Made by :func:`open_recording`.  Frames are read on demand and not stored, so the memory used does not grow
-    with the length of the recording.  Use it as a context manager, or call :meth:`close`.
+    Made by :func:`open_recording`. Frames are read on demand and not stored. Use it as a context manager, or call
+    :meth:`close`.
 
     Attributes
     ----------
     path
-        The file, folder or pattern it was opened from.
+        File, folder or pattern.
     shape
         (height, width) of a frame in the region, pixels.
     region
@@ -39,10 +39,9 @@ class Recording:
     numbers
         Number of each frame counted from the first, int (frames,); a hole is a missing frame.
     frame_rate, pixel_size, pixel_width
-        Frames per second [Hz] and metres per pixel, from the file or the user; ``pixel_size`` is the height of a pixel, for
-        motion along columns, and ``pixel_width`` its width where the file states another.
+        Frames per second [Hz] and metres per pixel: its height, for motion along columns, and its width.
     exposure
-        Shutter time [s], or ``None`` where it is not known.
+        Shutter time [s], or ``None``.
     max_value
         Grey level at which a pixel is saturated.
     metadata
@@ -50,7 +49,7 @@ class Recording:
     diagnostics
         Diagnostics of the file.
     edge_error
-        Standard error [px] that the way the file stores pictures adds to every edge.
+        Standard error [px] of every edge from the way the file stores pictures.
 
     Examples
     --------
@@ -178,23 +177,21 @@ def open_recording(
     Parameters
     ----------
     path
-        A Photron header (.cih, .cihx) or its .mraw; a video (.avi, .mp4, .mov, .mkv); Phantom's .cine; a TIFF
-        stack; an array (.npy, or .h5, ``"file.h5::name"`` if it contains several); a folder of numbered images
-        or a pattern such as ``"run3/img_*.png"``.
+        Photron header (.cih, .cihx) or its .mraw; video (.avi, .mp4, .mov, .mkv); .cine; TIFF stack; array (.npy, or
+        .h5, ``"file.h5::name"`` if it contains several); folder of numbered images or a pattern such as
+        ``"run3/img_*.png"``.
     frame_rate
-        Frame rate [Hz] of the recording. Overrides the file. It is required for a video, because the rate in
-        the file is the playback rate. A Photron header gives record rate over skipped frames; the argument is
-        required if statements in a file contradict each other.
+        Frame rate [Hz], in place of that of the file. Required for a video, whose file has the playback rate, and if
+        statements in a file contradict each other.
     pixel_size
-        Metres per pixel in the plane of the beam.  Overrides the file.  Photron (.cihx), ImageJ and OME files may
-        contain it; usually it is measured with a scale in view.
+        Metres per pixel in the plane of the beam, in place of that of the file (.cihx, ImageJ, OME).
     region
-        (first row, last row + 1, first column, last column + 1), the part of the frame to read.
+        Part of the frame: (first row, last row + 1, first column, last column + 1).
 
     Raises
     ------
     InputError
-        If the file is malformed, or if frame rate or pixel size is neither in the file nor in the call.
+        If the file is malformed, or frame rate or pixel size is missing.
 
     Examples
     --------
@@ -407,22 +404,21 @@ def write_photron(
     Parameters
     ----------
     path
-        Name of the header, ``.cih`` or ``.cihx``; the pixels are written next to it as ``.mraw``.  Only a
-        ``.cihx`` header has a place for the pixel size.
+        Name of the header, ``.cih`` or ``.cihx``, with the ``.mraw`` beside it. Only ``.cihx`` stores the pixel size.
     frames
-        Arrays of integers of one shape (height, width), taken one at a time.
+        Arrays of integers of one shape (height, width).
     frame_rate
         Frames written per second [Hz].
     pixel_size
         Metres per pixel.
     exposure
-        Shutter time [s]; the whole time between recorded frames unless given.
+        Shutter time [s]; by default the time between frames.
     bit_depth
-        Stored bits per pixel, 8, 12 or 16; unless given 12 for .cihx and 16 for .cih.
+        Stored bits per pixel, 8, 12 or 16; by default 12 for .cihx, 16 for .cih.
     effective_bits
-        Bits that carry the image; unless given 8 in an 8-bit file and 12 in the others.
+        Bits that carry the image; by default 8 in an 8-bit file, else 12.
     skip
-        Every ``skip``-th frame of the camera is in *frames*; the record rate is ``frame_rate*skip``.
+        Number of camera frames per written frame; the record rate is ``frame_rate*skip``.
 
     Returns
     -------

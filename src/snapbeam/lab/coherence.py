@@ -42,16 +42,16 @@ def frequency_response(
 ) -> xr.Dataset:
     """Estimate the frequency response and the coherence of two signals by Welch's method.
 
-    With the densities S of Hann windows that overlap by half, H1 = S_xy/S_xx is unbiased by noise of the response, and
-    H2 = S_yy/S_yx by noise of the excitation.  The coherence is ``|S_xy|**2 / (S_xx S_yy)``.  The relative standard error of
-    the magnitude, and that of the phase in rad, is sqrt((1 - coherence)/(2 n coherence)) with n independent segments
-    (J. S. Bendat and A. G. Piersol, *Random Data*, 4th ed., section 9.2).  The response of a nonlinear system is that
-    of its best linear approximation for this excitation.
+    With the densities S of Hann windows that overlap by half, H1 = S_xy/S_xx is unbiased by noise of the response, H2 =
+    S_yy/S_yx by noise of the excitation. The coherence is ``|S_xy|**2 / (S_xx S_yy)``; sqrt((1 - coherence)/(2 n
+    coherence)) with n independent segments is the relative standard error of the magnitude, and that of the phase in
+    rad (J. S. Bendat and A. G. Piersol, *Random Data*, 4th ed., section 9.2). A nonlinear system has the response of
+    its best linear approximation.
 
     Parameters
     ----------
     excitation, response : xarray.DataArray
-        Signals with the same sampling frequency and clock (see :func:`make_signal`); their common part is used.
+        Signals with one sampling frequency and clock; their common part is used.
     resolution : float, optional
         Distance of the lines [Hz]; by default that of 31 segments.
     estimator : {"h1", "h2"}
@@ -59,16 +59,15 @@ def frequency_response(
     Returns
     -------
     xarray.Dataset
-        ``magnitude`` and ``phase`` [rad] with standard errors ``magnitude_se`` and ``phase_se``, and ``coherence``, over
-        ``frequency`` [Hz].  ``window_bias`` is the relative bias of the magnitude by the window, 0 away from the highest
-        peak.  The attribute ``coherence_limit`` is exceeded by unrelated signals at 5 % of the lines.  Those of the mode,
-        where it can be fitted: ``peak_frequency`` [Hz], ``peak_magnitude`` and ``peak_damping_ratio``, each with its
-        standard error ``..._se``.
+        ``magnitude`` and ``phase`` [rad] with ``magnitude_se`` and ``phase_se``, and ``coherence``, over ``frequency``
+        [Hz]. ``window_bias`` is the relative bias of the magnitude, 0 away from the highest peak. Unrelated signals
+        exceed the attribute ``coherence_limit`` at 5 % of the lines. If the mode can be fitted: ``peak_frequency``
+        [Hz], ``peak_magnitude``, ``peak_damping_ratio``, each with ``..._se``.
 
     Raises
     ------
     InputError
-        If the signals have different sampling frequencies or clocks, or are too short for the resolution.
+        If sampling frequencies or clocks differ, or the signals are too short.
 
     Examples
     --------

@@ -39,38 +39,35 @@ def full_field(
 ) -> xr.Dataset:
     """Measure the displacement of every block of columns by digital image correlation.
 
-    Each block is a part of the beam that moves as a whole across the beam.  The picture at rest, shifted, amplified and
-    offset, is fitted to each frame by least squares (Gauss-Newton, cubic splines); the standard error is that of the fit
-    with the noise that it leaves (B. Pan et al., Meas. Sci. Technol. 20, 062001, 2009).  It needs texture such as
-    speckle, or an edge across the motion, within the block and nothing else: the block must not contain a
-    background with texture.
+    The picture at rest, shifted, amplified and offset, is fitted to each frame by least squares (Gauss-Newton, cubic
+    splines), with the standard error of the noise that it leaves (B. Pan et al., Meas. Sci. Technol. 20, 062001, 2009).
+    A block must contain texture such as speckle, or an edge across the motion, and no background with texture.
 
     Parameters
     ----------
     recording : Recording
     rows : (int, int)
-        First row of the blocks and the row after the last one, in the region of the recording, where the beam is at
-        rest.
+        First row of the blocks, and the row after the last one, in the region, at rest.
     block : int
         Width of a block, px.
     rest_frames : int
-        Number of frames at the start, at rest, whose mean is the reference.
+        Number of frames at the start whose mean is the reference.
     motion : {"rows", "columns"}
-        Axis along which the beam moves; for ``"columns"`` *rows* are columns, and blocks are of rows.
+        Axis of the motion; for ``"columns"`` *rows* are columns.
     progress : callable, optional
         Function that receives (frames done, frames).
 
     Returns
     -------
     xarray.Dataset
-        ``displacement`` [m] from the rest, positive towards the first row, with ``displacement_se`` and
-        ``correlation``, over ``time`` [s] and ``position`` [m] along the beam; NaN where the correlation is below 0.5,
-        the block left the region, or the frame is missing.
+        ``displacement`` [m] from the rest, positive towards the first row, ``displacement_se`` and ``correlation``,
+        over ``time`` [s] and ``position`` [m]; NaN where the correlation is below 0.5, the block left the region, or
+        the frame is missing.
 
     Raises
     ------
     InputError
-        If the rows are too few or outside the region, or no block has any texture.
+        If the rows are too few or outside the region, or no block has texture.
 
     Examples
     --------
@@ -241,32 +238,31 @@ def modal_amplitudes(
 ) -> xr.Dataset:
     """Project a measured displacement on the buckling modes of a model.
 
-    The amplitudes alpha of w(x, t) = sum of alpha_i(t) phi_i(x) follow by least squares with the standard errors of
-    the displacements as weights.
+    The amplitudes alpha of w(x, t) = sum of alpha_i(t) phi_i(x) follow by weighted least squares.
 
     Parameters
     ----------
     field : xarray.Dataset
-        Of :func:`full_field`.
+        Result of :func:`full_field`.
     model : ReducedModel
-        Of the beam.
+        Model of the beam.
     contact : float
-        Position of a known point in the field [m], such as the contact.
+        Position of a known point in the field [m].
     location : float
-        Location of the same point, x over the length.
+        Location of that point, x over the length.
     modes : int, optional
-        Number of modes, at most those of the model, which is the default.
+        Number of modes; all by default.
 
     Returns
     -------
     xarray.Dataset
-        ``modal_amplitude`` [m^0.5] from the rest with ``modal_amplitude_se`` over ``time`` and ``mode``, ``residual`` [m]
-        (root mean square of what the modes leave), and ``condition`` (of the shapes in the view) as an attribute.
+        ``modal_amplitude`` [m^0.5] from the rest with ``modal_amplitude_se`` over ``time`` and ``mode``, ``residual``
+        [m], the root mean square of the rest, and the attribute ``condition`` of the shapes in the view.
 
     Raises
     ------
     InputError
-        If part of the field lies beyond the ends of the beam, or the view does not tell the modes apart.
+        If the field extends beyond the beam, or does not tell the modes apart.
 
     Examples
     --------

@@ -263,10 +263,9 @@ def recorded_drive(
 ) -> xr.Dataset:
     """Resample a measured drive, start-up transient included, for use in the model, without adding energy.
 
-    The drift-free displacement is low-passed without phase shift to *bandwidth*, resampled through a
-    band-limited interpolation, and differentiated, so that displacement and velocity belong together.  The gain
-    of the filter is at most 1 at every frequency.  At ends that are not at rest half the filter's length is
-    discarded, because samples are missing there.
+    The drift-free displacement is low-passed to *bandwidth* without phase shift and with a gain of at most 1,
+    interpolated, and differentiated, so that displacement and velocity belong together. At ends that are not at rest
+    half the filter's length is discarded.
 
     Parameters
     ----------
@@ -275,28 +274,27 @@ def recorded_drive(
     sampling_frequency : float
         Samples per second [Hz] of the result.
     bandwidth : float, optional
-        Highest frequency of the drive [Hz]; by default ten times the excitation frequency, and never more than
-        0.4 of the measured sampling rate.
+        Highest frequency of the drive [Hz]; by default ten times the excitation frequency, at most 0.4 of the measured
+        sampling rate.
     measurement : DriveMeasurement, optional
-        Result of :func:`measure_drive` for this velocity; measured by default.
+        Result of :func:`measure_drive`; measured by default.
     alignment : Alignment, optional
-        With the camera: turns the drive over where the vibrometer counts the other direction as positive.
+        Alignment with the camera, which turns the drive over where the directions differ.
     polarity : {1, -1}, optional
-        -1 to turn the drive over, instead of the polarity of the alignment.
+        Polarity in place of that of the alignment.
     amplitude_from : {"vibrometer", "camera"}
-        Whose amplitude the drive has; the camera's needs an alignment.
+        Source of the amplitude; the camera's needs an alignment.
 
     Returns
     -------
     xarray.Dataset
-        ``displacement`` [m] and ``velocity`` [m/s] over ``time`` [s], which begins at the onset if there is
-        one; the displacement there is its zero.
+        ``displacement`` [m], zero at the onset, and ``velocity`` [m/s] over ``time`` [s], which begins there if there
+        is one.
 
     Raises
     ------
     InputError
-        If the result could not hold the bandwidth, the record is too short for the filter, or its start-up is
-        broken by a dropout.
+        If the result cannot hold the bandwidth, the record is too short, or its start-up has a dropout.
 
     Examples
     --------

@@ -113,12 +113,12 @@ def read_signal(
     path : path
         See :func:`read_channels`.
     channel : str or int, optional
-        Its name, or its number from 0; needed if there are several.
+        Name or number from 0; needed if there are several.
     units : str, optional
         Unit of the values if the file has none, such as ``"mm/s"``.
     sensitivity : str, optional
-        Sensitivity per volt or per full scale, such as ``"125 mm/s/V"`` or ``"0.5 m/s/FS"``; needed for
-        channels in volts that are to become velocities, and for sound files of integers.
+        Sensitivity per volt or per full scale, such as ``"125 mm/s/V"`` or ``"0.5 m/s/FS"``, for channels in volts and
+        sound files of integers.
     sampling_frequency : float, optional
         Sampling frequency [Hz] if the file has none.
 
@@ -130,8 +130,8 @@ def read_signal(
     Raises
     ------
     InputError
-        Naming the file and the field: a missing or contradicting unit, an unknown channel, NaN, times that
-        do not increase or have gaps, a truncated file.
+        Naming file and field: a missing or contradicting unit, an unknown channel, NaN, times that do not increase or
+        have gaps, a truncated file.
 
     Examples
     --------

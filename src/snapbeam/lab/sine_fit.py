@@ -172,12 +172,11 @@ def fit_sine(
     Parameters
     ----------
     samples : xarray.DataArray
-        A signal, as :func:`snapbeam.lab.make_signal` and :func:`snapbeam.lab.read_signal` return it; or its samples,
-        from :func:`~snapbeam.lab.signals.check_signal`.
+        Signal, or its samples from :func:`~snapbeam.lab.signals.check_signal`.
     frequency : float, optional
         Initial guess [Hz]; by default the highest peak of the spectrum.
     harmonics : int
-        Multiples to fit, the sine itself included; those above 0.95 of the Nyquist frequency are left out.
+        Multiples to fit, the sine included, up to 0.95 of the Nyquist frequency.
     fixed : bool
         True if *frequency* is known and not fitted.
     keep : bool array, optional
@@ -186,8 +185,7 @@ def fit_sine(
     Returns
     -------
     SineFit
-        Standard errors are those of least squares with the noise found near the frequency in the residual;
-        they hold for noise that is white over a band of about 50 lines.
+        The fit, with least-squares standard errors from the noise near the frequency, white over about 50 lines.
 
     Notes
     -----

@@ -481,11 +481,10 @@ class StartUp:
 class DriveMeasurement:
     """The measured motion of the shaker.
 
-    ``steady`` is the sine fitted after the start-up; ``startup`` is None where the record begins in motion;
-    ``stop`` [s] is the end of the motion or of the record; ``cycle_time`` [s] and ``cycle_amplitude`` follow
-    the amplitude cycle by cycle; ``accepted`` is true if ``steady.sinad`` exceeds ``snr_limit`` [dB].
-    ``flaws`` are samples (first, one past the last) that are not part of the motion, ``lines`` hum, which is
-    subtracted, and lines in addition to the sine; ``clipping`` the clipping levels; ``diagnostics`` the
+    ``steady`` is the sine fitted after the start-up; ``startup`` is None where the record begins in motion; ``stop``
+    [s] is the end of motion or record; ``cycle_time`` [s] and ``cycle_amplitude`` follow the cycles; ``accepted``:
+    ``steady.sinad`` exceeds ``snr_limit`` [dB]. ``flaws`` are samples (first, one past the last) outside the motion,
+    ``lines`` hum, which is subtracted, and other lines; ``clipping`` has the clipping levels, ``diagnostics`` the
     diagnostics.
 
     Examples
@@ -567,24 +566,22 @@ def measure_drive(
 ) -> DriveMeasurement:
     """Measure the shaker's motion: find where it starts and settles, and fit the steady sine.
 
-    Dropouts and clipped samples are detected in the residual of the sine and excluded from the fit.
+    Dropouts and clipped samples, seen in the residual of the sine, are excluded.
 
     Parameters
     ----------
     signal : xarray.DataArray
         Velocity [m/s] or displacement [m] of the shaker.
     frequency : float, optional
-        Set excitation frequency [Hz], the initial guess; by default the highest peak of the spectrum.
+        Set frequency [Hz], the initial guess; by default the highest peak.
     amplitude : float, optional
         Set amplitude, in the unit of the signal, for a check.
     acceleration : xarray.DataArray, optional
-        Acceleration of the same shaker in the same test [m/s^2], for a check of units and sampling rate, which the
-        record alone cannot tell.
+        Acceleration of the shaker in the same test [m/s^2], to check units and sampling rate.
     snr_limit : float
-        Minimum ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
+        Minimum ratio [dB] of the sine to noise and distortion; the paper's 15 dB.
     tolerance : float
-        Maximum deviation of a steady cycle from the steady sine, as a fraction of its amplitude.  Raised to
-        four times the noise of one cycle's amplitude where that is more.
+        Maximum deviation of a steady cycle over the amplitude; at least four times the noise of one cycle.
 
     Examples
     --------
@@ -827,18 +824,17 @@ def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: flo
 def displacement_from_velocity(velocity: xr.DataArray, measurement: DriveMeasurement | None = None) -> xr.DataArray:
     """Integrate the shaker's velocity to its displacement [m] without drift.
 
-    The velocity's cubic spline is integrated exactly.  Noise and offset add a slow drift, which is determined
-    where the motion is known, at rest (zero) and in steady motion (zero mean over a cycle), as a smoothing
-    spline that follows nothing faster than about four cycles, and subtracted.  The start-up transient is
-    bridged, so it keeps its shape.  Dropouts and clipped samples are replaced by the steady sine. The mean
-    position of the shaker is assumed constant.
+    The cubic spline of the velocity is integrated exactly. The drift from noise and offset is determined at rest (zero)
+    and in steady motion (zero mean over a cycle) by a smoothing spline over about four cycles, and subtracted; the
+    start-up transient is bridged. Dropouts and clipped samples are replaced by the steady sine. The mean position is
+    assumed constant.
 
     Parameters
     ----------
     velocity : xarray.DataArray
         Velocity [m/s].
     measurement : DriveMeasurement, optional
-        Result of :func:`measure_drive` for this velocity; measured by default.
+        Result of :func:`measure_drive`; measured by default.
 
     Examples
     --------

@@ -81,8 +81,8 @@ class HarmonicLoad(LoadMotion):
 class LoadRamp(LoadMotion, Timed):
     """A load that changes smoothly from P to P + change and stays, x^3 (10 - 15 x + 6 x^2) of the share x of its way.
 
-    Long, it is quasi-static: a beam whose load falls below the critical one unbuckles, and buckles again, when the load
-    comes back, to the side that an imperfection favours.
+    A long ramp is quasi-static: a beam below the critical load unbuckles, and buckles again to the side that an
+    imperfection favours.
 
     Parameters
     ----------
@@ -91,8 +91,7 @@ class LoadRamp(LoadMotion, Timed):
     duration : float
         Periods of the first mode that the change takes.
     hold_periods : float
-        Periods of the first mode for which the load stays at P + change, from the end of the change on; then it goes back
-        as it came, in *duration*.  By default 1e9: no run sees it go back.
+        Periods of the first mode at P + change, after which the load goes back in *duration*; 1e9 by default.
 
     See Also
     --------

@@ -26,24 +26,24 @@ class BaseExcitation:
 
         m alpha'' + ... = -y''(t) rho S integral(phi) + phi(x_s) f.
 
-    Displacements, velocities, energies and the work of the base are those of that frame: the work is that of
-    the inertial force.  A run begins at rest in that frame, for any velocity of the base.
+    Displacements, velocities, energies and the work of the base (that of the inertial force) are those of that frame. A
+    run begins at rest in it.
 
     Parameters
     ----------
     motion : Drive
-        y(t), such as an :class:`~snapbeam.AccelerationSine`, a :class:`~snapbeam.BandLimitedNoise` or a
-        :class:`~snapbeam.Burst`; any drive that has an acceleration.
+        Motion y(t) with an acceleration, such as an :class:`~snapbeam.AccelerationSine`, a
+        :class:`~snapbeam.BandLimitedNoise` or a :class:`~snapbeam.Burst`.
     direction : {"up", "down"}
-        Well towards which y counts positive: the upper or the lower one.
+        Well towards which y is positive: the upper or the lower one.
     striker_on_base : bool
-        True if the mount of the striker moves with the base, like a stop in the same frame. Otherwise it stays
-        in space, and the tip moves by -y(t) in the frame of the ends.
+        True if the mount of the striker moves with the base. Otherwise it stays in space, and the tip moves by -y(t) in
+        the frame of the ends.
 
     Raises
     ------
     InputError
-        For a motion without an acceleration, such as a record or a free flight.
+        For a motion without an acceleration.
 
     See Also
     --------

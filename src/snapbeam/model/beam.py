@@ -44,20 +44,18 @@ class Beam:
     young_modulus : float
         Young's modulus E, Pa.
     buckling_level : float
-        Height b of the buckled beam at its centre, m, greater than 0.  It reads 0 if the beam was given
-        an ``axial_load`` that does not buckle it.
+        Height b of the buckled beam at its centre, m, greater than 0; reads 0 under an ``axial_load`` that does not
+        buckle the beam.
     axial_load : float
-        Axial load P, N, compression positive.  Below the critical load the beam is straight; a
-        negative load is tension.
+        Axial load P, N, compression positive; below the critical load the beam is straight.
     boundary : BoundaryConditions
-        Boundary conditions; clamped and rigid by default. Other conditions change the critical loads, the first
-        of them in the relation above, and 4 L^2/(pi^2 E S) in it to phi_1(L/2)^2/gamma.
+        Boundary conditions, clamped and rigid by default. Others change the critical loads and, in the relation above,
+        4 L^2/(pi^2 E S) to phi_1(L/2)^2/gamma.
 
     Raises
     ------
     InputError
-        If a value is not finite or not positive where it must be, or if both or neither of
-        ``buckling_level`` and ``axial_load`` are given.
+        If a value is out of range, or ``buckling_level`` and ``axial_load`` are both given or both missing.
 
     See Also
     --------

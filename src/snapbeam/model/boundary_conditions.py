@@ -17,9 +17,9 @@ from snapbeam.util.validation import integer
 class BoundaryConditions:
     """Ends that do not move sideways, each on a rotational spring.
 
-    E I phi'' = k_left phi' at the left end and -k_right phi' at the right one.  The buckling modes under these
-    conditions stay orthogonal in their slopes and, with the energy of the springs, in their curvatures, so that
-    the reduced model has the same form; mass, shapes and critical loads change.
+    E I phi'' = k_left phi' at the left end and -k_right phi' at the right one. The buckling modes stay orthogonal in
+    their slopes and, with the energy of the springs, in their curvatures: the reduced model has the same form, with
+    other masses, shapes and critical loads.
 
     Supports that give way along the axis, with the stiffness K between them, share the stretching with the beam:
     gamma = (E S/(2 L))/(1 + E S/(K L)).
@@ -29,7 +29,7 @@ class BoundaryConditions:
     left_rotational_stiffness, right_rotational_stiffness : float, optional
         Rotational stiffness, N m/rad: 0 is a pinned end, None (the default) a clamped one.
     axial_support_stiffness : float, optional
-        K, N/m; rigid by default.
+        Stiffness K, N/m; rigid by default.
 
     See Also
     --------

@@ -52,8 +52,7 @@ def equilibrium_branches(
     values : (float, float)
         Range of the parameter, in its unit.
     progress : callable or bool, optional
-        Called as ``progress(done, total)`` with the equilibria from which branches were followed; True writes a line to
-        standard error.
+        Called as ``progress(done, total)`` with the equilibria from which branches were followed; True prints it.
 
     Returns
     -------

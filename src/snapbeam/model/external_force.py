@@ -269,15 +269,14 @@ class ExternalForce:
     Parameters
     ----------
     history : ForceHistory
-        F(t): a :class:`~snapbeam.HarmonicForce`, a :class:`~snapbeam.ConstantForce`, a :class:`~snapbeam.model.HalfSineForce` or, for
-        any other history, a :class:`~snapbeam.RecordedForce`.
+        Force F(t): a :class:`~snapbeam.HarmonicForce`, :class:`~snapbeam.ConstantForce`,
+        :class:`~snapbeam.model.HalfSineForce` or :class:`~snapbeam.RecordedForce`.
     location : float, optional
         Location of the force on a beam, over the length.
     shape : array_like of shape (N,), optional
-        Row h of a structure given by matrices: the force on each coordinate per unit of F; its contact point by
-        default.
+        Row h of a structure given by matrices; its contact point by default.
     label : str, optional
-        Name in parameter names, in place of the number of the force.
+        Name in place of the number of the force.
 
     See Also
     --------

@@ -43,50 +43,45 @@ def force_displacement(
 ) -> xr.Dataset:
     r"""Compute the static force-displacement curve of a point force: every branch and its stability.
 
-    The force F acts on the beam at *location*, positive towards the upper well.  The displacement w is that of the same
-    point, from the straight line through the ends.  With c = phi(x_s) and the potential energy U of the system
-    (:attr:`snapbeam.System.potential`) the equilibria solve
+    The force F acts at *location*, positive towards the upper well; w is the displacement of that point from the
+    straight line through the ends. With c = phi(x_s) and the potential energy U (:attr:`snapbeam.System.potential`) the
+    equilibria solve
 
         dU/dalpha = F c.
 
-    The paths through all equilibria without the force, and those that branch off from them, symmetric and antisymmetric
-    ones, are followed in arc length.  Of a structure without local forces closed paths without such an equilibrium are
-    found too, by all equilibria under 40 forces.  Structures with one equilibrium, such as a shallow arch, have a curve
-    as well.
+    The paths through all equilibria without the force and those that branch off are followed in arc length. Of a
+    structure without local forces closed paths are found too, from all equilibria under 40 forces.
 
     Parameters
     ----------
     system : System, ReducedModel or Potential
-        Local forces and the constant part of an external force act; the striker, the drive, the contact and forces that
-        change in time do not.
+        System; its local forces and the constant part of an external force act.
     location : float, optional
-        x_s in (0, 1); that of the striker by default.  A structure given by matrices has its own.
+        Location x_s in (0, 1); that of the striker, or of a structure given by matrices, by default.
     well : {"lower", "upper"}, optional
-        The well from which the force pushes the beam.  By default the as-fabricated one, on the side of the initial
-        shape; of a beam without an initial shape the lower one.
+        Well from which the force pushes the beam; by default the as-fabricated one, on the side of the initial shape,
+        or the lower one.
     displacement_range : (float, float), optional
-        Range of w, m.  By default all equilibria and critical points, and a quarter more at both ends.
+        Range of w, m; by default all equilibria and critical points, and a quarter more.
 
     Returns
     -------
     xarray.Dataset
-        Variables over ``point``: ``displacement`` (m), ``force`` (N), ``energy`` (J, potential energy without the work
-        of the force), ``branch``, ``unstable_directions`` under a given force (0: stable),
-        ``unstable_directions_at_fixed_displacement``, and ``amplitude`` (alpha, over ``mode``).  Over
-        ``branch_number``: ``branch_kind``, "primary" or "secondary".  Over ``critical_point``: ``critical_kind``
-        ("limit" or "bifurcation"), ``critical_displacement`` (m), ``critical_force`` (N), ``critical_branch``.
-        ``snap_through_force`` (N) is where the stable path from the well ends under a force towards the other side.
-        ``snap_back_force`` is where the stable path of the other well ends on the way back; with one well, where the
-        path that comes from a large force does. ``snap_through_displacement`` and ``snap_back_displacement`` (m) belong
-        to them.  They are NaN if the beam does not snap.  ``energy_barrier`` (J) is that from the well to the lowest
-        adjacent saddle without a force, ``energy_barrier_back`` that from the other well; NaN with one well.  The
-        attributes name the well, how it was chosen, and the kind of the critical points.
+        Variables over ``point``: ``displacement`` (m), ``force`` (N), ``energy`` (J, without the work of the force),
+        ``branch``, ``unstable_directions`` under a given force (0: stable),
+        ``unstable_directions_at_fixed_displacement``, ``amplitude`` (alpha, over ``mode``). Over ``branch_number``:
+        ``branch_kind``, "primary" or "secondary". Over ``critical_point``: ``critical_kind`` ("limit" or
+        "bifurcation"), ``critical_displacement`` (m), ``critical_force`` (N), ``critical_branch``.
+        ``snap_through_force`` (N) ends the stable path from the well; ``snap_back_force`` ends that of the other well
+        on the way back or, with one well, the path from a large force. ``snap_through_displacement`` and
+        ``snap_back_displacement`` (m) belong to them. They are NaN without snap-through. ``energy_barrier`` (J) is from
+        the well to the lowest adjacent saddle without a force, ``energy_barrier_back`` from the other well; NaN with
+        one well. The attributes name the well and its choice.
 
     Raises
     ------
     InputError
-        For a location at a node of all modes, a linear system, whose curve is a straight line, or a well that does not
-        exist.
+        For a location at a node of all modes, a linear system, or a well that does not exist.
 
     See Also
     --------

@@ -186,8 +186,8 @@ class PiezoelectricHarvester(_Layers):
 
         theta_i = Theta [phi_i'(x_2) - phi_i'(x_1)],     C v' = -v/R - theta . alpha',
 
-    with Theta the bending moment per volt.  Their own mass and stiffness are neglected.  Of a structure given
-    by matrices theta is Theta times its ``patch_shape``, for all locations.
+    with Theta the bending moment per volt. Their own mass and stiffness are neglected. A structure given by matrices
+    has Theta times its ``patch_shape``.
 
     Parameters
     ----------
@@ -253,18 +253,18 @@ class PiezoelectricHarvester(_Layers):
 
             e = d_31/s_11,     eps = eps^T - d_31^2/s_11.
 
-        These are the formulas of Erturk and Inman, Piezoelectric Energy Harvesting, Wiley 2011, ch. 3, for a thin beam.
+        Source: Erturk and Inman, Piezoelectric Energy Harvesting, Wiley 2011, ch. 3, for a thin beam.
 
         Parameters
         ----------
         stress_constant : float, optional
-            The effective e_31, C/m^2; its sign turns the sign of the voltage.
+            Effective e_31, C/m^2; its sign is that of the voltage.
         strain_constant : float, optional
             d_31, m/V or C/N, with *layer_modulus*, instead of *stress_constant*.
         layer_modulus : float, optional
             Young's modulus of the layers at constant field, 1/s_11, Pa.
         permittivity : float
-            Permittivity, F/m: at constant strain with *stress_constant*, at constant stress with *strain_constant*.
+            Permittivity, F/m, at constant strain with *stress_constant*, else at constant stress.
         layer_thickness, layer_width : float
             Thickness and width of each layer, m.
         beam : Beam
@@ -272,10 +272,10 @@ class PiezoelectricHarvester(_Layers):
         resistance : float
             Resistance of the load, ohm.
         patch_start, patch_end : float
-            Ends of the patch, locations over the length in [0, 1].
+            Ends of the patch over the length, in [0, 1].
         wiring : {"parallel", "series"}
-            Wiring of the two layers: in parallel twice the moment per volt and twice the
-            capacitance of one, in series the moment of one and half its capacitance.
+            Wiring: in parallel twice the moment per volt and twice the capacitance of one layer, in series the moment
+            of one and half its capacitance.
 
         Examples
         --------
@@ -329,12 +329,12 @@ class PiezoelectricPatches(_Layers):
 
         theta_i = sum_k Theta_k [phi_i'(x_2k) - phi_i'(x_1k)],     C v' = -v/R - theta . alpha'.
 
-    Of patches in parallel C is the sum of their capacitances.  :meth:`wired` makes it from them.
+    In parallel C is the sum of the capacitances. :meth:`wired` makes the circuit from its patches.
 
     Parameters
     ----------
     patches : array_like of shape (patches, 3)
-        Rows x_1, x_2 (over the length) and Theta_k, N m per volt of the load; a negative Theta reverses the polarity.
+        Rows x_1, x_2 (over the length) and Theta_k, N m per volt of the load; its sign is the polarity.
     capacitance : float
         C of the circuit, F.
     resistance : float
@@ -363,8 +363,7 @@ class PiezoelectricPatches(_Layers):
             raise InputError(f"patches = {shown(self.patches)}: must be rows of start < end and a moment per volt")
         within("patches", float(rows[:, :2].min()), 0.0, 1.0, closed="both")
         within("patches", float(rows[:, :2].max()), 0.0, 1.0, closed="both")
-        rows.setflags(write=False)
-        object.__setattr__(self, "patches", rows)
+        object.__setattr__(self, "patches", tuple(map(tuple, rows.tolist())))  # rows of numbers, so that == compares
 
     @classmethod
     def wired(
@@ -377,13 +376,13 @@ class PiezoelectricPatches(_Layers):
 
             1/C = sum 1/C_k,     theta = C sum theta_k/C_k,
 
-        while the differences of the charges of the patches, which no current changes, are springs along the n - 1 rows of
-        sum theta_k theta_k^T/C_k - theta theta^T/C.  They follow the first harvester and lose nothing.
+        while the differences of the charges, which no current changes, are springs along the n - 1 rows of sum theta_k
+        theta_k^T/C_k - theta theta^T/C. They follow the first harvester and lose nothing.
 
         Parameters
         ----------
         patches : sequence of PiezoelectricHarvester
-            Patches; their own resistances are not used.  A negative moment per volt reverses the polarity.
+            Patches, whose resistances are not used; the sign of the moment per volt is the polarity.
         wiring : {"parallel", "series"}
             Wiring of the patches.
         resistance : float
@@ -392,7 +391,7 @@ class PiezoelectricPatches(_Layers):
         Returns
         -------
         list of Harvester
-            Harvesters for ``System(..., harvesters=...)``.  The first has the voltage and the resistance of the load.
+            Harvesters for ``System(..., harvesters=...)``; the first has the load.
 
         Examples
         --------
@@ -463,7 +462,7 @@ class ElectromagneticHarvester(Harvester):
     resistance : float
         R of the load, ohm.
     coil_resistance, inductance : float
-        R_c (ohm) and L_c (H) of the coil; without an inductance the current follows the velocity at once.
+        R_c (ohm) and L_c (H) of the coil; without inductance the current follows the velocity.
     location : float
         x_c over the length.
 

@@ -61,22 +61,21 @@ class Imperfection:
 
         U = sum E I k_i^2 (alpha_i - alpha0_i)^2/2 - P (s - s0)/2 + gamma (s - s0)^2/4 - F . alpha,
 
-    s = alpha . alpha and s0 = alpha0 . alpha0: that of a perfect beam under the load P + gamma s0 with the constant
-    transverse force E I k_i^2 alpha0_i + F_i.  Parts that are given add up.  Displacements, loads and forces count
-    positive towards the upper well.
+    with s = alpha . alpha and s0 = alpha0 . alpha0: that of a perfect beam under the load P + gamma s0 with the
+    constant force E I k_i^2 alpha0_i + F_i. Parts add up. Displacements, loads and forces are positive towards the
+    upper well.
 
     Parameters
     ----------
     midspan_amplitude : float
-        Height at the centre, m, of an initial shape of the given *shape*.
+        Height of the initial shape at the centre, m.
     shape : {"mode", "sine"}
-        Shape of height *midspan_amplitude*: the first buckling mode, or a single half sine, of which the modes take the
-        part that they hold.
+        Initial shape: the first buckling mode, or the part of a single half sine that the modes hold.
     antisymmetric_amplitude : float
-        Maximum height, m, of an initial shape of the form of the second buckling mode, on the left half.
+        Maximum height, m, of a part of the form of the second buckling mode, on the left half.
     profile : array_like of shape (2, points), optional
-        A measured initial shape: places over the length, ascending from 0 to 1, and heights, m.  The straight line
-        through its ends is taken away.
+        Measured initial shape: places over the length, ascending from 0 to 1, and heights, m. The straight line through
+        its ends is subtracted.
     point_load : float
         Constant force, N, at *point_location*.
     point_location : float
@@ -84,7 +83,7 @@ class Imperfection:
     uniform_load : float
         Constant force per length, N/m.
     gravity : float
-        Acceleration of gravity, m/s^2, that pulls towards the lower well: 9.81 for a beam that lies.
+        Acceleration of gravity, m/s^2, towards the lower well: 9.81 for a horizontal beam.
 
     See Also
     --------

@@ -29,13 +29,13 @@ def identify_imperfection(
 ) -> ReducedModel:
     """The beam and the imperfection whose first frequencies about the two wells are those that were measured.
 
-    The buckling level, or the axial load of a beam that was given one, and one number of the imperfection are
-    found, two unknowns from two frequencies, which do not determine the type of imperfection.
+    Two unknowns, the buckling level (or the axial load) and one number of the imperfection, follow from two
+    frequencies, which do not determine the type of imperfection.
 
     Parameters
     ----------
     beam : Beam
-        The load is identified; all other parameters are fixed.
+        Beam whose load is identified.
     lower_frequency, upper_frequency : float
         First natural frequency about the lower and about the upper well, Hz.
     kind : {"midspan_amplitude", "point_load", "uniform_load"}
@@ -43,12 +43,12 @@ def identify_imperfection(
     modes : int
         Number of modes of the model.
     imperfection : Imperfection, optional
-        Other known parameters of the beam.
+        Other known parts.
 
     Returns
     -------
     ReducedModel
-        Model of the identified ``beam`` and ``imperfection``; its ``well_frequencies`` are those that were given.
+        Model of the identified ``beam`` and ``imperfection``, with the given ``well_frequencies``.
 
     Raises
     ------

@@ -22,29 +22,27 @@ class Integration:
     Parameters
     ----------
     cycles : int, optional
-        Number of cycles of excitation, at least 1; default 200, or all cycles of a recorded drive.
+        Number of cycles of excitation, at least 1; by default 200, or all cycles of a recorded drive.
     step : float, optional
-        Step in free flight, s; steps in contact scale with it.  The default follows from the model and
-        the contact; its error is on the docs' page on accuracy.
+        Step in free flight, s; steps in contact scale with it. Follows from model and contact by default.
     accuracy : {"standard", "reference"}
-        ``"standard"``: order 4.  ``"reference"``: order 6 and much shorter steps, to check others with.
+        Order 4, or order 6 with much shorter steps, to check results.
     tolerance : float, optional
-        Requested maximum error of the displacement of the contact point and of mid-span, over b, from 1e-10 to
-        0.1, up to the predictability horizon. Excludes *step* and *accuracy*.
+        Maximum error of the displacement of the contact point and of mid-span, over b, from 1e-10 to 0.1, up to the
+        predictability horizon; in place of *step* and *accuracy*.
     engine : {"auto", "native", "python", "cuda"}
-        Solver; ``"auto"`` is the native core, ``"native"``.  ``"python"`` is the specification in Python, for laws of one's own
-        in plain Python: thousands of times slower, it chooses its steps itself, and takes no *step*, *tolerance* or *early_termination*.
-        ``"cuda"`` is the core on a GPU of NVIDIA, for maps of ten thousand runs and more (extra ``cuda``); single runs stay on the CPU.
+        Solver: ``"auto"`` and ``"native"`` are the core in C++. ``"python"`` is its specification, for laws in plain
+        Python: hundreds to thousands of times slower, without *step*, *tolerance* or *early_termination*. ``"cuda"`` is the core on
+        an NVIDIA GPU (extra ``cuda``), for maps of ten thousand runs and more.
     early_termination : bool
-        End a run once its response class is certain: the class is the same, statistics other than it stop there.
+        End a run once its response class is certain; other statistics stop there.
     threads : int, optional
-        Threads of the native core; all usable cores by default.  No number depends on it.
+        Threads of the native core, all cores by default; results do not depend on it.
     high_frequency_ratio : float
         Multiple of omega_1 above which the energy of a mode counts as high, for ``high_frequency_energy_fraction``.
     max_steps : int, optional
-        Maximum number of steps of one run. If free flight alone needs more, an InputError is raised; if
-        contacts need more, the run ends with the status STEP_LIMIT. Default: about one hour on one core, 1e10
-        steps with 1 mode, 7e8 with 64.
+        Maximum number of steps of a run, by default about one hour on one core (1e10 with 1 mode, 7e8 with 64). If free
+        flight alone needs more, an InputError is raised; otherwise the run ends with the status STEP_LIMIT.
 
     Raises
     ------

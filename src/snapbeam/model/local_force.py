@@ -32,9 +32,8 @@ _NEAREST = 0.1
 class LocalForce:
     """A law of a force that acts on one point: derive a frozen dataclass from it, with the law's constants as fields.
 
-    The law depends on the displacement u of the point from the straight beam, or on its rotation, and on the
-    rate v of that.  Its physics are scalar functions, which the solver calls in the time step.  ``law``
-    contains the constants, by the names of the fields:
+    The law depends on the displacement u of the point from the straight beam, or on its rotation, and on the rate v of
+    that. Its physics are scalar functions; ``law`` contains the constants, by the names of the fields:
 
     - ``force(law, displacement)``: conservative force on the beam, N, or moment, N m; positive in the direction of u;
     - ``energy(law, displacement)``: its potential energy, J; the force is minus its derivative.
@@ -44,19 +43,19 @@ class LocalForce:
     - ``damping_force(law, displacement, velocity)``: the part that depends on v;
     - ``damping_coefficient(law, displacement, velocity)``: minus its derivative by v, N s/m or N m s/rad.
 
-    They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone.  A law that is valid for some displacements only
-    has ``displacement_range(law)``, a pair; a run that leaves it ends with the status DIVERGED.
+    They use ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone. ``displacement_range(law)``, a pair, limits the
+    displacements; a run that leaves them ends with the status DIVERGED.
 
     Parameters
     ----------
     location : float, optional
         Location of the force on a beam, over the length.
     coordinate : {"displacement", "rotation"}
-        Coordinate u of a beam at the location: its displacement, m, or its rotation, rad.
+        Coordinate u at the location: displacement, m, or rotation, rad.
     shape : array_like of shape (N,), optional
-        Row of a structure given by matrices: u = shape . alpha; its contact point by default.
+        Row of a structure given by matrices, u = shape . alpha; its contact point by default.
     label : str, optional
-        Name in parameter names, in place of the number of the force: ``"magnet"`` in ``force.magnet.gap``.
+        Name in place of the number of the force: ``"magnet"`` in ``force.magnet.gap``.
 
     See Also
     --------
@@ -65,8 +64,7 @@ class LocalForce:
     Notes
     -----
     In modal coordinates about a well, p' = ... + r F(u, v) with r = V^T shape, u = u_well + r . q and v = r . p.  The wells of
-    the model are those without the force, those of the system (:attr:`snapbeam.System.potential`) with it; runs begin in
-    the latter.
+    the model are those without the force; runs begin in those of the system (:attr:`snapbeam.System.potential`).
 
     Examples
     --------
@@ -267,8 +265,8 @@ class LocalSpring(LocalForce):
     stiffness : float
         k, N/m, or N m/rad for a rotation.
     cubic_stiffness : float
-        k_3, N/m^3, or N m/rad^3.  A softening spring, k_3 < 0, is valid up to u^2 = -k/k_3, where its force falls to zero
-        and its potential energy has a maximum; with k = 0 it has no such limit.
+        k_3, N/m^3, or N m/rad^3. With k > 0 a softening spring, k_3 < 0, is valid up to u^2 = -k/k_3, where its force
+        falls to zero.
 
     See Also
     --------

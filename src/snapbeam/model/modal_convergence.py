@@ -39,8 +39,8 @@ def with_modes(system: System, modes: int) -> System:
 def modal_error(system: System, quantity: Callable[[System], ArrayLike] = well_frequencies) -> float:
     r"""Estimate the relative error of a quantity that follows from the finite number of modes.
 
-    The quantity q is computed with N modes and with N' = max(2 N, N + 4).  Of a quantity whose error decreases with the
-    second order of N or faster, Richardson's extrapolation bounds the error of q(N) by
+    The quantity q is computed with N modes and with N' = max(2 N, N + 4). If its error decreases with the second order
+    of N or faster, Richardson's extrapolation bounds the error of q(N) by
 
         4/3 abs(q(N') - q(N)) / abs(q(N)),
 
@@ -49,15 +49,14 @@ def modal_error(system: System, quantity: Callable[[System], ArrayLike] = well_f
     Parameters
     ----------
     system : System
-        A beam with the forces that act on it at rest; its strikers and excitations are left out.
+        Beam with the forces that act at rest; strikers and excitations are left out.
     quantity : callable, optional
-        A function of a system, with one or more numbers; the first three frequencies about each well by default.
+        Function of a system that returns numbers; the first three frequencies about each well by default.
 
     Returns
     -------
     float
-        NaN for a structure given by matrices, whose modes are given, if the numbers of components differ, and above 64
-        modes.
+        The error; NaN for a structure given by matrices, if the numbers of components differ, or above 64 modes.
 
     See Also
     --------

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.model.parameters import PHYSICAL, lookup
+from snapbeam.model.parameters import PHYSICAL, lookup, physical_hint
 from snapbeam.model.quantity import split_name
 from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import (
@@ -82,7 +82,7 @@ def _number(name: str, text: str, part: str, forms: str, unit: str) -> float:
     try:
         value = number_in_unit(part, unit)
     except InputError as error:
-        raise InputError(f"{name} = {text!r}: {error}") from None
+        raise InputError(f"{name} = {text!r}: {error}{physical_hint(name)}") from None
     if value is None:
         raise InputError(f"{name} = {shown(text)}: must be {forms}")
     return _finite(name, text, value)

@@ -32,6 +32,7 @@ from snapbeam.model.parameters import (
     lookup,
     named_in,
     parameters,
+    physical_hint,
     physical_names,
     ratio_of,
     refuse_well_axis,
@@ -232,6 +233,7 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
     unit = "" if item.unit == "1" else f" in {item.unit}"
     message, value = _from_text(name, value, item.unit) if item.kind is float else ("", value)
     if message:
+        message += physical_hint(row.name)
         return message, None
     if item.kind is float and not (name == "damping_ratio" and isinstance(value, (list, np.ndarray))):
         if isinstance(value, bool) or not isinstance(value, (int, float)):

@@ -162,7 +162,11 @@ def _around(row: Parameter) -> Parameter:
     """Parameter of base, axial load or a force, with a name distinct from that of the striker."""
     section, name = split_name(row.name)
     of = _AROUND[section]
-    words = f"{row.quantity.long_name}, of {of}" if of else row.quantity.long_name
+    words = (
+        f"{row.quantity.long_name}{',' * (' over ' in row.quantity.long_name)} of {of}"
+        if of
+        else row.quantity.long_name
+    )
     plain = name if row.short == name or section == "base_excitation" else row.short
     plain = plain.removeprefix("load_").removeprefix("force_")
     return dataclasses.replace(
@@ -333,6 +337,14 @@ _IN_UNITS = {
     "location": ("location_m", "m", "distance from the left end"),
 }
 """Name in the physical unit, unit and words of each ratio, by its field."""
+
+
+def physical_hint(name: str) -> str:
+    """The words that tell which parameter takes the physical unit of a ratio; empty for another parameter."""
+    found = _IN_UNITS.get(name.rpartition(".")[2])
+    return f"; {found[0]} takes a value in {found[1]}" if found else ""
+
+
 _OWNERS = {
     "drive": "the striker",
     "contact": "the striker",

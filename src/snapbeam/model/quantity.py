@@ -164,11 +164,9 @@ def check_label(label: Any) -> None:
 
 
 def keep_shape(force: Any) -> None:
-    """Replace the ``shape`` of a force, unless it is None, by a read-only array."""
+    """Replace the ``shape`` of a force, unless it is None, by a tuple of numbers, so that == compares forces."""
     if force.shape is not None:
-        shape = finite_array("shape", force.shape, 1).copy()
-        shape.setflags(write=False)
-        object.__setattr__(force, "shape", shape)
+        object.__setattr__(force, "shape", tuple(finite_array("shape", force.shape, 1).tolist()))
 
 
 # ----------------------------------------------------------------------------------------------------

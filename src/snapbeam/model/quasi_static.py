@@ -37,10 +37,9 @@ def quasi_static_threshold(
     location : array_like
         x_s, each in (0, 1).
     frequency_ratio : array_like
-        Omega, each greater than 0.  The two broadcast against each other.
+        Omega, each greater than 0, broadcast against *location*.
     beam : Beam, optional
-        Buckled beam whose first buckling mode is used if its ends turn; between clamps that mode is the same for every
-        beam.
+        Buckled beam, if its ends turn; the first mode between clamps is the same for all.
 
     Returns
     -------

@@ -477,9 +477,9 @@ class ReducedModel(Wells):
 
         m alpha'' + K0 alpha + gamma (alpha . alpha) alpha = phi(x_s) f,
 
-    and the potential energy is U = alpha . K0 alpha / 2 + gamma (alpha . alpha)^2 / 4.  A constant transverse force B
-    makes the wells unequal: it adds B to the right side and -B . alpha to U.  Use :meth:`from_beam` or
-    :meth:`from_matrices` to create a model; its arrays are read-only.
+    and the potential energy is U = alpha . K0 alpha / 2 + gamma (alpha . alpha)^2 / 4. A constant transverse force B
+    makes the wells unequal: it adds B to the right side and -B . alpha to U. :meth:`from_beam` and
+    :meth:`from_matrices` create a model; its arrays are read-only.
 
     The arguments of :meth:`from_matrices` are attributes; for a beam w = alpha . phi (m), with alpha and phi in m^0.5, mass in
     kg m, stiffness in N and nonlinear_stiffness in N/m.
@@ -487,17 +487,16 @@ class ReducedModel(Wells):
     Attributes
     ----------
     well_amplitude : array of shape (N,)
-        Amplitudes at rest in the lower well, (-sqrt((P - P_cr)/gamma), 0, ...); of a structure with one equilibrium
-        that one, zeros if it is perfect.
+        Amplitudes at rest in the lower well, (-sqrt((P - P_cr)/gamma), 0, ...), or in the one equilibrium.
     length_scale : float or None
-        Length that normalises displacements, m: the buckling level b; of a beam that the load alone would not buckle
+        Length that normalises displacements, m: the buckling level b; of a beam that the load alone would not buckle,
         the height of the centre in the well of minimum energy; None for a straight beam.
     beam : Beam or None
         Beam from which the model was reduced.
     damping : array of shape (N, N) or None
-        Damping matrix C, N s/m, if it was given; *given_damping_ratio* are the damping ratios if they were.
+        Damping matrix C, N s/m, if given; *given_damping_ratio* otherwise.
     given_reference_frequency : float or None
-        Frequency to normalise with, Hz, if it is not the first natural frequency.
+        Frequency that normalises, Hz, if it is not the first natural frequency.
     imperfection : Imperfection or None
         Imperfection from which *transverse_force* follows.
 
@@ -566,14 +565,13 @@ class ReducedModel(Wells):
         modes : int
             Number of modes N, 1 to 256.
         damping_ratio : float or array of shape (N,)
-            Damping ratio of the linear modes about a well, each in [0, 1): of unequal wells the one that the first striker
-            pushes away from, the one of minimum energy without a striker.
+            Damping ratio of the linear modes about a well, each in [0, 1): of unequal wells the one that the first
+            striker pushes away from, or the one of minimum energy. The matrix is the same everywhere.
         reference_frequency : float, optional
-            Frequency that normalises the excitation, Hz; the first natural frequency by default, of unequal wells about
+            Frequency that normalises the excitation, Hz; by default the first natural frequency, of unequal wells about
             the one of minimum energy.
         imperfection : Imperfection, optional
-            Imperfection, which makes the wells unequal; a zero one is ignored.  Damping is that of the linear
-            modes about the well that the striker pushes away from, and the same matrix everywhere.
+            Imperfection, which makes the wells unequal.
         """
         instance("beam", beam, Beam, "a Beam")
         count = integer("modes", modes, 1, MAX_MODES)
@@ -647,56 +645,53 @@ class ReducedModel(Wells):
     ) -> ReducedModel:
         """A model of any structure, given by its matrices; a free mass (stiffness 0) is one.
 
-        A coordinate whose stiffness is a penalty (at least 1e14, and 1e12 times every other) is fixed: it is removed from the
-        matrices and from every row, and a :class:`~snapbeam.DiagnosticWarning` names it.
+        A coordinate with a penalty stiffness (at least 1e14, and 1e12 times every other) is fixed: it is removed from
+        matrices and rows, and a :class:`~snapbeam.DiagnosticWarning` names it.
 
         Parameters
         ----------
         mass : array of shape (N, N)
-            Mass matrix, symmetric and positive definite; an array or a sparse matrix of SciPy.
+            Mass matrix, symmetric and positive definite, dense or sparse.
         stiffness : array of shape (N,) or (N, N)
-            Linear stiffness of the unstressed structure: a diagonal or a symmetric matrix, which may be sparse.
+            Linear stiffness of the unstressed structure: a diagonal or a symmetric matrix, dense or sparse.
         contact_shape : array of shape (N,)
             Displacement under the shaker per unit of each coordinate.
         midspan_shape : array of shape (N,), optional
-            Shape values at the point whose sign distinguishes the wells; by default the contact point.
+            Shape values at the point whose sign distinguishes the wells; the contact point by default.
         nonlinear_stiffness : float
-            gamma of the term gamma (alpha . alpha) alpha, at least 0.
+            Factor gamma of gamma (alpha . alpha) alpha, at least 0.
         well_amplitude : array of shape (N,), optional
-            Coordinates at rest in the lower well (where the displacement of the centre is not
-            positive); zeros if not given.  It must be a stable equilibrium.
+            Stable equilibrium in the lower well (the displacement of the centre is not positive); zeros by default.
         length_scale : float
             Length that normalises displacements, m.
         damping_ratio : float or array of shape (N,)
-            Damping ratio of each linear mode about the equilibrium, each in [0, 1); 0 by default.
+            Damping ratio of each linear mode about the equilibrium, in [0, 1).
         damping : array of shape (N, N), optional
-            Damping matrix C in place of *damping_ratio*, N s/m: adds C alpha' to the left side, about both wells.  Symmetric,
-            without negative eigenvalues; an array or a sparse matrix of SciPy.  It may couple the linear modes, make
-            some of them overdamped, and damp rigid ones.
+            Damping matrix C, N s/m, in place of *damping_ratio*: C alpha' on the left side, about both wells.
+            Symmetric, without negative eigenvalues; it may couple or overdamp modes and damp rigid ones.
         reference_frequency : float, optional
             Frequency that normalises the excitation, Hz; needed if the first natural frequency is 0.
         transverse_force : array of shape (N,), optional
-            Constant force B that makes the wells unequal; the equilibria then follow from it and are not given.
+            Constant force B that makes the wells unequal; the equilibria follow from it.
         base_shape : array of shape (N,), optional
-            Displacement of each coordinate if the base moves by one unit and nothing deforms, r; needed for a
-            base excitation, whose inertial force is -m r y''.
+            Displacement r of each coordinate under a unit motion of the base without deformation; needed for a base
+            excitation, with the inertial force -m r y''.
         elongation_matrix : array of shape (N, N), optional
-            S of the term gamma (alpha . S alpha) S alpha, symmetric and without negative eigenvalues; the identity by
-            default.  For a beam it is the geometric stiffness matrix of a unit tension, with gamma = E A/(2 L); for a
-            cubic spring k_3 between coordinates it is h h^T with gamma = k_3, where h . alpha is its elongation.
+            Matrix S of the term gamma (alpha . S alpha) S alpha, symmetric, without negative eigenvalues; the identity
+            by default. Of a beam it is the geometric stiffness matrix of a unit tension, gamma = E A/(2 L); of a cubic
+            spring k_3 with the elongation h . alpha it is h h^T, gamma = k_3.
         patch_shape : array of shape (N,), optional
-            Difference of the slopes at the two ends of piezoelectric layers, w'(x_2) - w'(x_1), per unit of each
-            coordinate; needed for a :class:`~snapbeam.PiezoelectricHarvester`.
+            Difference of the slopes at the ends of piezoelectric layers, w'(x_2) - w'(x_1), per unit of each
+            coordinate, for a :class:`~snapbeam.PiezoelectricHarvester`.
         modes : int, optional
-            Number of lowest linear modes, 1 to 256, onto which the matrices and rows are projected.  They become the
-            coordinates of the model.  Sparse matrices of more than 4000 coordinates need it; no well_amplitude.
+            Number of lowest linear modes, 1 to 256, onto which matrices and rows are projected: the new coordinates.
+            Sparse matrices of more than 4000 coordinates need it; not with well_amplitude.
 
         Raises
         ------
         InputError
-            For matrices of the wrong shape, not symmetric or not positive definite, a damping matrix with a negative
-            eigenvalue or beside *damping_ratio*, values that are not finite or out of range, or an equilibrium that is none or is unstable; if rounding hides whether a natural
-            frequency is 0.
+            For matrices of wrong shape, symmetry or definiteness, *damping* beside *damping_ratio*, values out of
+            range, a point that is not a stable equilibrium, or if rounding hides whether a natural frequency is 0.
         """
         given = checked_structure(
             StructureMatrices(
@@ -931,16 +926,17 @@ def _coupling(parity: NDArray[np.int_]) -> _Array:
 # The shape of a beam along its length, from the amplitudes of its buckling modes.
 
 
-def row_of_matrices(model: ReducedModel, shape: _Array | None) -> _Array:
+def row_of_matrices(model: ReducedModel, shape: tuple[float, ...] | None) -> _Array:
     """Row of a force on a structure given by matrices, (N,): its *shape*, by default that of the contact."""
     if shape is None:
         assert model.contact_shape is not None
         return model.contact_shape
-    if shape.shape != (model.modes,):
+    row = np.asarray(shape)
+    if row.shape != (model.modes,):
         raise InputError(
-            f"force.shape of shape {shape.shape}: must be ({model.modes},); give one number for each coordinate"
+            f"force.shape of shape {row.shape}: must be ({model.modes},); give one number for each coordinate"
         )
-    return shape
+    return row
 
 
 def displacement_along(

@@ -46,30 +46,29 @@ class State:
     Parameters
     ----------
     amplitude : array_like of shape (..., N), or Equilibrium
-        Amplitudes alpha of the buckling modes, m^0.5; of an equilibrium, such as one of ``potential.wells``, its own.
+        Amplitudes alpha of the buckling modes, m^0.5, or an equilibrium, such as one of ``potential.wells``.
     velocity : array_like of shape (..., N), optional
         Their velocities, m^0.5/s; zeros by default.
     phase : array_like of shape (...), optional
-        Phase of the drive, rad; NaN, or nothing given: the one that the drive has at the start.
+        Phase of the drive, rad; NaN or None: that at the start.
     striker_position : array_like of shape (...), optional
-        Mid-position of the tip in space, m; NaN, or nothing given: the tip touches the beam.
+        Mid-position of the tip in space, m; NaN or None: the tip touches the beam.
     contact_time : array_like of shape (..., strikers), optional
-        Seconds since the present contact of each striker began, in the order of the strikers; negative where tip and
-        beam are apart.  NaN, or nothing given: the penetration decides.
+        Duration of the present contact of each striker, s; negative where tip and beam are apart. NaN or None: the
+        penetration decides.
     striker_shift, striker_rate : array_like of shape (...) or (..., strikers)
-        Displacement (m) and velocity (m/s) of the tip of a striker with mass beyond the motion of its drive, positive
-        towards the upper well; NaN of strikers without.  One number for each of several strikers.
+        Displacement (m) and velocity (m/s) of the tip of a striker with mass beyond its drive, positive towards the
+        upper well; NaN of others.
     indentation : array_like of shape (...) or (..., strikers)
-        Residual indentation of contacts under a law with plastic deformation, m; NaN of others, and where there is none
-        yet.  One number for each of several strikers.
+        Residual indentation of contacts under a law with plastic deformation, m; NaN of others.
     circuit : array_like of shape (...) or (..., harvesters)
-        State of the circuits of harvesters: voltage (V) of piezoelectric layers, current (A) of a coil with an
-        inductance; NaN where there is none, or where it is at rest.
+        State of the circuits: voltage (V) of piezoelectric layers, current (A) of a coil with an inductance; NaN where
+        there is none, or at rest.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitude and velocity that were carried along, k of them.
     statistics : mapping, optional
-        Statistics of the interval since the previous state: crossings, impacts, peak_force, ... by name.  If the
-        integration failed, ``statistics["status"]`` gives the reason and the state is NaN.
+        Statistics of the interval since the previous state, by name. If the integration failed,
+        ``statistics["status"]`` gives the reason and the state is NaN.
     modal : ModalState, optional
         The same in an engine's coordinates.
 

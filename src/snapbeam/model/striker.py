@@ -25,19 +25,18 @@ class Striker:
     location : float
         Position of the tip over the length of the beam, x_s, in (0, 1).
     side : {"below", "above"}
-        Side of the beam the tip pushes from.  ``"below"``: it pushes upward on the beam at rest in
-        its lower well.  ``"above"`` is the mirror image, downward on the upper well.
+        Side of the beam: ``"below"`` pushes upward on the beam at rest in its lower well, ``"above"`` is the mirror
+        image.
     gap : float, optional
-        Distance, m, between the mid-position and the beam at rest in the well that the first striker pushes away
-        from; negative presses.  By default the tip touches the beam at the start, wherever the beam then is.
+        Distance, m, between the mid-position and the beam at rest in the well that the first striker pushes away from;
+        negative presses. By default the tip touches the beam at the start.
     mass : float, optional
-        Mass of the striker, kg; infinite by default: the tip follows its drive exactly.  With a mass the drive
-        is the motion that the tip has as long as nothing touches it, and the contact force moves the body from
-        it: m_s x'' + c_s x' + k_s x = -f.
+        Mass of the striker, kg; infinite by default: the tip follows its drive. With a mass the contact force moves the
+        body from that motion: m_s x'' + c_s x' + k_s x = -f.
     suspension_stiffness : float
         Stiffness k_s of its suspension, N/m; 0 is a free flying mass.
     suspension_damping : float
-        Damper c_s of its suspension, N s/m, below critical; a coil of force factor K on a resistance R adds K^2/R.
+        Damper c_s of its suspension, N s/m, below critical.
 
     See Also
     --------
@@ -129,8 +128,7 @@ class Shaker:
     location : float
         Position of the tip over the length of the beam, x_s, in (0, 1).
     side : {"below", "above"}
-        Side of the beam the shaker pushes from.  ``"below"``: it pushes upward on the beam at rest in
-        its lower well.  ``"above"`` is the mirror image, downward on the upper well.
+        Side of the beam, as of a :class:`Striker`.
 
     See Also
     --------
@@ -173,10 +171,9 @@ class Contact:
     law : ContactLaw
         Law of the force between tip and structure.
     striker : Striker or Shaker
-        Striker with its own location, side, gap and drive.  Without a gap its tip touches the beam at rest in the
-        well that the first striker pushes away from.
+        Striker; without a gap its tip touches the beam at rest in the well that the first striker pushes away from.
     label : str, optional
-        Name in parameter names, in place of the number of the contact: ``"stop"`` in ``contact.stop.gap``.
+        Name in place of the number of the contact: ``"stop"`` in ``contact.stop.gap``.
 
     See Also
     --------

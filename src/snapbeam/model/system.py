@@ -67,22 +67,22 @@ class System:
     model : ReducedModel
         Reduced model of the structure.
     contacts : sequence of Contact, optional
-        Strikers, each with the law of its contact.  Without any the structure vibrates freely from *initial_state*.
+        Strikers, each with the law of its contact; without any the structure vibrates freely.
     forces : sequence of LocalForce or ExternalForce, optional
-        A :class:`~snapbeam.LocalForce` depends on the displacement and velocity of one point, an
-        :class:`~snapbeam.ExternalForce` on time.
+        Forces on one point that depend on its motion (:class:`~snapbeam.LocalForce`) or on time
+        (:class:`~snapbeam.ExternalForce`).
     base_excitation : BaseExcitation, optional
-        Motion of the base on which both ends of the beam are mounted.
+        Motion of both ends of the beam.
     axial_load : AxialLoadModulation, optional
         Change of the axial load in time.
     harvesters : sequence of PiezoelectricHarvester or ElectromagneticHarvester, optional
         Circuits that turn motion into power in a resistor.
     initial_state : State, optional
-        State in which runs begin, one and not a batch; at rest in *initial_well* by default.
+        State in which runs begin; at rest in *initial_well* by default.
     initial_well : {"lower", "upper", "unforced"} or int, optional
-        Well in which runs begin at rest, by name or by its index in ``unloaded_potential.wells``; "unforced" is the well
-        without the local forces, which then begin with the run, as a voltage that is switched on.  By default the one that the
-        first striker or stop pushes away from, touched by it; :attr:`initial_well_text` names it.
+        Well in which runs begin at rest, by name or index in ``unloaded_potential.wells``; "unforced" is the well
+        without the local forces, which then begin with the run. By default the one that the first striker or stop
+        pushes away from, touched by it; :attr:`initial_well_text` names it.
 
     See Also
     --------
@@ -90,8 +90,7 @@ class System:
 
     Notes
     -----
-    A system may have parts that the solver cannot integrate; a run then raises an error; its potential energy
-    and what follows from that are found nevertheless.
+    A system with parts that the solver cannot integrate has a potential energy; a run raises an error.
 
     Examples
     --------
@@ -163,12 +162,12 @@ class System:
     def replace(self, **changes: Any) -> System:
         """A neighbour: the same system with parameters changed by dotted name.
 
-        Names are those of the table of parameters (:func:`snapbeam.model.parameters.parameters`), as :func:`snapbeam.sweep`
-        takes them: ``velocity_amplitude``, ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``contact.location`` and ``drive.frequency_ratio``.
-        Those of the second contact, its drive or the second force have its number, ``contact.2.gap``,
-        ``drive.2.frequency_ratio``, or its label, ``contact.stop.gap``.  Whole parts are ``beam``, ``model``, ``contacts``,
-        ``forces``, ``base_excitation``, ``axial_load``, ``harvesters``, ``initial_state`` and ``initial_well``; one of several is ``contact``,
-        ``contact.law``, ``contact.striker``, ``drive``, ``force`` or ``harvester``, with its number after the first word.
+        Names are those of :func:`snapbeam.model.parameters.parameters`: ``velocity_amplitude``, ``beam.thickness``,
+        ``model.modes``, ``contact.stiffness``, ``drive.frequency_ratio``. The second contact, drive or force has its
+        number, ``contact.2.gap``, or its label, ``contact.stop.gap``. Whole parts are ``beam``, ``model``,
+        ``contacts``, ``forces``, ``base_excitation``, ``axial_load``, ``harvesters``, ``initial_state`` and
+        ``initial_well``; one of several is ``contact``, ``contact.law``, ``contact.striker``, ``drive``, ``force`` or
+        ``harvester``, with its number after the first word.
         """
         prefix = "initial_state."
         parts = {item.name: getattr(self, item.name) for item in fields(self)}
@@ -305,9 +304,9 @@ class System:
     def rest_state(self) -> State:
         """State at rest in the well that the first striker pushes away from, touched by it.
 
-        Without a striker it is the well of the start.  With local forces it is the well of the system that a beam comes
-        to, without inertia, from that well of the structure; where that is a saddle now, on the side of the striker.  An external force begins with the run, its constant part
-        too.
+        Without a striker it is the well of the start. With local forces it is the well that a beam without inertia
+        reaches from that well of the structure; from a saddle, on the side of the striker. An external force begins
+        with the run.
 
         Raises
         ------
@@ -346,14 +345,14 @@ class System:
     def poles(self, equilibrium: Equilibrium | str | int | None = None) -> NDArray[np.complex128]:
         """Poles of small oscillations about an equilibrium, with damping, local forces and circuits.
 
-        Of m a'' + C a' + K a = sum_j theta_j z_j and M_j z_j' = -theta_j . a' - rho_j z_j, with the tangent stiffness K of the
-        potential energy and the damping C of the modes and, at rest, of the local forces.  Contacts are open.
+        The equations are m a'' + C a' + K a = sum_j theta_j z_j and M_j z_j' = -theta_j . a' - rho_j z_j, with the
+        tangent stiffness K and the damping C of the modes and, at rest, of the local forces. Contacts are open.
 
         Parameters
         ----------
         equilibrium : Equilibrium, {"lower", "upper"} or int, optional
-            One of ``potential.equilibria``, or a well by name or by its index in ``potential.wells``; by default the one of
-            *initial_well*, or of :attr:`rest_state`.
+            One of ``potential.equilibria``, or a well by name or index in ``potential.wells``; by default that of
+            *initial_well* or :attr:`rest_state`.
 
         Returns
         -------
@@ -401,8 +400,8 @@ class System:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Natural frequencies about an equilibrium with all loads open, and with all loads shorted.
 
-        Of m a'' + (K + sum_j theta_j theta_j^T/M_j) a = 0 with the circuits that lose nothing: those of layers with an open
-        circuit, and those of coils with an inductance and no resistance with a shorted one.
+        From m a'' + (K + sum_j theta_j theta_j^T/M_j) a = 0 with the circuits that lose nothing: layers with an open
+        circuit, coils with an inductance and no resistance with a shorted one.
 
         Parameters
         ----------

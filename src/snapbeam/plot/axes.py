@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.parameters import Parameter, lookup
 from snapbeam.plot.style import cell_edges
-from snapbeam.util.si_prefixes import prefixed, scale_of
+from snapbeam.util.si_prefixes import WITH_PREFIX, prefixed, scale_of
 from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ _LONGEST = 44
 """Characters of a line along an axis of a picture of one column."""
 _SMALL, _LARGE = 0.01, 1e4
 """Between these the maximum number along an axis of a unit without prefixes is shown as it is."""
-_WITH_PREFIX = frozenset(("m", "m/s", "s", "N", "N/m", "N m", "Pa", "Hz", "ohm", "F", "H", "V", "A", "W", "J"))
-"""Units that take a prefix of the SI, from 1 and up to 10,000 of which none is needed."""
 _PLAIN = {"um": "µm", "ohm": "Ω"}
 """Units of parameters as figures write them."""
 _DECADES = 10.0
@@ -74,7 +72,7 @@ def _scaled(dataset: xr.Dataset, name: str) -> tuple[float, str]:
     most = float(np.abs(points).max())
     if words is not None or name in AXIS_LABELS or is_geometric(points) or most == 0.0:
         return own
-    if unit in _WITH_PREFIX:
+    if unit in WITH_PREFIX:
         return own if 1.0 <= most < _LARGE else scale_of(points, _PLAIN.get(unit, unit))
     if _SMALL <= most < (1e6 if unit == "g" else _LARGE):  # kg would be another unit
         return own
@@ -94,7 +92,7 @@ def tick_text(dataset: xr.Dataset, name: str, value: float, digits: int = 2) -> 
     row = _parameter(dataset, name)
     if not unit and row is not None and row.quantity.unit != "1":
         unit = row.quantity.unit
-    if divisor == 1.0 and row is not None and row.quantity.unit in _WITH_PREFIX and not 1.0 <= abs(value) < _LARGE:
+    if divisor == 1.0 and row is not None and row.quantity.unit in WITH_PREFIX and not 1.0 <= abs(value) < _LARGE:
         return prefixed(value, unit, digits)
     symbol = "" if unit else f" in {symbol_of(dataset, name)}".removesuffix(" in ")
     return f"{float(f'{value / divisor:.{digits}g}'):.6g} {unit}".rstrip() + symbol

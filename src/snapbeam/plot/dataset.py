@@ -297,8 +297,8 @@ def plot_dataset(dataset: xr.Dataset, variable: str | None = None, ax: Axes | No
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> run = sb.simulate(system, sb.Integration(cycles=10))
+    >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> run = sb.simulate(damped, sb.Integration(cycles=10))
     >>> ax = sb.plot.plot_dataset(run.dataset, "phase_portrait")
     >>> ax = run.dataset.snapbeam.plot()
     """

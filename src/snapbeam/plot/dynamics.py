@@ -67,8 +67,8 @@ def plot_diagram(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> diagram = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", [0.02, 0.03, 0.04])
+    >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> diagram = sb.dynamics.bifurcation_diagram(damped, "velocity_amplitude", [0.02, 0.03, 0.04])
     >>> ax = sb.plot.plot_diagram(diagram)
     """
     branches = list(branches)
@@ -187,11 +187,11 @@ def plot_lifetimes(
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> axes = {"drive.velocity_amplitude": [0.1, 0.2]}
     >>> settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
     >>> lifetimes = sb.dynamics.lifetime_map(
-    ...     system, axes, sb.Integration(cycles=20), initial_conditions=4, settings=settings
+    ...     damped, axes, sb.Integration(cycles=20), initial_conditions=4, settings=settings
     ... )
     >>> ax = sb.plot.plot_lifetimes(lifetimes)
     """
@@ -285,11 +285,11 @@ def plot_survival(dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequen
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> axes = {"drive.velocity_amplitude": [0.1, 0.2]}
     >>> settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
     >>> lifetimes = sb.dynamics.lifetime_map(
-    ...     system, axes, sb.Integration(cycles=20), initial_conditions=4, settings=settings
+    ...     damped, axes, sb.Integration(cycles=20), initial_conditions=4, settings=settings
     ... )
     >>> ax = sb.plot.plot_survival(lifetimes)
     """
@@ -364,7 +364,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     dataset : xarray.Dataset
         Of :func:`snapbeam.dynamics.lyapunov_spectrum` or :func:`snapbeam.dynamics.largest_lyapunov`.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
     per : {"second", "period"}
         Unit of time: 1 s, or one period of the excitation.
 
@@ -372,8 +372,8 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> ax = sb.plot.plot_exponents(sb.dynamics.lyapunov_spectrum(system, periods=40, transient=20))
+    >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> ax = sb.plot.plot_exponents(sb.dynamics.lyapunov_spectrum(damped, periods=40, transient=20))
     """
     contains(dataset, "exponents", "exponent")
     dataset = in_units(dataset)
@@ -473,14 +473,14 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     dataset : xarray.Dataset
         Of ``to_dataset`` of a :class:`snapbeam.dynamics.PeriodicOrbit` or a :class:`snapbeam.dynamics.Branch`.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
 
     Examples
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> orbit = sb.dynamics.periodic_orbit(system, transient=200)
+    >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> orbit = sb.dynamics.periodic_orbit(damped, transient=200)
     >>> ax = sb.plot.plot_multipliers(orbit.to_dataset())
     """
     contains(dataset, "multipliers", "multiplier_real", "multiplier_imag")
@@ -518,7 +518,7 @@ def plot_backbone(
     datasets : xarray.Dataset or sequence of xarray.Dataset
         Of :func:`snapbeam.dynamics.backbone_curve`.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
     labels : sequence of str, optional
         Of the curves, in a legend; the wells by default if there are several.
 
@@ -683,14 +683,14 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     dataset : xarray.Dataset
         Of :meth:`snapbeam.dynamics.Attractors.to_dataset`.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
 
     Examples
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> attractors = sb.dynamics.find_attractors(system, 12)
+    >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> attractors = sb.dynamics.find_attractors(damped, 12)
     >>> ax = sb.plot.plot_attractors(attractors.to_dataset())
     """
     if "points" not in dataset or "attractor" not in dataset["points"].dims:
@@ -725,7 +725,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str | None = No
     dataset : xarray.Dataset
         Of :func:`snapbeam.dynamics.poincare_section`.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
     x : {"midspan_displacement", "displacement_at_striker", "drive_phase"}, optional
         By default the displacement of mid-span, once a period; the phase of the drive, at impacts or a level.
 
@@ -733,8 +733,8 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str | None = No
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> ax = sb.plot.plot_section(sb.dynamics.poincare_section(system, "impact", 20, transient=20))
+    >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> ax = sb.plot.plot_section(sb.dynamics.poincare_section(damped, "impact", 20, transient=20))
     """
     section, new = str(dataset.attrs.get("section", "stroboscopic")), ax is None
     x = x or next(iter(section_abscissae(dataset)), "midspan_displacement")
@@ -787,8 +787,8 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> found = sb.dynamics.find_attractors(system, 12)
+    >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> found = sb.dynamics.find_attractors(damped, 12)
     >>> grid = {"amplitude[1]": [-1.2, 0.0, 1.2], "velocity[1]": [-0.5, 0.5]}
     >>> ax = sb.plot.plot_basins(sb.dynamics.basins_of_attraction(found, grid))
     """

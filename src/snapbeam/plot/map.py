@@ -69,24 +69,23 @@ def plot_response_map(
 ) -> Axes:
     """Draw the response class of each run of a map; over one axis, with the range of the mid-span displacement.
 
-    Cell borders lie midway between the points of an axis, the outermost as far out as the next one in (but
-    not below zero, nor beyond the end of the beam).  Cells of a map with repeats are the paler the fewer
-    of them agree (``class_fraction``).
+    Cell borders lie midway between points (not below zero, nor beyond the end of the beam). Cells of a map with repeats
+    are the paler the fewer of them agree (``class_fraction``).
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map with the variable ``response_class`` over one or two axes of more than one point, or over a list of points
+        Map with ``response_class`` over one or two axes of more than one point, or a list of points
         (:func:`plot_points`).
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
     measurements : MeasuredPoints, optional
-        Measured responses, drawn as dots in the colours of their classes.  Those measured at another value
-        of the map's fixed coordinate (by more than 2 %) are left out, with a warning.
+        Measured responses, drawn as dots in the colours of their classes. Those at another value of the map's fixed
+        coordinate (by more than 2 %) are left out, with a warning.
     quasi_static_line : bool
-        Whether to draw the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed.
+        True for the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed.
     legend : bool
-        Whether to draw a legend below the map: response classes and their fractions of the runs.
+        True for a legend with the fractions of the runs.
 
     Examples
     --------
@@ -325,21 +324,20 @@ def plot_statistic(
 ) -> Axes:
     """Draw a statistic of a map: colours over two axes, a curve over one, coloured dots of a list of points.
 
-    Cells of runs that failed, or that have none of it, are grey.
+    Cells without a value are grey.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map, or a result of :func:`snapbeam.dynamics.hysteresis`, whose two sweeps are drawn as two lines.
+        Map, or a result of :func:`snapbeam.dynamics.hysteresis`, drawn as two lines.
     name : str
-        One of :data:`snapbeam.STATISTICS`, or any other variable over the axes; over an axis of seeds its mean, with
-        the interval as a band over one other axis.
+        Name of a variable over the axes; over an axis of seeds its mean, with the interval over one other axis.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
     log : bool, optional
-        Whether colours, or the axis, go by powers of ten; by default where the values span more than two of them.
+        True for powers of ten; by default where the values span more than two.
     over : str, optional
-        One of two axes, such as ``"harvester.resistance"``: over it a curve is drawn for each value of the other one.
+        One of two axes: over it a curve is drawn for each value of the other one.
 
     Examples
     --------
@@ -430,7 +428,8 @@ def _curves(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, along: str) -> No
     factor, _ = _label(dataset, name, dataset[name].values)
     for at, (color, mark) in enumerate(zip(colors, itertools.cycle("os^Dv<>"), strict=False)):
         value = tick_text(dataset, other, float(dataset[other][at]), 4) if words is None else words[at]
-        text = value if words is None else f"{symbol_of(dataset, other) or other} = {value}"
+        symbol = symbol_of(dataset, other) or ("" if words is None else other)
+        text = f"{symbol} = {value.removesuffix(f' in {symbol}')}" if symbol else value
         values = data.isel({other: at}).values
         ax.plot(points, values, f"{mark}-", color=color, markersize=1.2 * marker_size(points.size), label=text)
         if f"{name}_low" in dataset:
@@ -542,18 +541,17 @@ def plot_points(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Result of :func:`snapbeam.sweep` over a list of points: variables over ``point``, parameters as coordinates.
+        Result of :func:`snapbeam.sweep` over a list of points.
     name : str
-        ``"response_class"``, one of :data:`snapbeam.STATISTICS`, or any other variable over the points.
+        Name of a variable over the points.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
     across, upward : str, optional
-        Parameters along the axes; by default two of those that differ, velocity amplitude or location upward.
+        Parameters along the axes; by default two of those that differ.
     measurements, quasi_static_line
-        Measured responses and V_QS1, as :func:`plot_response_map` draws them; they need axes, and values common to all
-        points, of the paper's coordinates.
+        Measured responses and V_QS1, as in :func:`plot_response_map`, over the paper's coordinates.
     legend : bool
-        Whether to draw a legend below: response classes and their fractions of the points.
+        True for a legend with the fractions of the points.
 
     Examples
     --------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +37,7 @@ from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.simulation.run import Run
 from snapbeam.util.diagnostics import diagnostics_of
 from snapbeam.util.si_prefixes import prefixed, scale_of
+from snapbeam.util.status_codes import is_of_matrices
 from snapbeam.util.validation import InputError, checked, choice, integer, interval, positive
 
 if TYPE_CHECKING:
@@ -76,7 +78,7 @@ def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, mode
     ----------
     run : Run or xarray.Dataset
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
     modes : int
 
     Examples
@@ -151,12 +153,12 @@ def plot_spectrum(
     Parameters
     ----------
     run : Run or xarray.Dataset
-        Of a run; or the power spectral density that ``estimated_psd`` of a recorded acceleration or a random vibration
-        returns: it is drawn with its interval, over the density that it was drawn from.
+        Run, or the power spectral density of ``estimated_psd``, which is drawn with its interval over the given
+        density.
     variable : str, optional
-        A variable over time, by name; the displacement of mid-span, or at the striker, by default.
+        Variable over time; the displacement of mid-span, or at the striker, by default.
     window : pair of float, optional
-        First and last cycle to take; everything by default.
+        First and last cycle; all by default.
 
     Returns
     -------
@@ -471,19 +473,17 @@ _MANY = 20_000  # samples above which a curve is stored as pixels in a vector fi
 def plot_run(run: Run | xr.Dataset, window: tuple[float, float] | None = None, ax: Axes | None = None) -> Axes:
     """Draw the displacements, the penetration and the contact force of a run, and its hardest impact closer.
 
-    Left, over cycles of excitation: the whole run or a window.  More than 100 cycles are drawn by the range,
-    minimum to maximum, in intervals of whole cycles; choose a window to see each cycle.  Right, over time: the
-    samples about the maximum contact force within the window, from a little before the contact to a little
-    after it.  A measured run has no force, and is drawn without it.
+    Left, over cycles: the whole run or a window; more than 100 cycles as the range, minimum to maximum, of whole
+    cycles. Right, over time: the maximum contact force within the window. A measured run is drawn without force.
 
     Parameters
     ----------
     run : Run or xarray.Dataset
         A run, or a dataset that follows :data:`snapbeam.simulation.dataset.SCHEMA`.
     window : pair of float, optional
-        First and last cycle to draw; everything by default.
+        First and last cycle; all by default.
     ax : matplotlib.axes.Axes, optional
-        Axes for the displacements alone; by default a new figure of two columns shows everything.
+        Axes for the displacements alone; a new figure of two columns by default.
 
     Returns
     -------
@@ -550,6 +550,7 @@ def plot_run(run: Run | xr.Dataset, window: tuple[float, float] | None = None, a
         figure.align_ylabels(left)
         if has_force:
             near, seconds, peak = _hardest_impact(part)
+            seconds = seconds * period
             scale, unit = scale_of(seconds, "s")
             around = seconds / scale
             right = _column(figure, grid, 1, near, around, scales)
@@ -567,7 +568,8 @@ _ONE_EVENT = ("shock", "half_sine", "recorded_acceleration", "random_vibration")
 
 def _is_of_one_event(dataset: xr.Dataset) -> bool:
     """Return whether a base without a striker moves the beam by a shock or a record, which has no cycle."""
-    return dataset.attrs.get("base_excitation_type") in _ONE_EVENT and "striker_displacement" not in dataset
+    moves = "striker_displacement" in dataset and np.ptp(dataset["striker_displacement"].values) > 1e-9
+    return dataset.attrs.get("base_excitation_type") in _ONE_EVENT and not moves
 
 
 def _with_base_acceleration(part: xr.Dataset) -> xr.Dataset:
@@ -577,15 +579,23 @@ def _with_base_acceleration(part: xr.Dataset) -> xr.Dataset:
     return part.assign(base_acceleration=("time", values))
 
 
-def _curves(part: xr.Dataset) -> list[tuple[str, str, str]]:
+def _curves(part: xr.Dataset) -> Iterator[tuple[np.ndarray, str, str]]:
     """The displacements that a run has; without a striker, that of the beam at the striker is left out."""
     struck = "striker_displacement" in part or "midspan_displacement" not in part
-    return [each for each in _CURVES if each[0] in part and (struck or each[0] != "displacement_at_striker")]
+    several = "striker_displacements" in part
+    for name, words, color in _CURVES:
+        if name not in part or (name == "displacement_at_striker" and not struck):
+            continue
+        if several and name == "striker_displacement":
+            for number, values in enumerate(part["striker_displacements"].transpose("striker", "time").values, 1):
+                yield values, "strikers" if number == 1 else "_striker", color
+        else:
+            yield part[name].values, words.replace("beam", "structure") if is_of_matrices(part.attrs) else words, color
 
 
 def _displacements(ax: Axes, part: xr.Dataset, x: np.ndarray) -> None:
-    for name, words, color in _curves(part):
-        ax.plot(x, part[name].values, color=color, label=words, rasterized=x.size > _MANY)
+    for values, words, color in _curves(part):
+        ax.plot(x, values, color=color, label=words, rasterized=x.size > _MANY)
     _straight(ax)
 
 
@@ -629,13 +639,13 @@ def _column(
         axes[-1].margins(x=0.0)
     pixels = x.size > _MANY
     far = at == 0 and "cycle" in part.variables and float(np.ptp(part["cycle"].values)) > _ENVELOPE
-    for name, label, color in _curves(part):
+    for values, label, color in _curves(part):
         if far:
-            _envelope(axes[0], x, part[name].values, color, f"{label} (range)")
+            _envelope(axes[0], x, values, color, f"{label} (range)")
         elif at == 1 and x.size < _FEW:
-            axes[0].plot(*_smooth(x, part[name].values), color=color, label=label)
+            axes[0].plot(*_smooth(x, values), color=color, label=label)
         else:
-            axes[0].plot(x, part[name].values, color=color, label=label, rasterized=pixels)
+            axes[0].plot(x, values, color=color, label=label, rasterized=pixels)
     if at == 0:
         _straight(axes[0])
     for row, name in enumerate((each for each in _PANELS if each in part), 1):

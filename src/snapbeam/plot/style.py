@@ -30,7 +30,7 @@ from snapbeam.plot.units import ratio_name
 from snapbeam.util.diagnostics import Diagnostic, Severity
 from snapbeam.util.files import MADE_BY, atomic_path, check_writable
 from snapbeam.util.si_prefixes import prefixed
-from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.status_codes import ResponseClass, is_of_matrices
 from snapbeam.util.validation import InputError, choice, finite_array, within
 
 if TYPE_CHECKING:
@@ -366,6 +366,8 @@ def caption(dataset: xr.Dataset, lines: int = 1, axes: Collection[str] = ()) -> 
         ("velocity_amplitude", "V", 2.0 * np.pi * frequency * length, "m/s"),
         ("location", r"x_\mathrm{s}", np.nan, ""),
     ):
+        if name == "location" and is_of_matrices(attrs):
+            continue
         if (value := fixed_value(dataset, name, axes)) is not None:
             physical = f" ({prefixed(value * scale, unit)})" if np.isfinite(scale) else ""
             how.append(f"${symbol}$ = {value:.4g}{physical}")

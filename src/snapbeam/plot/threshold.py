@@ -33,23 +33,21 @@ def plot_threshold(
 ) -> Axes:
     """Draw the result of :func:`snapbeam.threshold`.
 
-    The line is the lowest value that makes an interwell response.  The shade reaches up to the value above
-    which every run is interwell, or to the end of the range if the highest run is intrawell.  Points
-    have markers.  A triangle at the top means that no run is interwell.  Hatching marks the
-    points whose outcome is ``not_searched`` or ``undecided``.  A dotted line at a point shows the range in
-    which failed runs leave the threshold open.
+    The line is the lowest value that makes an interwell response. The shade reaches up to the value above which every
+    run is interwell, or to the end of the range. A triangle at the top: no run is interwell. Hatching: ``not_searched``
+    or ``undecided``. A dotted line: failed runs leave the threshold open.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Result of :func:`snapbeam.threshold` along one axis, or a curve for each point of a second axis; without an axis
-        the classes along the parameter are drawn.
+        Result of :func:`snapbeam.threshold` along one axis, or a curve for each point of a second; without an axis the
+        classes along the parameter are drawn.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure one column wide by default.
+        Axes to draw in; new ones by default.
     quasi_static : bool
-        Whether to draw the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed, of a system that it describes.
+        True for the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed, of a system that it describes.
     legend : bool
-        Whether to name the curves.
+        True to name the curves.
 
     Examples
     --------

@@ -45,38 +45,37 @@ def advance(
 ) -> State:
     """Advance a state, or a batch of states, by periods of the excitation.
 
-    A step ends at every whole period, and the further motion depends only on the state there.  Two calls of one period
-    are therefore bitwise identical with one call of two periods.  They are equal to rounding under motions that do not
-    repeat, and if several parts move: then the phase of a state counts the periods.  :func:`~snapbeam.simulate` has no such steps and agrees to the error of its accuracy level.
+    A step ends at every whole period, and the motion depends only on the state there: two calls of one period are
+    bitwise identical with one call of two, or equal to rounding under motions that do not repeat and if several parts
+    move, where the phase of a state counts the periods. :func:`~snapbeam.simulate` has no such steps and agrees to its
+    error.
 
     Parameters
     ----------
     system : System
         System whose states are advanced.
     state : State, optional
-        One state, or a batch, which all cores integrate in parallel; by default the initial state of the system.
+        State or batch, which all cores integrate in parallel; the initial state by default.
     periods : float
-        Periods of the excitation, greater than 0: of the first striker that moves, or else of the base or the axial load;
-        without an excitation, periods of the first mode.
+        Periods, greater than 0, of the first striker that moves, or else of the base or the axial load; without an
+        excitation, of the first mode.
     tangent : array_like of shape (..., k, 2, N), optional
-        Small changes of amplitudes (m^0.5) and velocities (m^0.5/s): k of them for each state, or the same k for all.  They
-        are advanced exactly, by the derivatives of every step and of the times of events, with finer steps at both ends of a
-        contact; where a law of one's own acts, by differences of its functions.  Strikers with mass, indentations and circuits begin
-        unchanged, and their own changes are not returned.
+        Small changes of amplitudes (m^0.5) and velocities (m^0.5/s), k for each state or for all, advanced by the exact
+        derivatives of every step and of the times of events, with finer steps at both ends of a contact; under a user's
+        law by differences. Strikers with mass, indentations and circuits begin unchanged and are not returned.
     integration : Integration, optional
-        Solver settings.  The states are advanced for *periods*, without early termination.
+        Solver settings, without early termination.
     save_every_period : bool
-        Return the state after each period, along a new first dimension, instead of the last one.  The
-        ``statistics`` are those of all periods, except the status, which is that of each state.
+        Return the state after each period, along a new first dimension. The ``statistics`` are those of all periods,
+        except the status.
     progress : callable, optional
-        Function that receives ``(done, total)``, numbers of states; True writes a line to standard error.
+        Called as ``progress(done, total)`` with states; True prints it.
 
     Returns
     -------
     State
-        The advanced state, with its ``statistics``, in the shape of the batch, and its ``tangent`` if *tangent* was
-        given.  A contact that has not ended does not count as an impact.  If a state could not be reached,
-        ``statistics["status"]`` gives the reason, and its numbers are NaN.
+        The advanced state, with its ``statistics`` and ``tangent``. A contact that has not ended is not an impact. If a
+        state could not be reached, it is NaN, and ``statistics["status"]`` gives the reason.
 
     See Also
     --------

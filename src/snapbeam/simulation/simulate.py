@@ -366,23 +366,20 @@ def simulate(
 ) -> Run | list[Run]:
     """Simulate one run and record its time series.
 
-    The beam starts from the initial state of the system.  By default it is at rest, with the tip in contact, in the
-    well that the striker pushes it out of (the lower one for a striker below, Eqs. 11-18).  Without a striker the beam
-    vibrates freely from the initial state, and a cycle is a period of the first mode.
+    By default the beam starts at rest, with the tip in contact, in the well that the striker pushes it out of (the
+    lower one for a striker below, Eqs. 11-18). Without an excitation a cycle is a period of the first mode.
 
     Parameters
     ----------
     system : System, or a list of them
-        The model; several models are simulated in parallel on all cores (``integration.threads``).
+        System, or several, which all cores simulate in parallel.
     integration : Integration, optional
-        Solver settings.  Recorded runs always use the CPU.
+        Solver settings; always on the CPU.
     sample_times : array_like, optional
-        Times to record, s, ascending, from 0 to the end of the run.  By default 200 per cycle of the excitation or of
-        the first mode, and the ends of the steps of each impact.  Times that a run did not reach, because it ended
-        early or failed, are NaN, with ``valid`` = 0.
+        Times to record, s, ascending, from 0 to the end of the run; by default 200 per cycle, and the ends of the steps
+        of each impact. Times that a run did not reach are NaN, with ``valid`` = 0.
     progress : callable, optional
-        Function that receives the finished fraction of the run, several times per second; True writes a line to
-        standard error.  For several runs it receives ``(done, total)``.
+        Called with the finished fraction of the run or, for several, as ``progress(done, total)``; True prints it.
 
     Returns
     -------
@@ -391,8 +388,8 @@ def simulate(
     Raises
     ------
     InputError
-        If the sample times are not increasing within the run, or the samples need more than 4 GiB.  A run that fails
-        numerically does not raise: ``run.summary.status`` gives the reason.
+        If the sample times are not increasing within the run, or need more than 4 GiB. A run that fails numerically
+        gives the reason in ``run.summary.status``.
 
     See Also
     --------

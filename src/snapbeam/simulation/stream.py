@@ -55,9 +55,8 @@ def simulate_to_file(
 ) -> RunSummary:
     """Simulate one run and write it to a file during the simulation.
 
-    The file is that of ``simulate(...).save(path)``.  The memory is about 200 MB plus 8 bytes for each recorded time,
-    for any number of modes.  :func:`snapbeam.load` reads the complete file; ``xarray.open_dataset(path)`` reads parts
-    of it.
+    The file is that of ``simulate(...).save(path)``, with about 200 MB of memory plus 8 bytes for each recorded time.
+    :func:`snapbeam.load` reads the file; ``xarray.open_dataset(path)`` reads parts of it.
 
     Parameters
     ----------
@@ -66,12 +65,11 @@ def simulate_to_file(
     integration : Integration, optional
         Solver settings, as for :func:`snapbeam.simulate`.
     path : path
-        NetCDF file, ending in ``.nc``.  It appears when the run has ended, complete or not at all.
+        NetCDF file, ending in ``.nc``, which appears at the end of the run.
     sample_times : array_like, optional
-        Times of the samples, s, as for :func:`snapbeam.simulate`.  Times that the run did not reach are omitted.
+        Times to record, as for :func:`snapbeam.simulate`; those that the run did not reach are omitted.
     progress : callable, optional
-        Function that receives the finished fraction of the run, several times per second; True writes a line to standard
-        error.
+        Called with the finished fraction; True prints it.
 
     Returns
     -------
@@ -82,8 +80,8 @@ def simulate_to_file(
     InputError
         If the sample times are not increasing times within the run.
     NoRoomError
-        If the disk is full.  The run ends before the part for which there is no room; the file has the samples up to
-        there, the status ``INTERRUPTED`` and the state to continue from.
+        If the disk is full: the file has the samples up to there, the status ``INTERRUPTED`` and the state to continue
+        from.
 
     See Also
     --------

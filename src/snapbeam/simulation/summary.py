@@ -17,13 +17,12 @@ from snapbeam.util.validation import InputError, integer, mapping
 class RunSummary(Mapping[str, Any]):
     """Response class and statistics of one run: a mapping whose items are also attributes.
 
-    :data:`snapbeam.STATISTICS` defines the names, units and meanings; displacements are in units of b, velocities in
-    units of b omega_1.  A run that failed has the ``response_class`` UNKNOWN, and the ``advice`` of its ``status``
-    gives the reason.  If a run ends early (``early_stop_time`` in seconds, NaN otherwise), its class is certain, but
-    its extremes and counts stop at that time.  ``final_well`` is the sign of w(1/2) at the end; ``final_well_proven``
-    is True if the run provably stays in that well.  ``other_well_reached`` is True if the centre came more than half of
-    the way from the border of the wells to the other well (with one well, to the mirror image of its rest); with unequal wells, one
-    well or without a striker, only such a run is interwell.
+    Names, units and meanings are those of :data:`snapbeam.STATISTICS`; displacements are over b, velocities over b
+    omega_1. A failed run has the ``response_class`` UNKNOWN and the reason in ``status.advice``. If a run ends early
+    (``early_stop_time``, s, else NaN), its class is certain, but extremes and counts stop there. ``final_well`` is the
+    sign of w(1/2) at the end; ``final_well_proven``: the run provably stays there. ``other_well_reached``: the centre
+    came more than half of the way from the border of the wells to the other well (with one well, to the mirror image of
+    its rest); with unequal wells, one well or without a striker, only such a run is interwell.
 
     See Also
     --------

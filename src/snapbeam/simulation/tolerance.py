@@ -104,17 +104,17 @@ def perturbation_growth(
     system : System
         System whose runs are compared.
     integration : Integration, optional
-        The number of cycles and the solver settings.  ``accuracy`` takes the place of its accuracy and tolerance.
+        Cycles and solver settings, except accuracy and tolerance.
     accuracy : {"standard", "reference"}
-        Accuracy level of the two compared runs.
+        Accuracy level of the two runs.
     perturbation : float
-        Relative change of every motion that drives the system, or of the initial state if nothing drives it.
+        Relative change of every driving motion, or else of the initial state.
 
     Returns
     -------
     xarray.Dataset
-        Variable ``separation`` over ``time`` (s) and ``cycle``: the maximum change up to that time of the displacement
-        at the striker and at mid-span, in units of b.
+        ``separation`` over ``time`` (s) and ``cycle``: the maximum change so far of the displacement at the striker and
+        at mid-span, over b.
 
     See Also
     --------

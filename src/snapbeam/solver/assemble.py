@@ -369,7 +369,7 @@ def _require_valid(system: System, state: State) -> None:
 
 
 def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Array]:
-    """Every parameter of scope *run* of a system as an array of shape (runs,), by dotted name.
+    """Every parameter of scope *run* of a system, and every number of its contact laws, as an array of shape (runs,), by dotted name.
 
     *points* holds those that differ between the runs; the others are the system's own.
     """
@@ -380,7 +380,7 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
             own |= {
                 f"{section_of('contact', number)}.{name}": value
                 for name, value in vars(part).items()
-                if isinstance(value, float) and quantities(type(part))[name].scope == RUN_SCOPE
+                if isinstance(value, float) and (part is each.law or quantities(type(part))[name].scope == RUN_SCOPE)
             }
         moving = section_of("drive", number)
         own |= {f"{moving}.{name}": value for name, value in each.striker.drive.values().items()}

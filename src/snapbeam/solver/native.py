@@ -171,7 +171,7 @@ class _Arrays:
         self.problem["levels"] = int(halvings.max()) + 2
         run[:, RUN.index("max_steps")] = ensemble.max_steps
         run[:, RUN.index("stretch")] = structure.stretch
-        run[:, RUN.index("calm_energy")] = CALM * barrier_of(structure) or math.inf
+        run[:, RUN.index("calm_energy")] = CALM[ensemble.order] * barrier_of(structure) or math.inf
         signals = channels.signals.copy()
         tones = channels.kinds == 0
         signals[:, tones, 4] *= finer

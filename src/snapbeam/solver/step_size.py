@@ -34,8 +34,8 @@ _IN_A_ROW = 3
 shorter to fit the cycle, and modes that come in step with the kicks spoil single lengths."""
 _FINER = 2.0
 """Steps of sixth order that all others are compared with, over the shortest of them."""
-CALM = 3.0
-"""Energy of a motion over the barrier's beyond which flight steps are halved."""
+CALM = {4: 10.0, 6: 3.0}
+"""Energy of a motion over the barrier's beyond which flight steps are halved, by order: of order 4 the most of those by which they are chosen."""
 _STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (10.0, 1.0 / 160.0, 1.0, 1.0))
 """Energy of each impulse over the barrier's, its maximum duration in periods of the first mode, the length of the
 steps that are tried over the flight step, and the error allowed over the limit: a beam that rings in its well, and one

@@ -85,18 +85,18 @@ class CheckpointOptions:
     Parameters
     ----------
     path : path, optional
-        Folder of the checkpoint; without a path the results stay in memory.
+        Folder; without it the results stay in memory.
     check_checkpoint : bool
-        Check every finished task, and compute only damaged tasks again.  Points that were never computed have the
-        class UNKNOWN.
+        Check every finished task, and compute only damaged ones again. Points that were never computed have the class
+        UNKNOWN.
     points_per_task : int, optional
         Points of a task of a new checkpoint.
     config : dict, optional
-        Parameters to store in the checkpoint, in the form of a parameter file.
+        Parameters to store, in the form of a parameter file.
     note : callable, optional
-        Function that receives a message about the computation, as ``note(text)``.
+        Function that receives messages, as ``note(text)``.
     report : SweepReport, optional
-        Object that receives the counts of computed, resumed, damaged and failed tasks.
+        Counts of computed, resumed, damaged and failed tasks, to fill in.
 
     See Also
     --------

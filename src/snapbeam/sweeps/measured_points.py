@@ -90,20 +90,19 @@ def read_measured_points(
 ) -> MeasuredPoints:
     """Read measured responses from a CSV file with a header.
 
-    Columns: ``frequency_ratio`` or ``frequency_hz``; ``velocity_amplitude`` (V) or ``velocity_m_s`` (the
-    amplitude in m/s); ``location`` (x_s, may be left out); ``response_class``, one of intrawell, transient 1,
-    transient 2, continuous, unknown, or the number of the class; and those next to which ``snapbeam
-    process-tests`` writes.  Cells are separated by commas, semicolons or tabs; with the latter two the decimal
-    sign may be a comma.  Lines that start with ``#`` are comments.
+    Columns: ``frequency_ratio`` or ``frequency_hz``; ``velocity_amplitude`` (V) or ``velocity_m_s``; ``location`` (x_s,
+    optional); ``response_class``: intrawell, transient 1, transient 2, continuous, unknown, or its number; further ones
+    as ``snapbeam process-tests`` writes them. Separators are commas, semicolons or tabs; with the latter two the
+    decimal sign may be a comma. Lines that start with ``#`` are comments.
 
     Parameters
     ----------
     path : path
         The file.
     reference_frequency : float, optional
-        First natural frequency, Hz, wanted for ``frequency_hz`` and ``velocity_m_s``.
+        First natural frequency, Hz, for ``frequency_hz`` and ``velocity_m_s``.
     buckling_level : float, optional
-        Buckling level b, m, wanted for ``velocity_m_s``: V = velocity / (2 pi b f_1).
+        Buckling level b, m, for ``velocity_m_s``: V = velocity / (2 pi b f_1).
 
     See Also
     --------

@@ -38,9 +38,9 @@ def mean_over_seeds(dataset: xr.Dataset, confidence: float = 0.95) -> xr.Dataset
     Returns
     -------
     xarray.Dataset
-        Mean of each real statistic over the seeds with Student's interval, as ``peak_voltage``, ``peak_voltage_low`` and
-        ``peak_voltage_high``: infinite with one seed, and where a run has no value, so that the mean is of the others.
-        ``snap``, the fraction of runs that snap through, with Wilson's interval; ``runs``, ``runs_failed``.
+        Mean of each real statistic over the seeds with Student's interval, as ``peak_voltage``, ``peak_voltage_low``
+        and ``peak_voltage_high``: infinite with one seed or where a run has no value. ``snap``, the fraction of runs
+        that snap through, with Wilson's interval; ``runs``, ``runs_failed``.
 
     Raises
     ------

@@ -234,11 +234,11 @@ class SweepSetup:
         ]
 
     @cached_property
-    def length_varies(self) -> bool:
-        """True if the length that displacements are normalised by differs between the points."""
+    def _outermost(self) -> list[System]:
+        """Systems at the ends and in the middle of every axis that changes the structure."""
         names = [name for name in self.structural if not name.startswith("integration.")]
         if not names:
-            return False
+            return [self.system]
         if isinstance(self.points, Grid):
             axes = {name: self.points.axes[name] for name in names}
             first = {name: values[0].item() for name, values in axes.items()}
@@ -249,10 +249,16 @@ class SweepSetup:
             table = {name: np.asarray(self.points.columns[name]).ravel() for name in names}
             places = {int(find(values)) for values in table.values() for find in (np.argmin, np.argmax)}
             asked = [{name: values[at].item() for name, values in table.items()} for at in places]
-        lengths = []
+        found = []
         for changes in asked:
             with suppress(InputError):  # refused when the points are computed
-                lengths.append(self.neighbour(changes)[0].scale.length)
+                found.append(self.neighbour(changes)[0])
+        return found
+
+    @cached_property
+    def length_varies(self) -> bool:
+        """True if the length that displacements are normalised by differs between the points."""
+        lengths = [system.scale.length for system in self._outermost]
         return bool(lengths) and max(lengths) - min(lengths) > 1e-9 * max(lengths)
 
     def scales_of(self, columns: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -297,8 +303,9 @@ class SweepSetup:
                 "reference_well",
                 "initial_well",
                 "initial_well_reason",
-                "wells",
             }
+            if any(system.model.is_bistable for system in self._outermost):
+                varied.add("wells")
         if any(name == "contact.side" or name.startswith("initial_state.") for name in self.points.names):
             varied |= {"initial_well", "initial_well_reason"}
         beam = self.system.model.beam

@@ -32,49 +32,46 @@ def sweep(
 ) -> xr.Dataset:
     """Compute the response class and the statistics of a run at every point of a grid or list of parameters.
 
-    Points with the same structure are integrated together.  The results do not depend on the batches, the order, the
-    tasks, the threads, the workers or interruptions: they are bitwise identical on the same engine, version and
-    processor type.
+    Points with the same structure are integrated together. Results are bitwise identical for any batches, order,
+    threads, workers or interruptions, on the same engine, version and processor type.
 
     Parameters
     ----------
     system : System
-        Nominal system; parameters that are not swept have its values.
+        Nominal system.
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
-        A mapping from parameters to values defines a grid with one dimension for each parameter.  Names are those of
-        :func:`snapbeam.model.parameters`, dotted (``"beam.thickness"``) or short (``"frequency_ratio"``); values
-        increase strictly.  ``"drive.frequency_hz"`` and the other names of ``snapbeam.model.parameters.PHYSICAL``
-        give an axis in Hz, m/s, g, um or m, which becomes one of ratios; if another axis changes the structure, the
-        result is a list of points that keep their Hz.  A dataset with one-dimensional variables, or a data frame, defines a list of points along
-        the dimension ``point``.
+        Mapping from parameters to strictly increasing values, a grid, or a dataset or data frame of one-dimensional
+        variables, a list along ``point``. Names are those of :func:`snapbeam.model.parameters`, dotted
+        (``"beam.thickness"``) or short (``"frequency_ratio"``). ``"drive.frequency_hz"`` and the other names of
+        ``snapbeam.model.parameters.PHYSICAL`` are in Hz, m/s, g, um or m and become ratios; if another axis changes the
+        structure, the result is a list of points that keep their Hz.
     integration : Integration, optional
         Solver settings.
     checkpoint : path or CheckpointOptions, optional
-        Folder in which snapbeam stores finished tasks.  If it exists, the sweep is resumed: only tasks that are
-        missing or damaged are computed.
+        Folder of finished tasks; of an existing one only missing or damaged tasks are computed.
     cluster : str, optional
-        Workers: ``"local:4"``, ``"tcp://host:8786"`` or a TOML file with a section ``[slurm]``.  By default this
-        process computes the sweep.  A cluster needs a checkpoint.
+        Workers: ``"local:4"``, ``"tcp://host:8786"`` or a TOML file with a section ``[slurm]``; this process by
+        default. A cluster needs a checkpoint.
     refine_levels : int
-        Number of times that the grid spacing is halved where neighbours differ in response class.
+        Halvings of the grid spacing where neighbours differ in response class.
     replicates : Replicates or int, optional
-        Repeats of each run with a perturbed initial condition; they add ``class_fraction``.
+        Repeats of each run with a perturbed start; they add ``class_fraction``.
     output : path, optional
-        NetCDF file, which is written block by block, so that the memory does not grow with the sweep.
+        NetCDF file, written block by block, for a sweep larger than the memory.
     progress : callable, optional
-        Function that receives ``(done, total)``, numbers of points; True writes a line to standard error.
+        Called as ``progress(done, total)`` with points; True prints it.
 
     Returns
     -------
     xarray.Dataset
-        The variables of :data:`snapbeam.STATISTICS` over the axes, with all parameters in the attributes.  With
-        *output*, the dataset is opened from that file.
+        The :data:`snapbeam.STATISTICS` over the axes, with all parameters in the attributes; opened from *output*, if
+        given.
 
     Raises
     ------
     InputError
-        If an axis is not valid, or the checkpoint belongs to another sweep.  Runs that fail numerically do not raise:
-        their class is UNKNOWN, and their ``status`` gives the reason.
+        If an axis is not valid, or the checkpoint belongs to another sweep. Runs that fail numerically have the class
+        UNKNOWN and the reason in ``status``.
     CheckpointError
         If the checkpoint is in use, cannot be written or is damaged beyond repair.
 

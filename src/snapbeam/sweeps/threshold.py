@@ -58,28 +58,27 @@ def threshold(
 ) -> xr.Dataset:
     """Find the threshold of the interwell response along one parameter, over any other parameters, as a band.
 
-    The boundary is fractal in places: interwell values may lie below intrawell values.  The result has
-    therefore two curves: the lowest interwell value, and the value from which every run is interwell.  snapbeam runs
-    every point of the grid, so both curves are exact on that grid.
+    The boundary is fractal in places: interwell values may lie below intrawell values. The result therefore has two
+    curves, exact on the grid: the lowest interwell value, and the value from which every run is interwell.
 
-    A run that leaves the displacements of a local force, as in pull-in to an electrode, counts as interwell if it does so
-    at ``accuracy="reference"`` too: variable ``pull_in``.  Another run with the status ``DIVERGED`` has failed.  The dynamic pull-in voltage is thus a threshold over ``force.voltage`` with
-    ``initial_well="unforced"``, and the shock or vibration that a loaded electrode survives is one over its amplitude.
+    A run that leaves the displacements of a local force, as in pull-in to an electrode, counts as interwell if it does
+    so at ``accuracy="reference"`` too (``pull_in``); another ``DIVERGED`` run has failed. The dynamic pull-in voltage
+    is a threshold over ``force.voltage`` with ``initial_well="unforced"``.
 
     Parameters
     ----------
     system : System
-        Nominal system; parameters that are not in *axes* have its values.
+        Nominal system.
     parameter : str
-        Parameter to raise, any real number of the system, such as ``"velocity_amplitude"`` or ``"force.voltage"``.
+        Real parameter to raise, such as ``"velocity_amplitude"`` or ``"force.voltage"``.
     values : array_like
-        Values of that parameter, strictly increasing, in its unit: the range and the resolution of the threshold.
+        Values of that parameter, strictly increasing, in its unit.
     axes : mapping of str to array_like, optional
-        Axes of the threshold, as in :func:`snapbeam.sweep`; without one the result is one threshold.
+        Axes of the threshold, as in :func:`snapbeam.sweep`; none by default.
     integration : Integration, optional
-        Solver settings.  Early termination is always used, also if ``integration.early_termination`` is False.
+        Solver settings. Runs always end early.
     progress : callable, optional
-        Function that receives ``(done, total)``, numbers of runs; True writes a line to standard error.
+        Called as ``progress(done, total)`` with runs; True prints it.
 
     Returns
     -------

@@ -27,8 +27,7 @@ class DifferentialEvolution:
     population : int
         Number of designs of a generation, at least 6.
     rng : int, numpy.random.Generator or None
-        A seed; a generator, which gives one; None takes one from the system.  Generation g samples from its number and the
-        seed alone.
+        Seed or its generator; None: random. Generation g samples from its number and the seed alone.
     weight, crossover : float
         F in (0, 2) and CR in [0, 1].
 

@@ -13,6 +13,7 @@ from scipy.special import ndtr
 
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import split_name
+from snapbeam.util.units import number_in_unit
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -229,35 +230,30 @@ _PHASE = UniformRange(math.pi, 2.0 * math.pi)
 class ParameterUncertainty:
     """Uncertainty of the parameters and the initial state of a system.
 
-    Sample number s comes from the seed and s alone (Philox with the key (seed, s)): it is the same at every point, in
-    every order, on any number of threads or workers.
+    Sample number s follows from the seed and s alone (Philox with the key (seed, s)), on any number of threads or
+    workers. With a phase or a ringing start the tip's mid-position is fixed in space.
 
     Parameters
     ----------
     of : mapping of str to Distribution
-        Distributions by the names of parameters, as :func:`snapbeam.sweep` takes them: :class:`Normal`,
-        :class:`UniformTolerance`, :class:`LogNormal`, about the value of the system or of the point, or :class:`UniformRange`.
+        Distributions by the names of parameters: :class:`Normal`, :class:`UniformTolerance`, :class:`LogNormal`, about
+        the value of the system or of the point, or :class:`UniformRange`.
     correlation : array_like of shape (parameters, parameters), optional
-        Correlations of the normal scores behind the distributions (a Gaussian copula), in the order of *of*.
+        Correlations of the normal scores (a Gaussian copula), in the order of *of*.
     displacement : float
-        Root mean square of a faint ringing at the start, of all modes with equal mean energy, at the centre, m; a beam
-        that would be pressed by the tip at rest begins on the other side of its rest instead.
+        Root mean square at the centre, m, of a ringing start of all modes with equal mean energy; a start that would
+        press the beam into the tip is mirrored about its rest.
     phase : bool
-        True if the drive begins at any phase of the half of its cycle in which the tip is drawn back.
+        True if the drive begins at any phase of the half cycle in which the tip is drawn back.
     hold_fixed : {"physical", "normalised"}
-        Excitation that stays fixed if the beam differs from the nominal one.  ``"physical"``: the same frequency in Hz,
-        velocity in m/s and location in m, so that Omega, V and x_s change with the beam's own frequency, buckling level
-        and length.  ``"normalised"``: the same Omega, V and x_s.
+        Excitation that stays fixed if the beam differs from the nominal one: ``"physical"``, frequency in Hz, velocity
+        in m/s and location in m; ``"normalised"``, Omega, V and x_s.
     seed : int
         Seed of the samples.
 
     See Also
     --------
     snapbeam.uncertainty.probability_map, snapbeam.uncertainty.sample_systems
-
-    Notes
-    -----
-    With a phase or a ringing start the tip's mid-position is fixed in space, as everywhere in dynamics.
 
     Examples
     --------
@@ -404,7 +400,12 @@ def uncertainty_from_mapping(
     for key, table in _flat(given).items():
         if not isinstance(table, Mapping):
             raise InputError(f"{name}.{key} = {shown(table)}: must be a table, such as {{normal = 0.01}}")
-        of[full_name(key)] = _distribution(f"{name}.{key}", table)
+        own = full_name(key)
+        try:
+            of[own] = _distribution(f"{name}.{key}", table, lookup(own).quantity.unit)
+        except InputError as error:
+            words = str(error)
+            raise InputError(words if words.startswith(f"{name}.{key}") else f"{name}.{key}: {words}") from None
     return ParameterUncertainty(of=of, **{key: given[key] for key in _OWN if key in given})
 
 
@@ -421,7 +422,14 @@ def _flat(given: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _distribution(name: str, table: Mapping[str, Any]) -> Distribution:
+def _distribution(name: str, table: Mapping[str, Any], unit: str) -> Distribution:
+    def number(value: Any) -> Any:
+        """A number that text states in the unit of the parameter, or as a share."""
+        if not isinstance(value, str):
+            return value
+        found = number_in_unit(value, "1" if table.get("relative") or "lognormal" in table else unit)
+        return value if found is None else found
+
     kinds = [key for key in table if key in KINDS]
     others = [key for key in table if key not in KINDS and key != "relative"]
     if len(kinds) != 1 or others:
@@ -431,8 +439,8 @@ def _distribution(name: str, table: Mapping[str, Any]) -> Distribution:
     if kinds[0] == "range":
         if more or not isinstance(value, (list, tuple)) or len(value) != 2:
             raise InputError(f"{name}.range = {shown(value)}: must be two numbers [low, high] alone")
-        return UniformRange(*value)
+        return UniformRange(*map(number, value))
     if kinds[0] == "lognormal" and more:
         raise InputError(f"{name}: a lognormal is relative by itself; leave relative out")
     kind: Any = KINDS[kinds[0]]
-    return kind(value, **more)
+    return kind(number(value), **more)

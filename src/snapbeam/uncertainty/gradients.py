@@ -48,12 +48,11 @@ def gradient(
 ) -> xr.Dataset:
     """Derivatives of smooth quantities by parameters of the system, with error estimates.
 
-    Of a statistic the core takes exact derivatives through the run, with those of the times of impacts, by all parameters that
-    leave the modes, the laws of a user and the times of jumps of a motion as they are, such as a frequency, an amplitude, a gap, a
-    contact's stiffness or location, a resistance; the step is a quarter of the usual one, and the error a third of what this changes.  The formula from what a run adds
-    up to the statistic, and the numbers of a run by the parameter, are differentiated by a small difference; no run is.
+    Statistics have exact derivatives through the run, with those of the times of impacts, by parameters that leave the
+    modes, a user's laws and the times of jumps of a motion: a frequency, an amplitude, a gap, a contact's stiffness or
+    location, a resistance. The step is a quarter of the usual one, and the error a third of the change that this makes.
 
-    By other parameters, and of a function, central differences of order six between neighbouring systems, whose step is shortened
+    By other parameters, and of a function, central differences of order six are taken, with a step that is shortened
     until orders six and four agree and all runs have the same number of impacts.
 
     Parameters
@@ -61,32 +60,30 @@ def gradient(
     system : System
         System at which derivatives are taken.
     quantity : str, sequence of str or callable
-        A statistic of a run by its name, such as ``"peak_force"`` or ``"energy_harvested"``, several of them, or a function of a system
-        that returns a number, such as a natural frequency or the amplitude of an orbit.
+        One or several names of statistics, such as ``"peak_force"`` or ``"energy_harvested"``, or a function of a
+        system that returns a number, such as a natural frequency.
     parameters : str or sequence of str
-        Numbers of the system that are not zero, by dotted or short name.
+        Numbers of the system that are not zero.
     integration : Integration, optional
-        Settings of the runs; early termination is off.
+        Solver settings; early termination is off.
 
     Returns
     -------
     xarray.Dataset
-        Variables over ``parameter``: ``derivative`` (per unit of the parameter), ``elasticity`` (relative change of the
-        quantity per relative change of the parameter), ``relative_error``, infinite where neighbouring runs have
-        other numbers of impacts at any distance (of exact ones at a relative change of 1e-5, or with the other step), ``method`` ("exact" or "differences") and ``growth``: the change of the
-        state at the end over the distance of the wells, per relative change of the parameter, NaN with differences.  In chaotic
-        motion it grows exponentially with the number of cycles, and a derivative says little.
-        The elasticity is NaN where the quantity is zero.  The attributes have the ``quantity``, its ``value`` and its ``units``.
-
-        Of several statistics ``derivative``, ``elasticity``, ``relative_error`` and ``method`` are over ``statistic`` and ``parameter``,
-        and ``value``, ``statistic_unit`` and ``no_derivative`` over ``statistic``.  The last is empty, or the reason why a statistic has
-        no derivative: a class, a count, or a value that is not finite.  Its numbers are NaN and its method is empty.
+        Variables over ``parameter``: ``derivative`` (per unit of the parameter); ``elasticity`` (relative change of the
+        quantity per relative change of the parameter, NaN where the quantity is zero); ``relative_error``, infinite
+        where neighbouring runs have other numbers of impacts (of exact ones at a relative change of 1e-5, or with the
+        other step); ``method`` ("exact" or "differences"); ``growth``, the change of the state at the end over the
+        distance of the wells per relative change of the parameter, NaN with differences. In chaotic motion it grows
+        exponentially with the cycles, and a derivative says little. The attributes are ``quantity``, ``value`` and
+        ``units``. Of several statistics the variables, except ``growth``, are over ``statistic`` and ``parameter``;
+        ``value``, ``statistic_unit`` and ``no_derivative`` are over ``statistic``. The last is the reason why one has
+        no derivative (NaN, no method): a class, a count, or a value that is not finite.
 
     Raises
     ------
     InputError
-        For a parameter that is zero or not a number, a quantity without a derivative (a class, a count), a quantity that is not finite, or
-        several statistics of which none has a derivative.
+        For a parameter that is zero or not a number, or if no quantity has a derivative.
 
     See Also
     --------

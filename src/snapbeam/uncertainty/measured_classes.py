@@ -53,24 +53,23 @@ def score_measurements(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Probability map of :func:`snapbeam.uncertainty.probability_map` over frequency ratio, velocity amplitude and
-        location, or some of them, as a grid; a measured point belongs to the nearest point of the grid, and must lie
-        within half a spacing of the grid.
+        Result of :func:`probability_map` over some of frequency ratio, velocity amplitude and location, as a grid. A
+        measured point belongs to the nearest point of the grid, at most half a spacing outside it.
     measurements : MeasuredPoints
-        Measured points, as :func:`snapbeam.read_measured_points` reads them; points of unknown class are left out.
+        Measured points; those of unknown class are left out.
     samples : int
-        Sets of responses sampled from the map, with which the measured ones are compared.
+        Sets of responses sampled from the map for comparison.
     rng : int, numpy.random.Generator or None
-        A seed; a generator, which gives one; None takes one from the system.
+        Seed, or a generator that gives one; None: random.
 
     Returns
     -------
     xarray.Dataset
-        Variables over ``measurement``:  ``response_class``, ``probability`` of that class with its 95 % limits,
-        ``most_likely`` class and its probability ``best``.  In the attributes: ``log_likelihood`` of all measurements;
-        ``log_likelihood_low``, ``log_likelihood_mean`` and ``log_likelihood_high`` (the 95 % range) of responses
-        sampled from the map itself; ``p_value``, the share of those that are no likelier than the measured ones;
-        ``agree``, measurements of the most likely class, with ``agree_expected``, as many as a right map lets expect.
+        Variables over ``measurement``: ``response_class``, its ``probability`` with 95 % limits, the ``most_likely``
+        class and its probability ``best``. Attributes: ``log_likelihood`` of all measurements; ``log_likelihood_low``,
+        ``log_likelihood_mean`` and ``log_likelihood_high``, the 95 % range of responses sampled from the map;
+        ``p_value``, the share of those that are no likelier than the measured ones; ``agree``, measurements of the most
+        likely class, and ``agree_expected`` under a right map.
 
     See Also
     --------

@@ -19,9 +19,9 @@ HERTZ_TIME = 2.943275  # contact time over d/v for a force k d^1.5: 2 int_0^1 dx
 class ContactTest:
     """One collision of the shaker's tip: closing speed, and two of duration, peak force, effective mass.
 
-    For a force k d^1.5 between two bodies of effective mass m that close at v (Hertz): maximum penetration
-    d = (5 m v^2/(4 k))^0.4, peak force k d^1.5, duration 2.943 d/v.  The bodies are rigid but for the
-    contact: a test on a block or a heavy clamp, not on the limp beam.
+    For a force k d^1.5 between bodies of effective mass m that close at v (Hertz): maximum penetration d = (5 m v^2/(4
+    k))^0.4, peak force k d^1.5, duration 2.943 d/v. The bodies are rigid but for the contact: test on a block or a
+    heavy clamp.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class ContactTest:
     effective_mass : float, optional
         1/(1/m_1 + 1/m_2), kg.
     relative_error : float
-        Standard error of each of the two as a share of it.
+        Relative standard error of each of the two.
 
     Examples
     --------
@@ -80,8 +80,8 @@ class ContactTest:
 class Measurements:
     """Measurements of one beam: frequencies, damping, geometry and contact tests.
 
-    Frequencies are in the order of the modes. A standard error may be one number or one for each; the default
-    is 0.5 %, with a diagnostic.
+    Frequencies are in the order of the modes. A standard error is one number or one for each; 0.5 % by default, with a
+    diagnostic.
 
     Parameters
     ----------
@@ -90,16 +90,15 @@ class Measurements:
     lower_well_frequencies, upper_well_frequencies : sequence of float
         Natural frequencies about either well, Hz.
     straight_frequencies_se, lower_well_frequencies_se, upper_well_frequencies_se : float or sequence of float, optional
-        Their standard errors, Hz.
+        Standard errors of these, Hz.
     lower_well_shape, upper_well_shape : sequence of str, optional
-        "symmetric" or "antisymmetric" for each frequency about a well.  Where given, frequencies are matched
-        to the model's modes of that shape in their order; else to all modes in their order, which at a
-        buckling level of about 6 radii of gyration changes.
+        "symmetric" or "antisymmetric" for each frequency about a well, to match the modes of that shape in their order;
+        else all modes in their order, which changes at a buckling level of about 6 radii of gyration.
     damping_ratio : sequence of float
         Damping ratios from free decays.
     damping_ratio_se : float or sequence of float, optional
     thickness, buckling_level : float, optional
-        Values measured with a gauge, m: compared with the result, not fitted to.
+        Values by gauge, m, compared with the result.
     contact : sequence of ContactTest
 
     Examples

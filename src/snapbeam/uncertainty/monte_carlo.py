@@ -326,7 +326,7 @@ def trials_of(
 def sample_systems(system: System, uncertainty: ParameterUncertainty, count: int) -> list[System]:
     """Draw systems from the uncertainty of parameters, for runs with a time series.
 
-    Sample s is that of number s in every other function of the uncertainty.
+    Sample s is number s in every other function of the uncertainty.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ def sample_systems(system: System, uncertainty: ParameterUncertainty, count: int
     Raises
     ------
     InputError
-        If a sampled value is out of range, or a parameter has no single value in the system.
+        If a sampled value is out of range, or a parameter has no single value.
 
     See Also
     --------

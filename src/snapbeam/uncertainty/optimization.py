@@ -232,9 +232,10 @@ class Constraint:
     quantity : str
         Name of the quantity, as in :class:`Objective`.
     lower, upper : float or str, optional
-        One of them at least, a number in the unit of the quantity or text with a unit, as ``"5 N"``.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
+        Limits, at least one: a number in the unit of the quantity or text such as ``"5 N"``. Of an outcome *lower* is
+        its probability, such as 0.95 of ``"other_well"``.
     probability : float
-        Required fraction of all systems that satisfy a constraint of a statistic of runs, in (0, 1).
+        Required fraction of systems for a constraint of a statistic of runs, in (0, 1).
 
     See Also
     --------
@@ -640,13 +641,12 @@ class OptimizerSettings:
     samples : int
         Runs of a design during the search, at least 8.
     validation_samples : int
-        Validation samples of a design that is checked, and again of one of a front that is reported.  A single design
-        is reported from four times as many.
+        Validation samples of a design, and again of a reported one of a front; a single design is reported from four
+        times as many.
     candidates : int
-        Maximum number of designs to validate, the best first, until one satisfies the constraints.
+        Maximum number of designs to validate until one satisfies the constraints.
     refinements : int
-        Maximum number of further designs to validate, between the feasible one and better infeasible ones; they
-        bring the design to its constraints.
+        Maximum number of further designs to validate, between the feasible one and better infeasible ones.
     confidence : float
         Confidence level of the intervals, in (0, 1).
     seed : int
@@ -757,21 +757,21 @@ def optimize_design(
 ) -> xr.Dataset:
     """Minimise objectives under constraints that hold with a stated probability.
 
-    Generalised differential evolution searches designs on common samples.  The best designs are checked on validation
-    samples until one satisfies its constraints for certain.  Bisection between it and better designs that violate a
-    constraint then brings it to its constraints.  The result is reported from further samples, so that the search does
-    not bias the intervals.  The search stops early after ten generations without progress.
+    Generalised differential evolution searches designs on common samples. The best ones are checked on validation
+    samples until one satisfies its constraints; bisection towards better designs that violate one brings it to them.
+    Further samples report the result, so that the search does not bias the intervals. The search stops after ten
+    generations without progress.
 
     Parameters
     ----------
     system : System
         The nominal system.
     variables : mapping of str to (low, high)
-        Real parameters that may be chosen.
+        Real parameters to choose, with their limits.
     objectives : Objective or str, or a list of up to three
-        Quantities to minimise; of several the result is the Pareto front.
+        Quantities to minimise; several give the Pareto front.
     constraints : Constraint, or a list of them
-        Conditions that a design must satisfy.
+        Conditions on a design.
     uncertainty : ParameterUncertainty
         Uncertain parameters and initial state of the system.
     settings : OptimizerSettings, optional
@@ -781,20 +781,19 @@ def optimize_design(
     checkpoint : path or CheckpointOptions, optional
         Checkpoint folder; an existing one is resumed.
     progress : callable, optional
-        Called as ``progress(done, total)`` with generations; True writes a line to standard error.
+        Called as ``progress(done, total)`` with generations; True prints it.
 
     Returns
     -------
     xarray.Dataset
-        Variables over ``design``, one, or a front by its first objective: a variable a parameter; ``objective_...``
-        with ``_low`` and ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of systems
-        that satisfy a constraint, with ``_low`` and ``_high``, and ``required_...``; ``constraints_satisfied``: whether
-        every lower limit is at least the required fraction, some upper limit is less, or neither is known;
-        ``distance_...``: that of the fraction from the required one, or of a quantity of the design from its limit.
-        Along ``tried``: every design that was evaluated, its objectives ``tried_distance_...`` and ``violation``.  If
-        no design satisfies the constraints, the one that violates them least is reported, with a
-        :class:`~snapbeam.DiagnosticWarning`.  The attribute ``termination_reason`` gives the reason why the search and
-        the refinement stopped.
+        Variables over ``design``, one, or a front ordered by its first objective: each parameter; ``objective_...``
+        with ``_low``, ``_high`` and ``_sought``, the value of the search; ``satisfied_...``, the fraction of systems
+        that satisfy a constraint, with ``_low`` and ``_high``, and ``required_...``; ``constraints_satisfied``: every
+        lower limit reaches its required fraction, some upper limit does not, or neither is known; ``distance_...`` of
+        the fraction from the required one, or of a quantity from its limit. Along ``tried``: every evaluated design,
+        its ``tried_distance_...`` and ``violation``. If no design satisfies the constraints, the one with the least
+        violation is reported, with a :class:`~snapbeam.DiagnosticWarning`. ``termination_reason`` is of search and
+        refinement.
 
     See Also
     --------

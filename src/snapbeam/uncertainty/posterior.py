@@ -154,14 +154,13 @@ class Waveform:
     Parameters
     ----------
     system : System
-        The nominal system: beam, contact, and the striker with a sinusoidal drive, whose frequency and speed are held
-        in Hz and m/s whatever the beam.
+        Nominal system with one sinusoidal striker, whose frequency and speed are held in Hz and m/s.
     time : array_like of shape (samples,)
         s since the drive began, ascending.
     displacement : array_like of shape (samples,)
         m, from the straight beam; NaN where nothing was found.
     standard_error : float
-        Standard error of a sample, m.  Errors are taken as independent: thin samples that are not.
+        Standard error of a sample, m, independent: thin samples that are not.
     at : {"striker", "midspan"}
         Place of the measurement.
     drive_error : float
@@ -443,30 +442,29 @@ def estimate_posterior(
     Parameters
     ----------
     measured : Measurements or None
-        Frequencies with their standard errors; damping ratios and contact tests, if any, are known by themselves.
+        Frequencies with their standard errors; damping ratios and contact tests stand for themselves.
     beam : Beam
         Median of the prior.
     prior : mapping of str to float
-        Parameters to estimate, among thickness, young_modulus, density, length and buckling_level, with the
-        standard deviation of the logarithm of each. A parameter without information in the data keeps its
-        prior.  With waveforms also damping_ratio and contact_stiffness, about those of the first waveform's
-        system, unless *measured* knows them.
+        Parameters to estimate, each with the standard deviation of its logarithm: thickness, young_modulus, density,
+        length, buckling_level; with waveforms also damping_ratio and contact_stiffness, about those of the first
+        waveform's system, unless *measured* has them. A parameter without information in the data keeps its prior.
     waveforms : Waveform or sequence of them
-        Tracked motions of the beam under a striker; each counts up to its predictability horizon.
+        Tracked motions of the beam under a striker.
     modes : int
-        Number of modes for the frequencies; a waveform has those of its system.
+        Number of modes for the frequencies.
     samples : int
         Samples, at least 200.
     rng : int, numpy.random.Generator or None
-        A seed; a generator, which gives one; None takes one from the system.
+        Seed, or a generator that gives one; None: random.
     progress : callable, optional
-        Called as ``progress(done, total)`` with samples of all stages, after the least squares; True writes a line to standard error.
+        Called as ``progress(done, total)`` with samples; True prints it.
 
     Returns
     -------
     Posterior
-        ``posterior.effective_sample_size`` is the number of independent samples that the weighted ones are worth.  If the search
-        for the most likely beam does not converge, ``posterior.converged`` is False, with a :class:`~snapbeam.DiagnosticWarning`.
+        Weighted samples, worth ``posterior.effective_sample_size`` independent ones. ``posterior.converged`` is False,
+        with a :class:`~snapbeam.DiagnosticWarning`, if the most likely beam was not found.
 
     See Also
     --------
@@ -474,8 +472,8 @@ def estimate_posterior(
 
     Notes
     -----
-    Population Monte Carlo (Cappe et al., J. Comput. Graph. Stat. 13 (2004) 907): samples of a Student's t about the
-    most likely beam, weighed by likelihood times prior over their density, twice fitted again to the weighted samples.
+    Population Monte Carlo (Cappe et al., J. Comput. Graph. Stat. 13 (2004) 907): samples of a Student's t about the most
+    likely beam, weighted by likelihood times prior over their density, fitted twice again to the weighted samples.
 
     Examples
     --------
@@ -657,25 +655,24 @@ def class_likelihood(
 ) -> _Array:
     """Log likelihood of measured classes under every sample of a posterior, for :meth:`Posterior.updated`.
 
-    The class of a measured point is one outcome of *runs* and one more sample from the same unknown chances:
-    with c of m runs of its class, a Dirichlet-multinomial of Jeffreys' prior gives it (c + 1/2)/(m + 2).  So a
-    class that no run had is unlikely, not impossible, and few runs give little information.
+    With c of *runs* = m runs of its class, a Dirichlet-multinomial of Jeffreys' prior gives a measured point the
+    probability (c + 1/2)/(m + 2): a class that no run had is unlikely, not impossible.
 
     Parameters
     ----------
     posterior : Posterior
         Few samples: :meth:`Posterior.resampled` first.
     system : System
-        The nominal system, by which Omega and V of the measurements are normalised.
+        Nominal system, which normalises Omega and V.
     measurements : MeasuredPoints
         Excitation in Hz and m/s, the same for every sample; points of unknown class are omitted.
     uncertainty : ParameterUncertainty
-        Uncertainty from test to test, such as ``ParameterUncertainty(displacement=3.5e-6)``, without parameters
-        of the posterior.
+        Uncertainty from test to test, such as ``ParameterUncertainty(displacement=3.5e-6)``, without parameters of the
+        posterior.
     runs : int
-        Number of runs of each measured point and sample, the same random samples for all.
+        Runs of each measured point and sample, on the same random samples.
     integration, checkpoint, progress
-        Settings of the runs, folder and report of progress, as in :func:`snapbeam.uncertainty.probability_map`.
+        Settings, folder and report, as in :func:`probability_map`.
 
     Returns
     -------

@@ -53,17 +53,17 @@ class SamplingPlan:
     Parameters
     ----------
     half_width : float, optional
-        Half the width of the interval of *outcome* that every point is to reach, in (0, 0.5); None: *initial_runs* runs for
+        Half width of the interval of *outcome* to reach at every point, in (0, 0.5); None: *initial_runs* runs for
         every point.
     outcome : str
-        Outcome whose interval is used: ``"snap"``, ``"continuous"``, ``"first_well"``, ``"other_well"``, or a statistic beyond
+        Outcome of the interval: ``"snap"``, ``"continuous"``, ``"first_well"``, ``"other_well"``, or a statistic beyond
         a value, such as ``"peak_force > 60 N"``.
     initial_runs : int
-        Runs that every point has to begin with, at least 8 where more follow.
+        First runs of every point, at least 8 where more follow.
     max_runs : int
-        Runs of a point at most.
+        Maximum number of runs of a point.
     total_runs : int, optional
-        Runs of all points together at most; those with the widest intervals come first.
+        Maximum number of runs of all points together; the widest intervals come first.
     confidence : float
         Confidence level of the intervals (Wilson's), in (0, 1).
 
@@ -210,7 +210,7 @@ def probability_map(
 ) -> xr.Dataset:
     """Compute the probability of each outcome at every point under parameter uncertainty.
 
-    Sample s is the same at every point.  Points with the widest intervals get further runs, until each interval has the
+    Sample s is the same at every point. Points with the widest intervals get further runs until each interval has the
     requested width.
 
     Parameters
@@ -218,36 +218,36 @@ def probability_map(
     system : System
         The nominal system.
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
-        Points of the map, as in :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is sampled too
-        is sampled around the value of the point.
+        Points of the map, as in :func:`snapbeam.sweep`: a grid or a list. A sampled parameter is sampled around the
+        value of the point.
     uncertainty : ParameterUncertainty
         Uncertain parameters and initial state.
     runs : SamplingPlan or int, optional
-        Sampling plan, or the same number of runs for every point; by default until the half width of the 95 %
-        interval of P(snap) is 0.05 everywhere.
+        Sampling plan, or the number of runs for every point; by default until the half width of the 95 % interval of
+        P(snap) is 0.05 everywhere.
     outcomes : str or sequence of str
-        Further outcomes: statistics beyond values, such as ``"peak_force > 60 N"``.  A value without a unit is in that of the
-        statistic; with a unit of length or velocity it is compared with the displacement or velocity of each sample.
+        Further outcomes, such as ``"peak_force > 60 N"``. A value without a unit is in that of the statistic; one of
+        length or velocity is compared with the displacement or velocity of each sample.
     statistics : str or sequence of str
-        Statistics whose mean and quantiles are wanted, such as ``"harvested_power"``.
+        Statistics of which mean and quantiles are computed, such as ``"harvested_power"``.
     quantiles : float or sequence of float
-        Probabilities of these quantiles, increasing, each in (0, 1).
+        Probabilities of the quantiles, increasing, in (0, 1).
     integration : Integration, optional
-        Early termination is always used, also if ``integration.early_termination`` is False, but never where a statistic is
-        asked for, which is of the whole run.
+        Solver settings. Runs end early unless a statistic, which is of the whole run, is asked for.
     checkpoint : path or CheckpointOptions, optional
         Checkpoint folder; an existing one is resumed.
     cluster, progress
-        Cluster and report of progress, as in :func:`snapbeam.sweep`; progress counts runs, of which the total grows.
+        Cluster and report, as in :func:`snapbeam.sweep`; the total of runs grows.
 
     Returns
     -------
     xarray.Dataset
-        ``probability`` with ``probability_low`` and ``probability_high`` over the axes and ``outcome``: ``snap``,
-        ``continuous``, ``first_well`` and ``other_well``, of which the last three add up to 1.  ``hits``; ``runs`` and
-        ``runs_failed``, which widen the intervals; ``reached``, whether the half width was.  Of each statistic its mean, with
-        Student's interval (``peak_force``, ``peak_force_low``, ``peak_force_high``), and over ``quantile``
-        ``peak_force_quantile`` with that of order statistics, infinite where the runs are too few or one failed.
+        ``probability``, with ``_low`` and ``_high``, over the axes and ``outcome``: ``snap``, ``continuous``,
+        ``first_well`` and ``other_well``, of which the last three add up to 1. ``hits``; ``runs`` and ``runs_failed``,
+        which widen the intervals; ``reached``: the half width was reached. For each statistic its mean with Student's
+        interval (``peak_force``, ``peak_force_low``, ``peak_force_high``), and over ``quantile``
+        ``peak_force_quantile`` with the interval of order statistics, infinite where the runs are too few or one
+        failed.
 
     Raises
     ------
@@ -260,9 +260,8 @@ def probability_map(
 
     Notes
     -----
-    The intervals are those of a fixed number of runs.  Stopping where they are narrow costs them nothing that is
-    seen: over probabilities sampled from (0, 1) they hold the truth in 95 % of cases.  The share itself leans towards
-    0 and 1 by at most 0.006 at a half width of 0.05.
+    Stopping where the intervals are narrow keeps their coverage: over probabilities sampled from (0, 1) they hold the truth
+    in 95 % of cases.  The share leans towards 0 and 1 by at most 0.006 at a half width of 0.05.
 
     Examples
     --------

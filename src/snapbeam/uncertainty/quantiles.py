@@ -239,13 +239,13 @@ class QuantileSearchSettings:
     probabilities : tuple of float
         Probabilities of the quantiles, increasing, each in (0, 1).
     runs : int
-        Runs of every column, at least 40 a probability.
+        Runs of every column, at least 40 for each probability.
     rounds : int
-        Rounds they are made in: the first over the whole range, each later one about the intervals found so far.
+        Rounds of the runs: the first over the whole range, each later one about the intervals found.
     confidence : float
         Confidence level of the intervals, in [0.5, 0.99].
     seed : int
-        Seed of the values at which runs are made.
+        Seed of the values of the runs.
     outcome : str
         Outcome of the probability, as in :class:`SamplingPlan`.
 
@@ -361,42 +361,40 @@ def quantile_threshold(
 ) -> xr.Dataset:
     """Find the values of a parameter at which the probability of snap-through has given values, with intervals.
 
-    Every run has its own value. The first round covers the range, each later one the remaining intervals.  The
-    interval is that of the isotonic regression, of which nothing but a rise is assumed (Banerjee and Wellner,
-    Ann.  Stat. 29 (2001) 1699); within it the threshold is where a logistic curve fitted to the runs about it
-    passes the value.  Where the probability is seen to fall, which fractal borders do, ``is_monotonic`` is
-    False and the interval reaches from the first value at which the probability may be so great to the last at
-    which it may be so small.
+    Every run has its own value. The first round covers the range, each later one the remaining intervals. The interval
+    is that of isotonic regression, which assumes a rise only (Banerjee and Wellner, Ann. Stat. 29 (2001) 1699); within
+    it the threshold is where a fitted logistic curve passes the value. Where the probability falls, as fractal borders
+    make it, ``is_monotonic`` is False, and the interval contains every value at which the probability may be the given
+    one.
 
     Parameters
     ----------
     system : System
         The nominal system.
     parameter : str
-        Parameter to raise, such as ``"velocity_amplitude"``: a number that may differ between the runs of an ensemble.
+        Parameter to raise, such as ``"velocity_amplitude"``, that may differ between runs.
     bounds : tuple of two floats
         Range of the search.
     axes : mapping of str to array_like, optional
-        Axes, as in :func:`snapbeam.sweep`; by default one point, the system itself.
+        Axes, as in :func:`snapbeam.sweep`; the system itself by default.
     uncertainty : ParameterUncertainty, optional
         Uncertain parameters.  Without uncertainty all quantiles are one threshold.
     options : QuantileSearchSettings, optional
         Probabilities, runs and rounds.
     integration : Integration, optional
-        Early termination is always used, also if ``integration.early_termination`` is False, but never where the outcome is
-        a statistic beyond a value.
+        Solver settings. Runs end early unless the outcome is a statistic beyond a value.
     checkpoint : path or CheckpointOptions, optional
         Checkpoint folder; an existing one is resumed.
     progress : callable, optional
-        Called as ``progress(done, total)`` with runs; True writes a line to standard error.
+        Called as ``progress(done, total)`` with runs; True prints it.
 
     Returns
     -------
     xarray.Dataset
-        ``threshold`` with ``threshold_low`` and ``threshold_high`` over the axes and ``quantile``; infinite
-        limits where no run bounds it, NaN if ``outcome_of_search`` gives a reason. ``is_fitted``: true if the
-        threshold is that of the fitted curve, and not of the isotonic regression alone.  ``is_monotonic``, with
-        the probability ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
+        ``threshold`` with ``threshold_low`` and ``threshold_high`` over the axes and ``quantile``; infinite limits
+        where no run bounds it, NaN if ``outcome_of_search`` gives a reason. ``is_fitted``: the threshold is that of the
+        fitted curve, not of the isotonic regression alone. ``is_monotonic``, with the ``monotonicity_p_value`` of such
+        a fall; ``runs``, ``runs_failed``.
 
     See Also
     --------

@@ -130,24 +130,23 @@ def sobol_indices(
 ) -> Sobol:
     """Sobol's indices by Saltelli's estimator (``scipy.stats.sobol_indices``), over scrambled Sobol sequences.
 
-    A sequence is so uniform that resampling its points overestimates the error; *replicates* sequences, each
-    scrambled by itself, are independent, and their scatter is the error (Owen's scrambling; Student's interval
-    of their mean).  At equal cost, few long sequences have a smaller error than many short ones.
+    The error is Student's interval of the mean of *replicates* independently scrambled sequences (Owen); resampling the
+    points of one would overestimate it. At equal cost, few long sequences have a smaller error than many short ones.
 
     Parameters
     ----------
     function : callable
-        Function of ranks in (0, 1) of shape (inputs, points) that returns numbers of shape (points,); called once.
+        Function of ranks in (0, 1), shape (inputs, points), that returns shape (points,); called once.
     inputs : int
         Number of inputs.
     samples : int
         Points of a sequence, a power of 2; *replicates* times *samples* times (*inputs* + 2) points in all.
     replicates : int
-        Number of sequences, at least 4; use more points rather than more replicates.
+        Number of sequences, at least 4.
     confidence : float
         Confidence level of the intervals, in (0, 1).
     rng : int, numpy.random.Generator or None
-        A seed; a generator, which gives one; None takes one from the system.
+        Seed, or a generator that gives one; None: random.
 
     See Also
     --------
@@ -292,9 +291,9 @@ class ThresholdQoI:
     bounds : tuple of two floats
         Minimum and maximum of the parameter, in its unit.
     values : int
-        Values tried first, evenly spaced: a window of snapping narrower than their spacing may be missed.
+        Values tried first, evenly spaced; narrower windows of snapping may be missed.
     halvings : int
-        Number of times that the step below the lowest value that snaps is halved.
+        Halvings of the step below the lowest value that snaps.
     at : mapping of str to float, optional
         Other parameters, at nominal values.
 
@@ -445,37 +444,37 @@ def sensitivity(
     system : System
         The nominal system.
     quantity : str or ThresholdQoI or LifetimeQoI
-        A statistic by its name, such as ``"peak_force"``, an outcome, or one of these.
+        Name of a statistic, such as ``"peak_force"``, or of an outcome, or one of these.
     uncertainty : ParameterUncertainty
         Uncertainty of at least one parameter.
     method : {"local", "sobol", "given_data"}
-        ``"local"``: half the difference of the quantities with a parameter one standard normal score up and down, the
-        others and the start as in *samples* samples (common random numbers).  ``"sobol"``: indices of the first order and
-        in total over four scrambled sequences of *samples* points, all from one start.  ``"given_data"``: indices of
-        the first order from *samples* plain samples, which may be correlated.
+        ``"local"``: half the difference of the quantities with a parameter one standard normal score up and down, over
+        *samples* common random numbers. ``"sobol"``: first and total indices over four scrambled sequences of *samples*
+        points, all from one start. ``"given_data"``: first indices from *samples* plain samples, which may be
+        correlated.
     samples : int, optional
-        Number of samples; 16, 128 and 1000 for the three methods by default.
+        Number of samples; 16, 128 and 1000 for the three methods.
     confidence : float
         Confidence level of the intervals, in (0, 1).
     integration : Integration, optional
         Settings of the runs.
     checkpoint : path or CheckpointOptions, optional
-        Checkpoint folder of the runs of all quantities except lifetimes; an existing one is resumed.
+        Checkpoint folder, not for lifetimes; an existing one is resumed.
     progress : callable, optional
-        Called as ``progress(done, total)`` with runs of each round; lifetimes report nothing; True writes a line to standard error.
+        Called as ``progress(done, total)`` with runs of each round, not for lifetimes; True prints it.
 
     Returns
     -------
     xarray.Dataset
-        Variables over ``parameter``, with ``unit``: locally ``effect`` (of +1 standard score), ``derivative`` (per unit
-        of the parameter) and ``quantity_minus`` and ``quantity_plus``, the first two with limits; else ``first_order``,
-        and ``total_order`` of Sobol's, with limits.  Mean and standard deviation of the quantity are attributes.
+        Variables over ``parameter``, with ``unit``: locally ``effect`` (of +1 standard score) and ``derivative`` (per
+        unit), with limits, ``quantity_minus`` and ``quantity_plus``; else ``first_order`` and, of Sobol's,
+        ``total_order``, with limits. Mean and standard deviation of the quantity are attributes.
 
     Raises
     ------
     InputError
-        If the quantity is missing for some samples, such as a threshold out of range, or does not vary, or if parameters
-        are correlated with Sobol's indices.
+        If the quantity is missing for some samples or does not vary, or if parameters are correlated with Sobol's
+        indices.
 
     See Also
     --------

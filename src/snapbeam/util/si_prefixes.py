@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+WITH_PREFIX = frozenset(("m", "m/s", "s", "N", "N/m", "N m", "Pa", "Hz", "ohm", "F", "H", "V", "A", "W", "J"))
+"""Units that take a prefix of the SI."""
 _PREFIXES = ("y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P", "E", "Z", "Y")
 
 

@@ -15,11 +15,10 @@ from snapbeam.util.validation import InputError, finite_array, shown
 class ResponseClass(IntEnum):
     """The kind of response of one run (section 4.2 of the paper).
 
-    Decided from the zero crossings of the displacement at the centre of the beam: none is intrawell;
-    more than n/5 in the last quarter (n cycles) is continuous interwell; anything else is transient,
-    1 if it ends about the well it started in and 2 if about the other.  A beam with one well, such as a shallow arch, has
-    the same codes with the names of :meth:`label_of`: it snapped if its centre came more than half of the way from the
-    flat shape to the mirror image of its rest.
+    From the zero crossings of the displacement at the centre: none is intrawell; more than n/5 in the last quarter (n
+    cycles) is continuous interwell; else transient, 1 if it ends about the well it started in and 2 if about the other.
+    A beam with one well has the same codes with the names of :meth:`label_of`: it snapped if its centre came more than
+    half of the way from the flat shape to the mirror image of its rest.
 
     Examples
     --------
@@ -74,6 +73,11 @@ def wells_of(attrs: Mapping[str, Any]) -> int:
     return int(found.item())
 
 
+def is_of_matrices(attrs: Mapping[str, Any]) -> bool:
+    """Return whether the structure of a dataset was given by matrices: its contact is at their row, at no location."""
+    return '"contact_shape"' in str(attrs.get("system", ""))
+
+
 class RunStatus(IntEnum):
     """Status of a run.  All but ``OK``, ``EARLY_STOP`` and ``FILLED`` leave the response class unknown.
 
@@ -120,8 +124,7 @@ def classify(
 ) -> NDArray[np.int8]:
     """Class of a response by the rules of section 4.2 of the paper.
 
-    No zero crossing of the centre displacement: intrawell.  More than n/5 crossings in the last quarter, n =
-    cycles/4: continuous interwell.  Else transient: 2 if the run ended in the other well, 1 if in the first.
+    The rules are those of :class:`ResponseClass`, with n = cycles/4.
 
     Parameters
     ----------

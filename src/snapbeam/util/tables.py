@@ -99,21 +99,21 @@ def _divisor(labels: Any, attrs: Any) -> str:
 def write_table(dataset: xr.Dataset, path: str | os.PathLike[str]) -> list[str]:
     """Write a dataset as a table of comma-separated values (.csv), or its arrays to a MATLAB (.mat) or universal file (.uff).
 
-    The first line of a ``.csv`` file contains names and units; numbers have all their digits.  A ``.mat`` file contains
-    every variable and coordinate under its name, with its dimensions.  A ``.uff`` file has a binary record (dataset 58)
-    of each variable over time or frequency; uneven samples are interpolated, which the record states.
+    A ``.csv`` file begins with names and units; numbers have all their digits. A ``.mat`` file contains every variable
+    and coordinate, with its dimensions. A ``.uff`` file has a binary record (dataset 58) of each variable over time or
+    frequency; uneven samples are interpolated, which the record states.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        A run, its impacts, a map, or another result.
+        Run, impacts, map, or another result.
     path : path
-        Ends in ``.csv``, ``.mat`` (MATLAB reads them by ``readtable`` and ``load``) or ``.uff``.
+        File ending in ``.csv``, ``.mat`` or ``.uff``.
 
     Returns
     -------
     list of str
-        Names of the variables that the table does not contain, since their dimensions are other ones.
+        Variables that the table does not contain, of other dimensions.
 
     Raises
     ------

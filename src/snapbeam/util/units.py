@@ -17,6 +17,7 @@ _OPERATOR = re.compile(r"(?<!\*)\s*([*/])\s*(?=[-+]?(?:\d|\.\d))")
 """Operator before a number, between two factors of a product; a power, ``m**2``, has none."""
 _FACTOR = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\D.*?)?\s*", re.DOTALL)
 _ANGLE = "radian"
+_GRAVITY = re.compile(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])")
 
 
 @cache
@@ -45,11 +46,15 @@ def conversion_factor(given: str, unit: str) -> float | None:
     if given == unit:
         return 1.0
     registry = _registry()
-    target = registry.Unit("" if unit == "1" else unit)
-    gravity = re.sub(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])", "standard_gravity", given)
-    for text in dict.fromkeys((given, gravity)):
+    given = re.sub(r"(?<=[A-Za-z])(?=[2-4](?![0-9.]))", "^", given)  # kg/m3 is kg/m^3
+    ends = [
+        (given, unit),
+        (_GRAVITY.sub("standard_gravity", given), unit),
+        (given, _GRAVITY.sub("standard_gravity", unit)),
+    ]
+    for text, wanted_unit in dict.fromkeys(ends):
         try:
-            own = registry.Unit(text)
+            own, target = registry.Unit(text), registry.Unit("" if wanted_unit == "1" else wanted_unit)
             if own.dimensionality != target.dimensionality:
                 continue
             one, two = (registry.Quantity(Decimal(count), own).to(target).magnitude for count in (1, 2))

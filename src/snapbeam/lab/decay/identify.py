@@ -58,40 +58,37 @@ def identify_decay(
     Parameters
     ----------
     signal : xarray.DataArray
-        Displacement [m or b], velocity, acceleration or voltage, evenly sampled, with its mean position of no
-        concern.
+        Displacement [m or b], velocity, acceleration or voltage, evenly sampled.
     modes : int
-        Number of modes, strongest first, by the matrix pencil (see :mod:`snapbeam.lab.decay.poles`); with the
-        method ``"fit"`` all are fitted together.
+        Number of modes, strongest first, by the matrix pencil (:mod:`snapbeam.lab.decay.poles`).
     frequencies : array_like, optional
         Approximate frequencies [Hz] of the modes, within 10 %, instead of *modes*.
     method : {"fit", "hilbert", "log_decrement"}
-        Nonlinear least squares on the signal itself; regression on amplitude and phase of the analytic
-        signal; regression on height and time of the maxima.
+        Nonlinear least squares on the signal, of all modes together; regression on amplitude and phase of the analytic
+        signal; or on height and time of the maxima.
     start, stop : float, optional
-        The part of the signal [s] that decays freely.  The start is found if left out: where the motion sets
-        in, and where its tops are no longer cut off; a second hit ends the decay.
+        Part of the signal [s] that decays freely. By default it starts where the motion sets in, not cut off, and ends
+        at a second hit.
     soften : bool
         True if frequencies may depend on amplitude.
     buckling_level : float, optional
-        b [m], for the displacement or velocity of mid-span: the softening then has a prior near 0.75 (a/b)^2,
-        that of one mode, within 10 %, which narrows the frequency of a short decay.
+        Buckling level b [m], for displacement or velocity of mid-span: the softening then has the prior 0.75 (a/b)^2 of
+        one mode, within 10 %.
     exponential_window : float, optional
         Time constant T [s] of a window exp(-t/T) of the analyser, to correct.
 
     Returns
     -------
     DecayFit
-        Frequencies and damping ratios at zero amplitude. If the damping of the first mode depends on amplitude (dry friction,
-        quadratic drag, or a monotone curve), so that the record only approaches that value, the spread of all forms that fit it is in
-        the standard error, and ``decay.damping_curve`` states the lowest amplitude. Standard errors follow the noise
-        near each mode and include the uncertainty of the softening law. If the residual exceeds the noise, they
-        include the differences between parts of the decay, and a diagnostic reports it.
+        Frequencies and damping ratios at zero amplitude. If the damping depends on amplitude (dry friction, quadratic
+        drag, or a monotone curve), the standard error contains the spread of all forms that fit, and
+        ``decay.damping_curve`` states the lowest amplitude. Standard errors follow the noise near each mode and the
+        softening law. A residual above the noise adds the differences between parts of the decay, with a diagnostic.
 
     Raises
     ------
     InputError
-        If the signal is unfit, fewer than 8 cycles long, or does not hold that many modes above the noise.
+        If the signal is unfit, has fewer than 8 cycles, or fewer modes above the noise.
 
     Examples
     --------

@@ -509,9 +509,8 @@ def _regressions(design: _Array, aim: _Array, weight: _Array, bend: tuple[float,
 def mode_shapes(first: xr.DataArray, second: xr.DataArray, fit: DecayFit) -> tuple[str, ...]:
     """Shape of each mode of *fit*: "symmetric", "antisymmetric" or "unclear".
 
-    Both sensors sense the same decay at places that mirror each other about the middle of the beam, such as a
-    quarter and three quarters of its length, and count the same direction as positive.  In a symmetric mode
-    they move alike, in an antisymmetric one against each other.
+    Both sensors record one decay at mirrored places of the beam, such as a quarter and three quarters of its length,
+    positive in one direction: a symmetric mode moves them alike.
 
     Parameters
     ----------

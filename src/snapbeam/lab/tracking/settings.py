@@ -94,47 +94,43 @@ class TrackingSettings:
     Attributes
     ----------
     buckling_level
-        b [m].  If given, displacements are also returned in units of b.
+        Buckling level b [m], for displacements in units of b.
     location
-        Location x_s/L of the contact, which sets the displacement of the beam at rest.
+        Location x_s/L of the contact.
     rest_displacement
-        Displacement of the beam [m] at rest, the one length a camera cannot know.
-        Unless given, the well that faces the shaker: -(b/2)(1 - cos 2 pi x_s/L), of opposite sign for a
-        shaker above; 0 without ``buckling_level``.
+        Displacement of the beam [m] at rest. By default the well that faces the shaker: -(b/2)(1 - cos 2 pi x_s/L), of
+        opposite sign for a shaker above; 0 without ``buckling_level``.
     rest_frames
-        Frames in which the beam is at rest: their number at the start, or (first, one past the last), negative
-        numbers counted from the end.  Unless given, the first half of those before it first departs from their
-        mean by three standard errors.
+        Frames at rest: their number at the start, or (first, one past the last), negative from the end. By default the
+        first half of those before it departs from their mean by three standard errors.
     beam_thickness, tip_diameter, drive_amplitude
-        Lengths that the recording shows too, to check the pixel size: thickness of the beam and diameter of the
-        shaker's rod behind its tip by gauge, and amplitude of the shaker's steady displacement by vibrometer [m].
+        Lengths that check the pixel size [m]: thickness of the beam and diameter of the shaker's rod by gauge,
+        amplitude of the shaker's steady displacement by vibrometer.
     beam_thickness_error, tip_diameter_error, drive_amplitude_error
-        Their standard errors [m]; 1 % of the gauged ones and 0.2 % of the amplitude unless given.
+        Standard errors of these [m]; by default 1 %, 1 % and 0.2 %.
     side
-        Side of the beam on which the shaker is: "below", "above", "left" or "right".  Up (or right) is
-        positive.
+        Side of the shaker: "below", "above", "left" or "right". Up (or right) is positive.
     objects
-        "bright" or "dark" against the background, or "auto": unlike the rows beyond the beam.
+        "bright" or "dark" against the background, or "auto".
     threshold
-        Grey level for binarising; Otsu's from the sample unless given.
+        Grey level for binarising; Otsu's by default.
     background : array of shape (height, width), optional
-        A picture of the scene without beam and shaker, to subtract.
+        Picture of the scene without beam and shaker, to subtract.
     gamma
-        Exponent of grey level over light, to be undone; 1 for a linear camera.
+        Exponent of grey level over light; 1 for a linear camera.
     shaker, marker
-        Whether to follow the shaker, and whether to look for a sticker on it.
+        True to follow the shaker, and to look for its sticker.
     tip_distance
-        Distance from the shaker's tip to the nearer edge of its sticker [m]; found from the picture, or
-        from the contact at rest, unless given.
+        Distance from the tip to the nearer edge of its sticker [m]; found by default.
     columns
-        Columns in which the beam's edge is fitted.
+        Columns in which the edge is fitted.
     contact_column
-        Column of the contact (or row, for a shaker at the left or right); found from the tip unless given.
+        Column (or row) of the contact; found from the tip by default.
     blur_limit
-        Edge width [px] beyond which a frame is flagged as blurred; 2.5 times the usual plus 0.5 unless given.
+        Edge width [px] of a blurred frame; by default 2.5 times the usual plus 0.5.
     fixed_marks
-        Parts of the picture, each (first row, last row + 1, first column, last column + 1), that show
-        stationary objects; their motion is that of the camera and is subtracted.
+        Parts of the picture with stationary objects, (first row, last row + 1, first column, last column + 1) each; the
+        motion of the camera there is subtracted.
 
     Examples
     --------

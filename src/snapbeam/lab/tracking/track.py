@@ -264,34 +264,31 @@ def track(
 ) -> xr.Dataset:
     """Measure the displacement of beam and shaker tip in every frame of a recording.
 
-    A sample of frames is binarised (Otsu or a fixed threshold) to find the beam, the shaker and, on it, a
-    sticker.  Then in every frame the beam's far edge, which the tip never covers, is fitted with a blurred
-    step in several columns about the contact, and the shaker by its sticker, or without one by its tip in
-    the columns where a gap remains.  The thickness of the beam and the way from sticker to tip, measured in
-    the sample, turn both into one scale on which the penetration is zero when the edges coincide.
+    A sample of frames is binarised (Otsu or a fixed threshold) to find the beam, the shaker and its sticker. In every
+    frame the beam's far edge is fitted with a blurred step in several columns about the contact, and the shaker by its
+    sticker, or else by its tip where a gap remains. The thickness of the beam and the distance from sticker to tip,
+    from the sample, give one scale on which the penetration is zero when the edges coincide.
 
     Parameters
     ----------
     recording
         An open recording.
     settings
-        Settings of the tracking; by default those of :class:`TrackingSettings`.
+        Settings; the defaults of :class:`TrackingSettings` otherwise.
     progress
         Called with (frames done, frames in all).
     **changes
-        Settings by name, such as ``buckling_level`` or ``side``, in place of those in *settings*.
+        Settings by name, such as ``buckling_level`` or ``side``.
 
     Returns
     -------
     xarray.Dataset
-        Over ``time`` [s]: ``displacement_at_striker``, ``striker_displacement``, ``penetration_normalised`` in
-        b and, with ``_mm``, in mm; ``displacement_stderr_mm`` and ``shaker_stderr_mm`` from the scatter of the
-        columns, the rest position and the increase by diagnostics; ``confidence`` from 0 to 1; ``flags``
-        (:class:`FrameFlag`); ``valid``; ``edge_width`` [px]; and, for drawing, ``beam_row``, ``beam_slope``,
-        ``tip_row``, ``marker_row`` [px, turned picture], with the noise of the first and third in
-        ``beam_row_stderr`` and ``tip_row_stderr``.  Frames without a valid edge, and frames missing from the
-        numbering, are NaN and have a flag. The attribute ``diagnostics`` contains the diagnostics;
-        :func:`snapbeam.lab.diagnostics_of` reads it.
+        Over ``time`` [s]: ``displacement_at_striker``, ``striker_displacement``, ``penetration_normalised`` in b and,
+        with ``_mm``, in mm; ``displacement_stderr_mm`` and ``shaker_stderr_mm`` from the scatter of the columns, the
+        rest position and diagnostics; ``confidence`` from 0 to 1; ``flags`` (:class:`FrameFlag`); ``valid``;
+        ``edge_width`` [px]; for drawing ``beam_row``, ``beam_slope``, ``tip_row``, ``marker_row`` [px, turned picture],
+        ``beam_row_stderr``, ``tip_row_stderr``. Missing frames and frames without a valid edge are NaN and flagged.
+        :func:`snapbeam.lab.diagnostics_of` reads the attribute ``diagnostics``.
 
     Examples
     --------
@@ -604,27 +601,25 @@ def tracking_report(dataset: xr.Dataset, *, diagnostics: bool = True) -> str:
 def contact_onsets(dataset: xr.Dataset, *, tolerance: float | None = None, minimum_frames: int = 1) -> xr.Dataset:
     """Impacts in a tracked recording: where the tip reaches the beam and leaves it again.
 
-    Contact begins when the penetration rises above ``-tolerance`` and ends when it falls below twice that, so
-    that noise does not split one contact into several.  The instant follows from a straight line through the
-    last frames of the approach (and the first of the parting), continued to zero; the time of a frame is the
-    middle of its exposure, if known. A contact that begins or ends in a gap of unmeasured frames has
-    ``bounded`` = 0.
+    Contact begins when the penetration rises above ``-tolerance`` and ends below twice that. The instant is where a
+    straight line through the last frames of the approach (the first of the parting) reaches zero; the time of a frame
+    is the middle of its exposure, if known. A contact that begins or ends in unmeasured frames has ``bounded`` = 0.
 
     Parameters
     ----------
     dataset
-        From :func:`snapbeam.lab.track`, with a shaker.
+        Result of :func:`track`, with a shaker.
     tolerance
-        Penetration below zero that still counts as contact [mm]; unless given, three standard deviations of
-        the frame-to-frame noise of the penetration, and at least 0.1 pixel.
+        Penetration below zero that still is contact [mm]; by default three standard deviations of its noise, at least
+        0.1 pixel.
     minimum_frames
         Shortest contact to report, in frames.
 
     Returns
     -------
     xarray.Dataset
-        Over ``impact``: ``onset`` and ``duration`` [s] with their standard errors, ``frames`` in contact,
-        ``closing_speed`` [m/s] before the onset (NaN where fewer than two frames precede it), ``bounded``.
+        Over ``impact``: ``onset`` and ``duration`` [s] with standard errors, ``frames`` in contact, ``closing_speed``
+        [m/s] (NaN where fewer than two frames precede the onset), ``bounded``.
 
     Examples
     --------

@@ -53,8 +53,8 @@ def _of_impact(function: Callable[[Any, float, float], float]) -> Callable[[Any,
 class ContactLaw:
     """A law of contact between the striker's tip and the beam: a frozen dataclass in a file of its own.
 
-    Its fields are quantities of scope *run*, each a positive number or zero.  Its physics are scalar functions
-    of numbers; ``law`` contains the numbers, by the names of the fields:
+    Its fields are quantities of scope *run*, each a positive number or zero. Its physics are scalar functions; ``law``
+    contains the numbers, by the names of the fields:
 
     - ``force(law, penetration)``: force on both, N, for a penetration > 0 (m);
     - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
@@ -62,17 +62,17 @@ class ContactLaw:
 
     ``engine = "python"`` needs ``force`` alone, in any Python; energy and slope then follow numerically.
 
-    A law that loses energy (``rate_dependent`` = True) has ``damping_coefficient(law, penetration)`` besides, N s/m: its force
-    is max(0, force + damping coefficient times the rate of penetration).
+    A law that loses energy (``rate_dependent`` = True) also has ``damping_coefficient(law, penetration)``, N s/m: its
+    force is max(0, force + damping coefficient times the rate of penetration).
 
-    A law with a state of its own (``memory``, the name of a residual indentation D, m, which is the last of the law's
-    numbers) has the penetration measured from the indented surface, and besides
+    A law with a state of its own (``memory``, the name of a residual indentation D, m, the last number) measures the
+    penetration from the indented surface, and also has
 
     - ``yield_penetration(law)``: penetration beyond which D increases, m;
     - ``memory_after(law, deepest)``: D of a contact that unloads from a maximum penetration beyond it.
 
-    They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.  A name that none of these
-    hooks has is refused when the class is defined; names of your own begin with an underscore.
+    They use ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate. Names of your own begin with an
+    underscore; others are refused when the class is defined.
 
     See Also
     --------

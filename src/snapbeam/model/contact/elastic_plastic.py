@@ -19,10 +19,10 @@ class ElasticPlasticContact(ContactLaw):
 
         f = min[k_1 (d + D), k_2 d]:
 
-    the branch k_1 on first loading, k_2 on unloading and on reloading, up to the change at d = D k_1/(k_2 - k_1).  A
-    contact that unloads from a maximum penetration d_m beyond this point leaves D' = (d_m + D) (1 - k_1/k_2).  A free mass
-    leaves an intact surface with sqrt(k_1/k_2) times its speed, at any speed; when it returns at most as fast, the contact
-    is elastic.  Walton and Braun, J. Rheol. 30 (1986) 949-980.
+    k_1 on first loading, k_2 on unloading and reloading, up to d = D k_1/(k_2 - k_1). Unloading from a maximum
+    penetration d_m beyond this point leaves D' = (d_m + D) (1 - k_1/k_2). A free mass leaves an intact surface with
+    sqrt(k_1/k_2) times its speed; when it returns at most as fast, the contact is elastic. Walton and Braun, J. Rheol.
+    30 (1986) 949-980.
 
     Parameters
     ----------

@@ -19,8 +19,8 @@ class KelvinVoigt(ContactLaw):
 
         e = exp(-2 zeta arccos(zeta)/sqrt(1 - zeta^2)),
 
-    and the continuation of the same to zeta >= 1; it leaves when the force has gone, before the spring is
-    slack.  The remaining energy of the spring is dissipated.  The force begins with a jump, c v.
+    continued to zeta >= 1. It leaves when the force has gone; the remaining energy of the spring is dissipated. The
+    force begins with a jump, c v.
 
     Parameters
     ----------

@@ -37,9 +37,9 @@ class LayeredHertz(ContactLaw):
 
         d = d_c + d_l,    f = k_c d_c^(3/2) = k_l d_l^2.
 
-    A layer thinner than the circle of contact and free to be compressed, bonded to a stiffer ground, is a bed of
-    springs: k_l = pi R M/h with its modulus in confined compression M = E (1 - nu)/[(1 + nu) (1 - 2 nu)]
-    (K. L. Johnson, Contact Mechanics, 1985, section 5.8).  A stiff layer leaves Hertz's law, a soft one the power 2.
+    A layer thinner than the circle of contact, free to be compressed and bonded to a stiffer ground, is a bed of
+    springs: k_l = pi R M/h with its confined modulus M = E (1 - nu)/[(1 + nu) (1 - 2 nu)] (K. L. Johnson, Contact
+    Mechanics, 1985, section 5.8). A stiff layer leaves Hertz's law, a soft one the power 2.
 
     Parameters
     ----------

@@ -17,8 +17,7 @@ _MICROMETRE = 1e-6
 class PowerLaw(ContactLaw):
     """An elastic contact of any exponent, f = f_1 (d/1 um)^p for a penetration d > 0, which loses nothing.
 
-    p = 1 is a spring, 3/2 Hertz's sphere, 2 a cone; a thin soft layer on a stiff ground, or a rough surface, stiffens
-    faster.  The force at one micrometre takes the place of a stiffness, whose unit would depend on p.
+    p = 1 is a spring, 3/2 Hertz's sphere, 2 a cone; a thin soft layer or a rough surface stiffens faster.
 
     Parameters
     ----------

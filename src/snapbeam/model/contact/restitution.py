@@ -19,10 +19,9 @@ INSTEAD_OF_RESTITUTION = (
 class Restitution(ContactLaw):
     """Newton's law of impact: the velocity of separation is e times that of approach.
 
-    The contact lasts no time.  Its impulse is (1 + e) times the velocity of approach over the mobility of the two bodies,
-    the sum of phi_i^2/m_i over the modes.  That sum grows with the number of modes, without a limit for a point: results
-    belong to a number of modes, and do not converge as modes are added.  Impacts that follow each other ever faster end in
-    a contact that is held together until its force would have to pull.
+    The contact lasts no time. Its impulse is (1 + e) times the velocity of approach over the mobility of the two
+    bodies, the sum of phi_i^2/m_i over the modes. That sum grows without a limit: results do not converge as modes are
+    added. Ever faster impacts end in a held contact, until its force would have to pull.
 
     Parameters
     ----------

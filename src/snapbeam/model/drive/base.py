@@ -66,15 +66,14 @@ class Scale(NamedTuple):
 class Drive:
     """A prescribed motion of the striker's tip about its mid-position: a frozen dataclass in a file of its own.
 
-    The motion is the sum of its ``components``: tones, polynomials in pieces and sweeps of the time since the drive began
-    (:mod:`snapbeam.model.drive.components`).  A drive that is none of these brings ``motion(drive, t)`` instead, a scalar
-    function that returns displacement (m) and velocity (m/s) at the time t (s); ``drive`` has the numbers of the run by name.
-    It is approximated by quintics within 1e-9 of its maximum.  :class:`Timed` is the base of drives that do not repeat.
+    The motion is the sum of its ``components``: tones, polynomials in pieces and sweeps of the time since the drive
+    began (:mod:`snapbeam.model.drive.components`), or a scalar function ``motion(drive, t)`` that returns displacement
+    (m) and velocity (m/s); ``drive`` has the numbers by name. The function is approximated by quintics within 1e-9 of
+    its maximum. Drives that do not repeat derive from :class:`Timed`.
 
-    ``numbers`` returns the numbers, of which ``omega`` is the rate of the phase (rad/s).  A drive with a field ``phase`` begins
-    at that phase, which is among the *columns*; the phase of a state replaces it.  ``discontinuities`` names the numbers that
-    are times at which the motion or one of its derivatives jumps.  A name that none of the hooks has is refused when the class
-    is defined; names of your own begin with an underscore.
+    ``numbers`` returns the numbers, of which ``omega`` is the rate of the phase (rad/s). A field ``phase`` is the phase
+    at the start, one of the *columns*; the phase of a state replaces it. ``discontinuities`` names the times at which
+    the motion or a derivative jumps. Names of your own begin with an underscore; others are refused.
 
     See Also
     --------

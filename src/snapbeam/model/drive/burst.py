@@ -25,9 +25,9 @@ class Burst(Timed):
 
         w_s(t) = w_0 + E(t) (V b omega_1/omega) sin(omega t),
 
-    with E = x^3 (10 - 15 x + 6 x^2) of the fraction x of the rise or of the fall: displacement, velocity and
-    acceleration have no jump.  Afterwards the tip stays at its mid-position or, with *retraction*, leaves the beam.
-    A burst longer than the run is a start-up.
+    with E = x^3 (10 - 15 x + 6 x^2) of the fraction x of the rise or fall, without jumps up to the acceleration.
+    Afterwards the tip stays at its mid-position or, with *retraction*, leaves the beam. A burst longer than the run is
+    a start-up.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Burst(Timed):
     duration_cycles : float
         Cycles from the beginning of the rise to the end of the fall.
     ramp_up_cycles, ramp_down_cycles : float
-        Cycles that they take, each greater than 0, together at most *duration_cycles*.
+        Cycles of rise and fall, each greater than 0, together at most *duration_cycles*.
     retraction : float
         Withdrawal of the tip in the cycle after the burst, over b; it releases the beam.
 

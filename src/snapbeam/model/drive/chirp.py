@@ -24,8 +24,8 @@ class Chirp(Timed):
 
         w_s(t) = w_0 + (V b omega_1/omega(t)) sin(integral of omega).
 
-    The frequency or its logarithm is linear in time.  After the sweep the frequency stays at its last value; the
-    velocity, not the displacement, has a small jump there.
+    The frequency or its logarithm is linear in time. After the sweep it stays at its last value; there the velocity has
+    a small jump.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Chirp(Timed):
     velocity_amplitude : float
         V.
     sweep_cycles : float
-        Duration over the first period 2 pi/(start_ratio omega_1): the cycles of the run are counted in these.
+        Duration over the first period 2 pi/(start_ratio omega_1), which is a cycle.
     sweep_type : {"linear", "log"}
         Linear or logarithmic increase of the frequency in time.
 

@@ -36,9 +36,8 @@ class BandLimitedNoise(Timed):
 
         w_s(t) = w_0 + E(t) sum_j (a/omega_j) sin(omega_j t + phase_j),    a = V_rms b omega_1 sqrt(2/32),
 
-    with one sine in each equal part of the band.  Frequencies and phases depend only on a counter and the seed, so
-    that a seed gives the same noise on every machine.  After about 32 times the reciprocal of the bandwidth the
-    noise is no longer new.  E rises smoothly.
+    with one sine in each equal part of the band. A seed gives the same noise on every machine, which is new for about
+    32 times the reciprocal of the bandwidth. E rises smoothly.
 
     Parameters
     ----------
@@ -49,7 +48,7 @@ class BandLimitedNoise(Timed):
     seed : int
         0 to 2^31 - 1.
     ramp_up_cycles : float
-        Cycles of the middle of the band in which the noise rises.
+        Cycles of the middle of the band in which E rises.
 
     See Also
     --------

@@ -119,20 +119,19 @@ class RandomVibration(SampledAcceleration):
 
         a(t) = sum_k s_k (A_k cos(2 pi f_k t) + B_k sin(2 pi f_k t)),    s_k^2 = integral of the density around f_k,
 
-    with frequencies f_k in steps of less than half the reciprocal of the duration, so that its variance is the integral of the
-    density.  The displacement begins with a smooth rise if *ramp_up_s* is given; the acceleration is then its second
-    derivative.  A seed gives the same motion in every run.  A cycle is a period of the first mode; a run must end
-    before the duration does.
+    with f_k in steps of less than half the reciprocal of the duration. With *ramp_up_s* the displacement rises
+    smoothly, and the acceleration is its second derivative. A seed gives the same motion in every run. A cycle is a
+    period of the first mode; a run must end before the duration does.
 
     Parameters
     ----------
     psd : array_like of shape (points, 2), or str
-        Break points of the density, Hz and g^2/Hz, with straight lines between them on logarithmic axes and nothing
-        outside; or the name of a spectrum of a standard, such as ``"MIL-STD-810G 514.6E-1"``.
+        Break points, Hz and g^2/Hz, with straight lines between them on logarithmic axes and nothing outside; or the
+        name of a spectrum of a standard, such as ``"MIL-STD-810G 514.6E-1"``.
     duration_s : float
         s.
     rms_g : float, optional
-        Root mean square acceleration, g: scales the density.  By default that of the density as given.
+        Root mean square acceleration, g, to scale the density to.
     seed : int
         0 to 2^31 - 1.
     ramp_up_s : float

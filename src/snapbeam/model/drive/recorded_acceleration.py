@@ -24,17 +24,16 @@ _Array = NDArray[np.float64]
 class RecordedAcceleration(FileKeys, SampledAcceleration):
     """A motion by its measured acceleration, such as that of a shaken base.
 
-    Between samples the acceleration is the cubic spline through all of them.  Velocity and displacement are its exact
-    integrals; the velocity has zero mean over the record, so that the motion ends where it began.  Low frequencies in a
-    record, such as an offset of the sensor, become large displacements: filter them out first if the displacement
-    matters, that is for a striker, or for a base under a striker in space.  A cycle is a period of the first mode.  A run
-    must end before the record does.
+    Between samples the acceleration is a cubic spline; velocity and displacement are its exact integrals. The velocity
+    has zero mean, so that the motion ends where it began. Low frequencies, such as an offset of the sensor, become
+    large displacements: filter them out for a striker, or for a base under a striker in space. A cycle is a period of
+    the first mode. A run must end before the record does.
 
     Parameters
     ----------
     record : array_like of shape (samples,)
-        Acceleration, m/s^2, the first sample at the start of the run; :meth:`from_g` takes g, :meth:`from_file` reads a file,
-        :meth:`from_psd` draws the record of a random vibration.
+        Acceleration, m/s^2, from the start of the run. :meth:`from_g` takes g, :meth:`from_file` a file,
+        :meth:`from_psd` a spectrum.
     sampling_frequency : float
         Samples per second, Hz.
 

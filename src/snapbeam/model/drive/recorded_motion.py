@@ -28,15 +28,14 @@ _SPEED_MARGIN = 1.5
 class RecordedMotion(FileKeys, Drive):
     """A measured motion of the tip, its start-up transient included.
 
-    :meth:`from_file` takes displacement or velocity from a file.  The motion between samples is the cubic that matches displacement and velocity at both; the displacement of the
-    first sample is taken as zero.
+    Between samples the motion is the cubic that matches displacement and velocity at both; the first displacement is
+    taken as zero.
 
     Parameters
     ----------
     displacement, velocity : array_like of shape (samples,)
-        Displacement (m) and velocity (m/s), positive towards the beam's upper well; they must belong
-        together: over each interval the displacement changes by the velocities' mean, within a tenth
-        of the maximum change.
+        Displacement (m) and velocity (m/s), positive towards the upper well. Over each interval the displacement
+        changes by the velocities' mean, within a tenth of the maximum change.
     sampling_frequency : float
         Samples per second, Hz.
     frequency : float

@@ -31,9 +31,8 @@ class Shock(Timed):
         haversine   A (1 - cos(2 pi t/D))/2
         trapezoid   A t/r,  A,  A (D - t)/r,   with the rise time r at both ends
 
-    and zero afterwards.  The body then continues at the velocity that the pulse has given it: 2 A D/pi, A D/2
-    and A (D - r).  Use it as the motion of a base; displacements are in the frame of the base.  A cycle is a
-    period of the first mode.
+    and zero afterwards. The body then continues at the velocity 2 A D/pi, A D/2 or A (D - r). Use it as the motion of a
+    base; displacements are in its frame. A cycle is a period of the first mode.
 
     Parameters
     ----------

@@ -26,12 +26,10 @@ class SumDrive(Timed):
 
         w_s(t) = w_0 + sum_i [w_i(t) - w_i(0)],
 
-    which begins at w_0 without a jump for any phases of the terms.  Use :meth:`of` or ``+`` to create a sum:
-    ``Sine(...) + Burst(...)``.
+    without a jump at w_0. Use :meth:`of` or ``+`` to create a sum: ``Sine(...) + Burst(...)``.
 
-    In parameter files the type of a sum joins those of its terms, ``"sine+burst"``.  The parameters of term i end
-    with its number, counted from 1: ``frequency_ratio_1``, ``duration_cycles_2``.  A cycle is a cycle of the first
-    term.
+    In parameter files its type is ``"sine+burst"``; the parameters of term i end with its number:
+    ``frequency_ratio_1``, ``duration_cycles_2``. A cycle is one of the first term.
 
     See Also
     --------

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     """Read the finished points of a sweep from its checkpoint, also while another process computes the sweep.
 
-    Points that are not finished have the class UNKNOWN and the status NOT_RUN.  If the sweep is refined, the result
-    contains the points of the first grid.
+    Unfinished points have the class UNKNOWN and the status NOT_RUN. Of a refined sweep the result has the first grid.
 
     Parameters
     ----------
@@ -39,7 +38,7 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Dataset as :func:`snapbeam.sweep` returns it, with the attributes ``points_done`` and ``points_total``.
+        Dataset of :func:`snapbeam.sweep`, with the attributes ``points_done`` and ``points_total``.
 
     Raises
     ------
