@@ -262,6 +262,10 @@ def _peak(left: _Array, rate: float, rough: SineFit) -> float | None:
     if spectrum[at] < _LEAST * rough.amplitude or near.sum() < 16:
         return None
     about = float(np.median(spectrum[near] ** 2)) / math.log(2.0)
+    # noise that falls or has a hill is higher at the line than about it
+    away, power = np.log(freq[near] / freq[at]), np.log(spectrum[near] ** 2)
+    course = np.polynomial.polynomial.polyfit(away, power, 2 if away.min() < 0.0 < away.max() else 1)
+    about = max(about, math.exp(course[0] + np.euler_gamma))
     return float(freq[at]) if spectrum[at] ** 2 > _ABOVE * about else None
 
 
@@ -640,7 +644,8 @@ def measure_drive(
     others = tuple(line.frequency for line in (*lines.hum, *lines.beside))
     lead, at, end = np.searchsorted(samples.time, (start - _LEAD * period, start, stop)).tolist()
     whole = samples.part(slice(lead, end))
-    record = Record(steady, part, left, others, times, cycles, early, whole, at - lead, clipping.found)
+    still = samples.values[: at - round(period * samples.sampling_frequency)] if before else samples.values[:0]
+    record = Record(steady, part, left, others, times, cycles, early, still, whole, at - lead, clipping.found)
     errors = find_errors(record)
     kinds = {one.kind for one in errors if one.matters}
     if kinds & {"samples_lost", "beat", "interpolated", "gain", "sign", "few_bits"}:
