@@ -253,7 +253,8 @@ def _jumps(record: Record) -> list[Hypothesis]:
             time = float(record.times[0] + (k + _CONSTANT - record.early.size) / record.fit.frequency)
             numbers = {"at": time, "ratio": float(abs(after[k]) / abs(before[k]))}
             gain = 0.5 * _CONSTANT * float(jump[k]) ** 2 / sd**2
-            if kind == "sign" or _at_once(record, time):
+            starts = kind == "gain" and numbers["ratio"] > 1.0 and k + _CONSTANT - record.early.size < _START
+            if not starts or _at_once(record, time):
                 told.append(Hypothesis(kind, gain, 3, max(*off, 0.01), numbers=numbers))
     return told
 
@@ -283,7 +284,7 @@ def _at_once(record: Record, at: float) -> bool:
     middles = np.arange(-0.5, 1.5, max(1.0 / 40.0, one))
     about = middles[int(np.argmin(left(one / 2.0, middles)))]
     step = float(left(one / 2.0, about + np.arange(-1.0 / 40.0, 1.0 / 40.0 + one, one)).min())
-    noise = max(step / max(cycles.size - 13, 1), record.fit.noise_rms**2)
+    noise = step / max(cycles.size - 13, 1) + 1e-12 * record.fit.amplitude**2
     return step - min(left(length, middles).min() for length in (0.25, 0.5, 1.0, 1.5, 2.0)) < -_AHEAD * noise
 
 
