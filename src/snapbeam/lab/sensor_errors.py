@@ -523,18 +523,17 @@ def _noise_misfit(record: Record) -> Callable[[_Filter | None], _Array]:
     # a start that is not over is no noise
     wave = np.exp(2j * math.pi * drive / rate * np.arange(n)[:, None] - np.linspace(0.0, 1.0, n)[:, None] * _FADES)
     late = np.hstack([wave.real, wave.imag])
-    spectra = [_noise_lines(record, one) for one in (left - late @ solve(late, left), record.rest)]
-    spectra = [one for one in spectra if one is not None]
+    found = (_noise_lines(record, one) for one in (left - late @ solve(late, left), record.rest))
+    spectra = [one for one in found if one is not None]
     if not spectra:
         return lambda one: np.zeros(1)  # a computed signal has no noise that a filter shapes
-    parts = [
-        (*one, (colours := _colours(one[0] / drive)), one[2] / colours, np.log(colours) @ one[2]) for one in spectra
-    ]
-    falling = parts[0][4][:, 0] >= parts[0][4][:, -1]
+    colours = [_colours(freq / drive) for freq, *_ in spectra]
+    falling = colours[0][:, 0] >= colours[0][:, -1]
+    weighed = [(count / one, np.log(one) @ count) for one, (_, _, count, _) in zip(colours, spectra, strict=True)]
 
     def misfit(one: _Filter | None) -> _Array:
         total = np.zeros(falling.size)
-        for freq, power, count, lines, _, weights, shapes in parts:
+        for (freq, power, count, lines), (weights, shapes) in zip(spectra, weighed, strict=True):
             kept = np.ones_like(freq) if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
             likely = count.sum() * np.log(weights @ (power / kept) / count.sum()) + shapes + count @ np.log(kept)
             total += 2.0 / lines * likely
