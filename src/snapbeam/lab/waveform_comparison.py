@@ -455,7 +455,7 @@ def measure_response(
     >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
     >>> run = sb.simulate(system, sb.Integration(cycles=20))
     >>> lab.measure_response(run.dataset, cycles=20).zero_crossings
-    15
+    16
     """
     choice("at", at, _PLACES)
     check_trajectory(run, require=(at,))
