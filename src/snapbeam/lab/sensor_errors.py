@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 from scipy.signal import butter, lfilter
 from scipy.signal.windows import tukey
-from scipy.stats import chi2
+from scipy.special import logsumexp
+from scipy.stats import chi2, norm
 
 from snapbeam.lab.decay.poles import Line
 from snapbeam.lab.diagnostics import KINDS_VIBROMETER
@@ -40,13 +41,15 @@ _CHANGES = 0.02  # of the amplitude, or rad, by which a steady motion may change
 _EXPLAINS = 0.75  # of the odd harmonics that a curve must explain
 _START = 20.0  # cycles of the start that a filter shapes
 _CONTRADICTS = 40.0  # chi-square of what a start or a drive that no model describes to the noise leaves
+_HOLE = 0.2  # of what a start shows of a notch, which noise without its hole may contradict
 _SPREADS = 2.0  # standard deviations of chi-square that a start leaves by chance
-_DESCRIBED = 1.2  # times its noise up to which what a start leaves is noise
 _PASSES = 0.05  # of the drive that a filter must let pass for it to be seen at all
 _BETWEEN = 0.02  # of a start, which filters between those that are tried leave
-_POSSIBLE = 3.0  # chi-square by which a filter may be worse than none, or than the best, and be there
-_SHOWS = 12.0  # chi-square by which noise or start alone show a filter, whatever the other says
-_UNSEEN = 0.002  # of the amplitude, up to which a filter that nothing shows is not thought of
+_CERTAIN = 20.0  # logarithm of the odds that noise or start alone may give
+_BELIEVED = 0.25  # of the chi-square of a start, for starts are of more kinds than those that are modelled
+_RARE = 0.02  # probability of a loss, up to which a standard error need not hold it
+_WHITE = 0.2  # probability of white noise
+_UNSEEN = 0.2  # of the standard error, up to which a filter that nothing shows is not thought of
 _BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
 _CONSTANT = 4  # cycles on either side of a jump
 _FADES = (8.0, 30.0)  # rates of starts that are not over, over the length
@@ -117,7 +120,7 @@ def one_sided(samples: SignalSamples, rest: int, first: int, last: int, fit: Sin
 class Record(NamedTuple):
     """A record as detectors see it: its steady part, the sine fitted to it and what that leaves, and its cycles.
 
-    ``early`` are the cycles before its start, ``moving`` the record from there on.
+    ``early`` are the cycles before its start, ``rest`` its samples there, ``moving`` those from ``lead`` before it on.
     """
 
     fit: SineFit
@@ -127,7 +130,9 @@ class Record(NamedTuple):
     times: _Array
     cycles: NDArray[np.complex128]
     early: NDArray[np.complex128]
+    rest: _Array
     moving: SignalSamples
+    lead: int
     clipped: bool
 
 
@@ -248,8 +253,39 @@ def _jumps(record: Record) -> list[Hypothesis]:
             time = float(record.times[0] + (k + _CONSTANT - record.early.size) / record.fit.frequency)
             numbers = {"at": time, "ratio": float(abs(after[k]) / abs(before[k]))}
             gain = 0.5 * _CONSTANT * float(jump[k]) ** 2 / sd**2
-            told.append(Hypothesis(kind, gain, 3, max(*off, 0.01), numbers=numbers))
+            starts = kind == "gain" and numbers["ratio"] > 1.0 and k + _CONSTANT - record.early.size < _START
+            if not starts or _at_once(record, time):
+                told.append(Hypothesis(kind, gain, 3, max(*off, 0.01), numbers=numbers))
     return told
+
+
+def _at_once(record: Record, at: float) -> bool:
+    """True if an amplitude changes from sample to sample about a time [s], as behind a switch, and rises over no part of a cycle.
+
+    A shaker's start that pauses rises again as its control lets it.
+    """
+    drive = record.fit.frequency
+    inside = np.abs(record.moving.time - at - 0.5 / drive) < 2.0 / drive
+    cycles, values = (record.moving.time[inside] - at) * drive, record.moving.values[inside]
+    if cycles.size < 16:
+        return True
+    waves = sines(cycles, [1.0, 2.0, 3.0])
+
+    def left(length: float, middles: _Array) -> _Array:
+        rests = []
+        for middle in middles:
+            late = np.clip((cycles - middle) / length + 0.5, 0.0, 1.0)[:, None]
+            design = np.hstack([waves * (1.0 - late), waves[:, 1:] * late])
+            rest = values - design @ solve(design, values)
+            rests.append(float(rest @ rest))
+        return np.array(rests)
+
+    one = drive / record.moving.sampling_frequency
+    middles = np.arange(-0.5, 1.5, max(1.0 / 40.0, one))
+    about = middles[int(np.argmin(left(one / 2.0, middles)))]
+    step = float(left(one / 2.0, about + np.arange(-1.0 / 40.0, 1.0 / 40.0 + one, one)).min())
+    noise = step / max(cycles.size - 13, 1) + 1e-12 * record.fit.amplitude**2
+    return step - min(left(length, middles).min() for length in (0.25, 0.5, 1.0, 1.5, 2.0)) < -_AHEAD * noise
 
 
 @functools.cache
@@ -362,7 +398,7 @@ def _filters(record: Record) -> list[Hypothesis]:
     """
     drive = record.fit.frequency
     noise = _noise_misfit(record)
-    plain = noise(None, False)
+    plain = float(noise(None).min())
     # behind a notch at its own frequency the drive is gone but for the change of its amplitude, and it is there
     candidates = [one for one in _candidates(drive) if abs(one.response(drive)) > _PASSES]
     start, certain = _start_gains(record, candidates)
@@ -379,10 +415,10 @@ def _filters(record: Record) -> list[Hypothesis]:
             "wanted": 20.0 * drive,
             "delay_ms": 1e3 * order / (2.0 * math.pi * one.centre),
         }
-        shown = plain - noise(one, False)
+        shown = plain - float(noise(one).min())
         # a notch rings where its noise has a hole
-        seen = one.kind == "notch" or shown > -_CONTRADICTS
-        gain = shown + max(gain, -_CONTRADICTS) if seen else shown
+        seen = shown > (-_HOLE * max(gain, 0.0) if one.kind == "notch" else -_CONTRADICTS)
+        gain = shown + max(gain, -_CONTRADICTS) if seen else min(shown, 0.0)
         # what the start alone shows may be the shaker's own: it is in the standard error, and not told
         own = shown < limit and (one.kind == "high_pass" or (one.kind == "notch" and certain < _CONTRADICTS))
         told.append(Hypothesis("" if own else one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
@@ -390,53 +426,60 @@ def _filters(record: Record) -> list[Hypothesis]:
 
 
 def _hidden_filters(record: Record) -> list[Hypothesis]:
-    """The largest loss by a high-pass that noise and start do not exclude: in the standard error, and no doubt.
+    """The loss by a high-pass that noise and start do not exclude: in the standard error, and no doubt.
 
-    It is possible where both together are not against it, or where one of them shows it, whatever the other says: noise
-    may hold the end of a transient, and a start may be of any kind, so what no filter explains of it excuses one.  White
-    noise behind a filter was coloured with the filter's own corner, a coincidence that is as rare as the filter would
-    have coloured white noise much: the loss is taken with the root of that probability.
+    It is the root of the mean square of what a filter takes, each as probable as noise and start make it, for as many
+    records behind one as others, and at least such that no loss of some probability is rarer by the standard error.  The colour of the noise is any of those tried, so what noise behind a filter shows, white
+    most of all, has little weight where it takes the one colour that the filter makes look so.  What no filter explains of a
+    start excuses one, for it is of a kind that is not modelled.
     """
     if not record.early.size:
         return []
     drive = record.fit.frequency
     filters = [one for one in _candidates(drive) if one.kind == "high_pass"]
     misfit = _noise_misfit(record)
-    noise = np.array([misfit(one, False) for one in filters]) - misfit(None, False)
+    noise = np.array([_weight(misfit(one)) for one in (None, *filters)])
     start, unexplained, freedom = _free_start(record, filters)
-    described = 1.0 + unexplained / freedom
     excused = min(float(start.min()), 0.0) + max(unexplained - _SPREADS * math.sqrt(2.0 * freedom), 0.0)
     against = np.maximum(start, excused) - max(0.0, excused)
-    both = np.minimum(noise, _CONTRADICTS) + np.maximum(against, -_CONTRADICTS)
-    possible = both < min(float(both.min()), 0.0) + _POSSIBLE
-    possible |= noise < min(float(noise.min()) + _POSSIBLE, -_SHOWS)
-    possible |= start < min(float(start.min()) + _POSSIBLE + unexplained, -_SHOWS)
-    possible &= (noise < _CONTRADICTS) | ((start < -_CONTRADICTS) & (described < _DESCRIBED))
+    odds = sum(np.clip(one, -_CERTAIN, _CERTAIN) for one in (noise[1:] - noise[0], -0.5 * _BELIEVED * against))
+    odds = np.exp(odds) / len(filters)
     loss = np.array([1.0 / abs(one.response(drive)) - 1.0 for one in filters])
-    taken = np.where(possible, loss, 0.0)
-    if misfit(None, True) - misfit(None, False) < _SHOWS:
-        white = np.array([misfit(one, True) for one in filters]) - misfit(None, True)
-        taken *= np.sqrt(_SHOWS / np.maximum(white, _SHOWS))
-    most = int(np.argmax(taken))
-    if taken[most] < _UNSEEN:
+    odds /= 1.0 + odds.sum()
+    share = odds * loss**2
+    beyond = odds[::-1].cumsum()[::-1]
+    held = loss[beyond > _RARE] / np.maximum(norm.isf(0.5 * beyond[beyond > _RARE]), 1.0)
+    taken = max(math.sqrt(float(share.sum())), float(held.max(initial=0.0)))
+    if taken < _UNSEEN * record.fit.amplitude_se / record.fit.amplitude:
         return []
-    numbers = {"corner": filters[most].centre, "limit": 0.05 * drive}
-    numbers |= {"loss_percent": 100.0 * loss[most] / (1.0 + loss[most]), "taken_percent": 100.0 * taken[most]}
-    return [Hypothesis("high_pass_possible", math.inf, 1, float(taken[most]), numbers=numbers)]
+    most = int(np.argmax(share))
+    numbers = {"corner": filters[most].centre, "limit": 0.05 * drive, "taken_percent": 100.0 * taken}
+    numbers["loss_percent"] = 100.0 * float(loss[most] / (1.0 + loss[most]))
+    return [Hypothesis("high_pass_possible", math.inf, 1, taken, numbers=numbers)]
+
+
+def _weight(misfit: _Array) -> float:
+    """Logarithm of the likelihood of noise, by its misfit with each colour, the first of which is white."""
+    weights = np.full(misfit.size, (1.0 - _WHITE) / max(misfit.size - 1, 1))
+    weights[0] = _WHITE
+    return float(logsumexp(-0.5 * misfit, b=weights)) if misfit.size > 1 else 0.0
 
 
 def _free_start(record: Record, filters: list[_Filter]) -> tuple[_Array, float, int]:
     """Chi-square by which filters fit the first cycles worse than none, what the best leaves beyond noise, and the freedom.
 
     The motion behind each is a sine of any amplitude and phase that change over a cycle: its start at once, the tail behind
-    a filter is no such sine.  Noise is what the same sine leaves of the end of the record.
+    a filter is no such sine.  It starts within a few samples of the onset, for those that a late one leaves out are all that a
+    filter has seen before.  Noise is what the same sine leaves of the end of the record.
     """
     fit, moving = record.fit, record.moving
     every = max(int(moving.sampling_frequency / (40.0 * fit.frequency)), 1)
-    size = min(int(_START * moving.sampling_frequency / fit.frequency), moving.values.size) // every
+    ahead = record.lead // every
+    begin = record.lead - ahead * every
+    size = min(int(_START * moving.sampling_frequency / fit.frequency), moving.values.size - begin) // every
     first, last = (
         (part - fit.offset).reshape(size, every).mean(1)
-        for part in (moving.values[: size * every], moving.values[-size * every :])
+        for part in (moving.values[begin : begin + size * every], moving.values[-size * every :])
     )
     rate = moving.sampling_frequency / every
     cycles = np.arange(size) * fit.frequency / rate
@@ -445,71 +488,99 @@ def _free_start(record: Record, filters: list[_Filter]) -> tuple[_Array, float, 
     course = BSpline.design_matrix(inside, np.pad(knots, 3, mode="edge"), 3).toarray()
     turn = np.exp(2j * math.pi * cycles)[:, None]
     waves = np.hstack([course * turn, turn**2, turn**3])
-    columns = np.hstack([waves.real, waves.imag])
-    freedom = size - columns.shape[1] - 2
+    # what it does within the sample in which it starts
+    columns = np.hstack([waves.real, waves.imag, np.eye(size, 1)])
+    freedom = size - columns.shape[1] - 1
     if freedom < 100:
         return np.zeros(len(filters)), 0.0, 1
 
-    def left(values: _Array, one: _Filter | None) -> float:
+    def left(values: _Array, one: _Filter | None, starts: range = range(1)) -> float:
         passed = columns if one is None else one.passed(columns, rate)
-        own = np.linalg.qr(np.hstack([passed, np.ones((size, 1))]))[0]
-        rest = (values - own @ (own.T @ values))[1:]
-        return float(rest @ rest)
+        rests = []
+        for late in starts:
+            design = np.vstack([np.zeros((late, columns.shape[1])), passed[: size - late]])
+            own = np.linalg.qr(np.hstack([design, np.ones((size, 1))]))[0]
+            rest = values - own @ (own.T @ values)
+            rests.append(float(rest @ rest))
+        return min(rests)
 
-    plain = left(first, None)
+    starts = range(ahead + 2)
+    plain = left(first, None, starts)
     colour = noise_colour(record.left, moving.sampling_frequency, fit.frequency) ** 2
     unit = colour * max(left(last, None) / freedom, 1e-12 * fit.amplitude**2)
-    worse = (np.array([left(first, one) for one in filters]) - plain) / unit
+    worse = (np.array([left(first, one, starts) for one in filters]) - plain) / unit
     return worse, max(plain / unit - freedom / colour + min(float(worse.min()), 0.0), 0.0), freedom
 
 
-def _noise_misfit(record: Record) -> Callable[[_Filter | None, bool], float]:
-    """Twice the negative logarithm of Whittle's likelihood of the noise behind a response, least over its colours.
+def _noise_misfit(record: Record) -> Callable[[_Filter | None], _Array]:
+    """Twice the negative logarithm of Whittle's likelihood of the noise behind a response, for each of its colours.
 
-    The function that is returned takes the response, and True for noise that is white before it.
+    It is that of the noise beside the motion and of the noise at rest, of one colour and any strengths.  The first is white.
     """
     rate, drive = record.part.sampling_frequency, record.fit.frequency
     left = record.left[min(round(_TAIL * rate / drive), record.left.size // 4) :]
     n = left.size
-    freq = np.fft.rfftfreq(n, 1.0 / rate)
     # a start that is not over is no noise
     wave = np.exp(2j * math.pi * drive / rate * np.arange(n)[:, None] - np.linspace(0.0, 1.0, n)[:, None] * _FADES)
     late = np.hstack([wave.real, wave.imag])
-    left = left - late @ solve(late, left)
+    found = (_noise_lines(record, one) for one in (left - late @ solve(late, left), record.rest))
+    spectra = [one for one in found if one is not None]
+    if not spectra:
+        return lambda one: np.zeros(1)  # a computed signal has no noise that a filter shapes
+    colours = [_colours(freq / drive) for freq, *_ in spectra]
+    falling = colours[0][:, 0] >= colours[0][:, -1]
+    weighed = [(count / one, np.log(one) @ count) for one, (_, _, count, _) in zip(colours, spectra, strict=True)]
+
+    def misfit(one: _Filter | None) -> _Array:
+        total = np.zeros(falling.size)
+        for (freq, power, count, lines), (weights, shapes) in zip(spectra, weighed, strict=True):
+            kept = np.ones_like(freq) if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
+            likely = count.sum() * np.log(weights @ (power / kept) / count.sum()) + shapes + count @ np.log(kept)
+            total += 2.0 / lines * likely
+        if one is not None and one.kind == "low_pass":
+            total[~falling] = np.inf  # noise that rises and is filtered again would explain any hill
+        return total
+
+    return misfit
+
+
+def _noise_lines(record: Record, noise: _Array) -> tuple[_Array, _Array, _Array, float] | None:
+    """Frequencies, power and number of the lines of a noise, those of the motion left out, and lines over independent ones.
+
+    None where there are too few.
+    """
+    rate, drive, n = record.part.sampling_frequency, record.fit.frequency, noise.size
+    if n < 2 * _LINES:
+        return None
+    freq = np.fft.rfftfreq(n, 1.0 / rate)
     # without a taper, steep noise leaks from high frequencies over all lines
     taper = tukey(n, 0.6)
-    lines = n * float((taper**4).sum()) / float((taper**2).sum()) ** 2  # over those that are independent
-    power = np.abs(np.fft.rfft(left * taper)) ** 2
+    lines = n * float((taper**4).sum()) / float((taper**2).sum()) ** 2
+    power = np.abs(np.fft.rfft((noise - noise.mean()) * taper)) ** 2
     used = (freq > 2.5 * rate / n) & (freq < min(12.0 * drive, 0.4 * rate))
     for line in (*record.lines, *(drive * np.arange(1, 13))):
         used &= np.abs(freq - line) > 1.5 * rate / n
     freq, power = freq[used], power[used]
     if freq.size < 2 * _LINES or not power.min() > 1e-18 * n * record.fit.amplitude**2:
-        return lambda one, white: 0.0  # a computed signal has no noise that a filter shapes
+        return None
     # neighbours that differ in frequency by less than 1 % are averaged
     steps = np.arange(math.log(freq[-1] / freq[0]) / 0.00996)
     edges = np.unique(np.searchsorted(freq, freq[0] * 1.01**steps))
     count = np.diff(np.append(edges, freq.size))
-    freq, power = np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count
+    return np.add.reduceat(freq, edges) / count, np.add.reduceat(power, edges) / count, count, lines
+
+
+def _colours(freq: _Array) -> _Array:
+    """Power of noise of many colours, the first of which is white, over frequency in that of the drive."""
     slope, white = np.meshgrid(np.linspace(-2.0, 2.0, 65), [0.0, *np.geomspace(0.03, 30.0, 13)])
-    colours = (freq / drive) ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
+    straight = freq ** -slope.reshape(-1, 1) + white.reshape(-1, 1)
     slope, knee = np.meshgrid([0.5, 1.0], np.geomspace(0.03, 3.0, 17))
-    bent = ((freq / drive) ** 2 + knee.reshape(-1, 1) ** 2) ** (-0.5 * slope.reshape(-1, 1))
-    colours = np.vstack([np.ones_like(freq), colours, bent])
-    falling = colours[:, 0] >= colours[:, -1]
-    shapes = np.log(colours) @ count
-    weights = count / colours
-
-    def misfit(one: _Filter | None, white: bool) -> float:
-        kept = np.ones_like(freq) if one is None else np.maximum(np.abs(one.response(freq)) ** 2, 1e-4)
-        total = count.sum() * np.log(weights @ (power / kept) / count.sum()) + shapes
-        if white:
-            total = total[:1]
-        elif one is not None and one.kind == "low_pass":
-            total = total[falling]  # noise that rises and is filtered again would explain any hill
-        return 2.0 / lines * (float(total.min()) + float(count @ np.log(kept)))
-
-    return misfit
+    bent = (freq**2 + knee.reshape(-1, 1) ** 2) ** (-0.5 * slope.reshape(-1, 1))
+    # a resonance of the bench
+    height, width, centre = np.meshgrid([1.0, 3.0, 10.0], [0.25, 0.5, 1.0], np.geomspace(0.1, 12.0, 24))
+    away = np.log(freq / centre.reshape(-1, 1)) / width.reshape(-1, 1)
+    humps = 1.0 + height.reshape(-1, 1) * np.exp(-0.5 * away**2)
+    return np.vstack([np.ones_like(freq), straight, bent, humps])
 
 
 def _start_gains(record: Record, filters: list[_Filter]) -> tuple[list[float], float]:
@@ -518,7 +589,7 @@ def _start_gains(record: Record, filters: list[_Filter]) -> tuple[list[float], f
     A low-pass makes a start alike to a gentle one, so it is not judged by it.  With it, what the best notch explains
     whatever the shape of the start is.
     """
-    fit, moving = record.fit, record.moving
+    fit, moving = record.fit, record.moving.part(slice(record.lead, None))
     every = max(int(moving.sampling_frequency / (40.0 * fit.frequency)), 1)
     count = min(int(_START * moving.sampling_frequency / fit.frequency), moving.values.size)
     time = moving.time[:count:every] - moving.time[0]

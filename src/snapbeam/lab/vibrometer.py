@@ -65,6 +65,7 @@ SNR_LIMIT = 15.0
 _STEADY = 0.03  # share by which the cycles of a steady motion may stray
 _SAME_LINE = 0.02  # of the frequency by which the highest line may differ
 _BRIDGED = 5  # frames
+_LEAD = 0.1  # cycles by which a start may lie before its onset
 
 
 def _late_fit(samples: SignalSamples, first: int, last: int, frequency: float) -> SineFit:
@@ -261,6 +262,10 @@ def _peak(left: _Array, rate: float, rough: SineFit) -> float | None:
     if spectrum[at] < _LEAST * rough.amplitude or near.sum() < 16:
         return None
     about = float(np.median(spectrum[near] ** 2)) / math.log(2.0)
+    # noise that falls or has a hill is higher at the line than about it
+    away, power = np.log(freq[near] / freq[at]), np.log(spectrum[near] ** 2)
+    course = np.polynomial.polynomial.polyfit(away, power, 2 if away.min() < 0.0 < away.max() else 1)
+    about = max(about, math.exp(course[0] + np.euler_gamma))
     return float(freq[at]) if spectrum[at] ** 2 > _ABOVE * about else None
 
 
@@ -637,8 +642,10 @@ def measure_drive(
     left = part.values - steady.waveform(part.time)
     left[~sound_samples(left.size, flaws)] = 0.0
     others = tuple(line.frequency for line in (*lines.hum, *lines.beside))
-    whole = samples.part(slice(*np.searchsorted(samples.time, (start, stop)).tolist()))
-    record = Record(steady, part, left, others, times, cycles, early, whole, clipping.found)
+    lead, at, end = np.searchsorted(samples.time, (start - _LEAD * period, start, stop)).tolist()
+    whole = samples.part(slice(lead, end))
+    still = samples.values[: at - round(period * samples.sampling_frequency)] if before else samples.values[:0]
+    record = Record(steady, part, left, others, times, cycles, early, still, whole, at - lead, clipping.found)
     errors = find_errors(record)
     kinds = {one.kind for one in errors if one.matters}
     if kinds & {"samples_lost", "beat", "interpolated", "gain", "sign", "few_bits"}:

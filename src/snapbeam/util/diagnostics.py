@@ -164,7 +164,7 @@ def diagnostics_of(result: Any) -> tuple[Diagnostic, ...]:
     >>> velocity = lab.render_vibrometer(100.0, 7e-3, duration=0.5)  # 100 Hz, 7 mm/s
     >>> drive = lab.measure_drive(velocity, 100.0)
     >>> [each.code for each in lab.diagnostics_of(drive)]
-    []
+    ['vibrometer.high_pass_possible']
     """
     own = getattr(result, "diagnostics", None)
     if isinstance(own, tuple):

@@ -183,6 +183,8 @@ _CLIPPED_SHIFT = 0.5  # px by which the edge of an overexposed object may lie of
 _STEP = 0.25  # px
 _REACH = 5.0
 _LEAST = 200  # windows
+_MIRRORED = 5e-4  # of the contrast to which the halves of an edge are alike
+_GRAIN = 4  # columns that share a grain of texture
 _CERTAIN = 30.0  # chi-square by which a bent edge must be worse than a straight one
 _LIKELY = 0.4  # |log gamma| of a curve that is taken before stronger ones
 _CENTRES = 24  # tried on either side of 0
@@ -208,8 +210,8 @@ def edge_shape(
     level = (data * sign).mean(-1) - contrast * model.mean(-1)
     share = (data * sign - level[:, None]) / contrast[:, None]
     places = np.stack(np.nonzero(good))
-    groups = (places[0], places[1], np.floor(centre[good] - centre[good].min()).astype(np.intp))
-    x, y, error = _binned(offset, share, groups)
+    groups = (places[0], places[1] // _GRAIN, np.floor(centre[good] - centre[good].min()).astype(np.intp))
+    x, y, error, by_grain = _binned(offset, share, groups)
     if x.size < 24 or clipped > CLIPPED:
         return unknown
     misfit = float(np.sqrt(np.mean((y - edge_profile(x, width)) ** 2)))
@@ -217,14 +219,16 @@ def edge_shape(
     ratio = float(np.median(dark / contrast))  # the dark side's grey level over the contrast
     if not ratio > 1e-3:
         return EdgeShape(misfit, math.nan, math.nan, 0.0, clipped)
-    gamma, error_of_gamma, shift = _symmetry(x, y, error, ratio, sign)
+    gamma, error_of_gamma, shift = _symmetry(x, y, error, ratio, sign, _together(x, error, by_grain))
     return EdgeShape(misfit, gamma, error_of_gamma, shift, clipped)
 
 
-def _symmetry(x: Floats, y: Floats, error: Floats, ratio: float, sign: float) -> tuple[float, float, float]:
+def _symmetry(
+    x: Floats, y: Floats, error: Floats, ratio: float, sign: float, together: float
+) -> tuple[float, float, float]:
     """Gamma that makes the edge symmetric in light, its standard error, and where its centre then lies.
 
-    The centre is 0 where a linear camera will do.
+    The centre is 0 where a linear camera will do.  *together* is the chi-square of one degree of freedom by texture.
     """
     outer = np.abs(x) > 0.8 * np.abs(x).max()
     low, high = float(y[outer & (x < 0.0)].mean()), float(y[outer & (x > 0.0)].mean())
@@ -233,14 +237,14 @@ def _symmetry(x: Floats, y: Floats, error: Floats, ratio: float, sign: float) ->
     scatter, centres = found[:, 0], found[:, 1]
     best = int(np.argmin(scatter))
     freedom = max(float(np.count_nonzero((x > 0.0) & (x < 4.0))) - 2.0, 1.0)
-    unit = max(1.0, scatter[best] / freedom)
+    unit = max(together, scatter[best] / freedom)
     # a strong curve can bend one symmetric edge into another: one near 1 that does as well is the likelier, if curves
     # on both sides of it do worse; where they only get worse towards 1, the strong one is what bent the edge
     likely = np.flatnonzero(np.abs(np.log(_GAMMAS)) < _LIKELY)
     other = int(likely[np.argmin(scatter[likely])])
     least = scatter[other] <= scatter[[other - 1, other + 1]].min()
     if least and (scatter[other] - scatter[best]) / unit < _CERTAIN:
-        best, unit = other, max(1.0, scatter[other] / freedom)
+        best, unit = other, max(together, scatter[other] / freedom)
     worse = (float(np.interp(0.0, np.log(_GAMMAS), scatter)) - scatter[best]) / unit
     alike = np.abs(scatter - scatter[best]) / unit < 1.0
     spread = np.log(_GAMMAS[alike & (np.abs(np.log(_GAMMAS / _GAMMAS[best])) < _LIKELY)])
@@ -260,6 +264,20 @@ def _light(y: Floats, error: Floats, gamma: float, ratio: float, sign: float) ->
     return (light if sign > 0 else 1.0 - light), error * slope
 
 
+def _together(x: Floats, error: Floats, by_grain: Floats) -> float:
+    """Chi-square of one degree of freedom of an edge's asymmetry, more than 1 where texture moves many steps together.
+
+    Grains (the columns of *by_grain*) with random signs are an edge by texture alone: the variance of its chi-square over
+    that of independent steps.
+    """
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (by_grain.shape[1], 128))
+    away = np.arange(0.5, 4.0 / _STEP) * _STEP
+    halves = [np.stack([np.interp(side, x, one) for one in (by_grain @ signs).T]) for side in (away, -away)]
+    spread = np.hypot(*(np.interp(side, x, error) for side in (away, -away)))
+    chi = ((halves[0] + halves[1]) ** 2 / (spread**2 + _MIRRORED**2)).sum(1)
+    return max(float(np.var(chi)) / (2.0 * away.size), 1.0)
+
+
 def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
     """Chi-square of an edge turned about its centre against itself, minimum over the centre, and the centre."""
     away = np.arange(0.5, 4.0 / _STEP) * _STEP
@@ -267,7 +285,7 @@ def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
     def chi(centre: float) -> float:
         total = np.interp(centre + away, x, light) + np.interp(centre - away, x, light) - 1.0
         spread = np.hypot(np.interp(centre + away, x, error), np.interp(centre - away, x, error))
-        return float(np.sum((total / np.hypot(spread, 5e-4)) ** 2))
+        return float(np.sum((total / np.hypot(spread, _MIRRORED)) ** 2))
 
     near = min(np.linspace(-0.8, 0.8, 2 * _CENTRES + 1), key=chi)
     step = 0.8 / _CENTRES
@@ -275,10 +293,12 @@ def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
     return float(found.fun), float(found.x)
 
 
-def _binned(offset: Floats, share: Floats, groups: tuple[NDArray[np.intp], ...]) -> tuple[Floats, Floats, Floats]:
-    """Mean offset, mean share and its standard error in steps of a fraction of a pixel.
+def _binned(
+    offset: Floats, share: Floats, groups: tuple[NDArray[np.intp], ...]
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Mean offset, mean share, its standard error and what each of the second groups gives, in steps of a fraction of a pixel.
 
-    Windows of one frame, one column or one row may be off together, by uneven light, speckle or noise of rows: the
+    Windows of one frame, of columns side by side or of one row may be off together, by uneven light, texture or noise: the
     error is the largest of those with the windows of a group as one.
     """
     index = np.floor((offset + _REACH) / _STEP).astype(int)
@@ -291,11 +311,13 @@ def _binned(offset: Floats, share: Floats, groups: tuple[NDArray[np.intp], ...])
     mean_x, mean = np.bincount(index, x) / total, np.bincount(index, y) / total
     off = y - mean[index]
     error = np.sqrt(np.bincount(index, off**2)) / total
+    parts = []
     for owner in owners:
         step = int(owner.max()) + 1
         together = np.bincount(index * step + owner, off, minlength=count.size * step).reshape(-1, step)
-        error = np.maximum(error, np.sqrt((together**2).sum(1)) / total)
-    return mean_x[full], mean[full], error[full]
+        parts.append(together / total[:, None])
+        error = np.maximum(error, np.sqrt((parts[-1] ** 2).sum(1)))
+    return mean_x[full], mean[full], error[full], parts[1][full]
 
 
 # ----------------------------------------------------------------------------------------------------
