@@ -15,7 +15,7 @@
 
 namespace SNAPBEAM_SET {
 
-constexpr double GRADING = 0.5, RELEASE = 0.5, CONTACT_TURN = 0.5, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
+constexpr double GRADING = 0.5, RELEASE = 0.5, CONTACT_TURN = 0.35, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 template <class L> constexpr int MOST_CORRECTIONS = L::directions > 0 ? 30 : CORRECTIONS;  // of a state the error is of second order, of derivatives of first
 
