@@ -164,7 +164,7 @@ SLOW: dict[str, Callable[[], xr.Dataset]] = {
     "sensitivity indices": lambda: sb.uncertainty.sensitivity(
         CHAOTIC, "peak_force", SPREAD, "sobol", samples=64, integration=SHORT
     ),
-    "gradient": lambda: sb.uncertainty.gradient(CHAOTIC, "peak_force", ["contact.stiffness", "location"], integration=SHORT),
+    "gradient": lambda: sb.uncertainty.gradient(SYSTEM, "peak_force", ["contact.stiffness", "location"], integration=SHORT),
     "gradients of several statistics": lambda: sb.uncertainty.gradient(
         SYSTEM, ["peak_force", "impacts", "rms_midspan_displacement", "striker_work"],
         ["contact.stiffness", "location", "velocity_amplitude"], integration=SHORT,

@@ -15,7 +15,8 @@
 
 namespace SNAPBEAM_SET {
 
-constexpr double GRADING = 0.5, RELEASE = 0.5, CONTACT_TURN = 0.35, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
+constexpr double GRADING = 0.5, RELEASE = 0.5, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
+constexpr double CONTACT_TURN[3] = {0.5, 0.35, 0.35};  // of each composition
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 template <class L> constexpr int MOST_CORRECTIONS = L::directions > 0 ? 30 : CORRECTIONS;  // of a state the error is of second order, of derivatives of first
 
@@ -394,7 +395,7 @@ template <class L> struct Group {
             const Channel<L> &c = z.channel[j];
             if (c.timed || c.circuit || (c.contact && !any(c.closed))) continue;
             const Real stiffness = with_law(c.law, [&](auto law) { return value(law.stiffness(c.contact ? max(c.d0, Number(0.0)) : c.x, c.numbers())); });
-            const Real by_stiffness = Real(CONTACT_TURN) / (sqrt(max(stiffness * value(c.M[j]), Real(1e-300))) * z.tick);
+            const Real by_stiffness = Real(CONTACT_TURN[problem->composition]) / (sqrt(max(stiffness * value(c.M[j]), Real(1e-300))) * z.tick);
             if (!c.contact) {
                 // towards the end of its range, where a force may be infinite, a share of the way
                 const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.numbers()) - c.x, c.x - law.low(c.numbers())); });

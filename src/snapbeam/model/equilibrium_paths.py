@@ -42,7 +42,7 @@ _CONVERGED = 1e-12
 _BALANCED = 1e-15
 """Residual over the forces of the structure, up to which it is rounding."""
 _STALE = 1e-3
-"""Step of Newton's method, scaled, up to which the derivative by the parameter is not computed anew."""
+"""Step of Newton's method, scaled, up to which the derivative by the parameter is kept."""
 _UNCOUPLED = 1e-6
 """Share of the row of the force in the direction that loses its stiffness, up to which a path branches off there."""
 _ASIDE = 4e-3
