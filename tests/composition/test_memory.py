@@ -26,11 +26,11 @@ for seed in map(int, sys.argv[2:]):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the C library of Linux fills memory on request")
 def test_memory_changes_no_bit():
-    """Systems with circuits that follow the beam beside lossy contacts: both failed."""
+    """A system with circuits that follow the beam beside lossy contacts: it failed."""
     found = []
     for fill in ("0", "165"):
         done = subprocess.run(
-            [sys.executable, "-c", RUNS, str(Path(__file__).parent), "7", "13"],
+            [sys.executable, "-c", RUNS, str(Path(__file__).parent), "13"],
             env=os.environ | {"MALLOC_PERTURB_": fill}, capture_output=True, text=True, check=True,
         )  # fmt: skip
         found.append(done.stdout)

@@ -228,6 +228,7 @@ label = "magnet"
     assert refused.exit_code == 2 and "must be first:last" in refused.output
 
 
+@pytest.mark.slow
 def test_branches_of_an_arch_over_its_thickness_take_few_reductions(monkeypatch: pytest.MonkeyPatch) -> None:
     """At a bifurcation the correction ends where its residual is rounding, and the fork is where a mode has no stiffness."""
     sizes = {"length": 500e-6, "width": 20e-6, "thickness": 2e-6}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections import Counter
 from itertools import combinations
@@ -9,6 +10,7 @@ from itertools import combinations
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import xarray as xr
 from every_kind import RESULTS, SYSTEM
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
@@ -22,6 +24,11 @@ from snapbeam.plot.style import COLUMN_WIDTHS, save_figure
 
 RAW_NAME = re.compile(r"[a-z][_.][a-z]|\w\[")
 """Parts of the name of a parameter or variable in a program."""
+
+
+@functools.cache
+def computed(result: str) -> xr.Dataset:
+    return RESULTS[result]()
 
 
 @pytest.fixture(autouse=True)
@@ -121,7 +128,7 @@ def check(figure: Figure, words: str) -> None:
 @pytest.mark.parametrize("result", RESULTS)
 def test_the_default_figure(result: str, style: str) -> None:
     """In three styles, at both widths of each."""
-    dataset = RESULTS[result]()
+    dataset = computed(result)
     figure = dataset.snapbeam.plot().get_figure(root=True)
     check(figure, f"{result}, {style}")
     for width in [each for each in COLUMN_WIDTHS if not has_width(figure, each)]:
@@ -131,7 +138,7 @@ def test_the_default_figure(result: str, style: str) -> None:
 @pytest.mark.parametrize("result", RESULTS)
 def test_the_text_of_every_figure_is_inside(result: str) -> None:
     """All but the default one, of one column; a figure that fits there fits two."""
-    dataset = RESULTS[result]()
+    dataset = computed(result)
     for name in list(figures_of(dataset)[1])[1:]:
         figure = dataset.snapbeam.plot(name).get_figure(root=True)
         assert outside(resized(figure, "single")) < 0.01, f"{name} of a single column"
@@ -153,7 +160,7 @@ GALLERY = ("run", "map", "map of a line", "attractors", "probability map", "life
 )
 def test_files_are_small_and_have_their_fonts(result: str, style: str, tmp_path) -> None:
     """Vector files have their fonts embedded as TrueType and are below 2 MB."""
-    dataset = RESULTS[result]()
+    dataset = computed(result)
     for name in figures_of(dataset)[1]:
         figure = dataset.snapbeam.plot(name).get_figure(root=True)
         for suffix in (".pdf", ".svg"):
