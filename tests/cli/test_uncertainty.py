@@ -49,7 +49,7 @@ def run(tmp_path, text: str, *arguments: str):
 @pytest.mark.parametrize(
     ("section", "words"),
     [
-        ('side = "above"\n', "upper well (contact on side 'above')"),
+        pytest.param('side = "above"\n', "upper well (contact on side 'above')", marks=pytest.mark.slow),
         ('side = "below"\n[initial_state]\ninitial_well = "upper"\n', "upper well (initial_well = 'upper')"),
     ],
 )
@@ -168,7 +168,7 @@ runs = 8
 [design]
 objectives = {quantity = "peak_midspan_displacement"}
 variables = {damping_ratio = [0.01, 0.1]}
-settings = {population = 6, generations = 1, samples = 8, validation_samples = 20}
+settings = {population = 4, generations = 1, samples = 4, validation_samples = 20}
 """
     designs = tmp_path / "designs.nc"
     result = run(tmp_path, text, "design", "-y", "-o", str(designs))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import pytest
 import random_starts
 
 from snapbeam.lab import make_signal, measure_drive
 from snapbeam.util.diagnostics import diagnostics_of, doubtful
 
 
+@pytest.mark.slow
 def test_starts_and_noise_of_many_kinds_are_no_high_pass():
     """Each kind of start twice; some of them were credited to a filter in one of four records."""
     found = [random_starts.judged(812, k, filtered=False) for k in range(2 * len(random_starts.STARTS))]
@@ -21,6 +23,7 @@ def test_a_high_pass_is_told_where_the_noise_shows_it():
     assert sum("high_pass" in codes for codes, *_ in found) >= 5
 
 
+@pytest.mark.slow
 def test_a_high_pass_that_nothing_shows_is_in_the_standard_error():
     """A third of them were off by more than 5 standard errors without a word when only the noise told a filter."""
     found = [random_starts.judged(813, k, filtered=True) for k in range(12)]

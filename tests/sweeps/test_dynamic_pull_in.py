@@ -33,6 +33,7 @@ def test_a_voltage_that_is_switched_on() -> None:
     assert SWITCHED < STATIC  # where a slow increase pulls in
 
 
+@pytest.mark.slow
 def test_a_shock_on_a_charged_plate_over_its_voltage() -> None:
     """An impulse gives a velocity; the plate survives while its energy is below that of the saddle."""
     shock = sb.Shock(acceleration_g=100.0, duration_ms=1e-3)
