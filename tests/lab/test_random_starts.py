@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import pytest
 import random_starts
 
 from snapbeam.lab import make_signal, measure_drive
