@@ -168,7 +168,7 @@ runs = 8
 [design]
 objectives = {quantity = "peak_midspan_displacement"}
 variables = {damping_ratio = [0.01, 0.1]}
-settings = {population = 6, generations = 1, samples = 4, validation_samples = 20}
+settings = {population = 6, generations = 1, samples = 8, validation_samples = 20}
 """
     designs = tmp_path / "designs.nc"
     result = run(tmp_path, text, "design", "-y", "-o", str(designs))
