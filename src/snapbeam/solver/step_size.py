@@ -77,7 +77,7 @@ _CONTACT_SPEED = 0.2
 _HALVINGS = {4: 4, 6: 10}
 _NATIVE_HALVINGS = 3
 _MOST_HALVINGS = {"standard": 5, "reference": 7}
-_CONTACT_TURN = math.pi
+_CONTACT_TURN = {"standard": math.pi, "reference": 1.0}
 """Maximum phase of the fastest mode in the longest contact step, rad; beyond half a turn, kicks are in resonance."""
 SUBDIVISION = 1 << 20
 """Ticks of a flight step."""
@@ -415,7 +415,7 @@ def choose_base_step(
         impact = _CONTACT_SHARE[accuracy] * duration
         flight = min(flight, impact * 2 ** _MOST_HALVINGS[accuracy])
         if fastest > 0.0:
-            impact = min(impact, _CONTACT_TURN / fastest)
+            impact = min(impact, _CONTACT_TURN[accuracy] / fastest)
     min_contact_halvings = max(0, math.ceil(math.log2(flight / impact)))
     if step is not None:
         impact *= positive("step", step, "s") / flight
