@@ -52,7 +52,7 @@ LOCAL = {"standard": 1e-5, "reference": 1e-9}
 """Errors over b that a run makes on its way, which its conditioning enlarges."""
 BEYOND = 100.0
 """Multiple of the limit up to which an error that the conditioning enlarges is compared."""
-QUIET = 1e-6
+QUIET = 1e-5
 """Voltage, V, below which errors are not relative."""
 KICK = 1e-10
 """Relative change of the start by which the conditioning is measured."""
