@@ -52,6 +52,7 @@ def test_map_size_is_that_of_the_command():
 
 
 @pytest.mark.slow  # a minute
+@pytest.mark.filterwarnings("ignore:2560 runs of .* in flight on average may take")
 def test_classes_of_the_map(tmp_path, monkeypatch):
     """The fractions of the classes, from the command as it stands."""
     monkeypatch.chdir(tmp_path)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import snapbeam as sb
-from snapbeam.util.validation import InputError
+from snapbeam.util.validation import InputError, InputTypeError
 
 BEAM = sb.Beam(length=0.3, thickness=0.4e-3, width=0.02, density=7850.0, young_modulus=200e9, buckling_level=0.7e-3)
 MODEL = sb.ReducedModel.from_beam(BEAM, modes=3, damping_ratio=0.02)
@@ -116,6 +116,8 @@ def test_patches_that_are_none_are_refused() -> None:
             sb.model.PiezoelectricPatches(patches=rows, capacitance=1e-9, resistance=1.0)
     with pytest.raises(InputError, match="one patch"):
         sb.model.PiezoelectricPatches.wired([], resistance=1.0)
+    with pytest.raises(InputTypeError, match=r"patches = -0\.0"):
+        sb.model.PiezoelectricPatches.wired(-0.0, resistance=1.0)  # type: ignore[arg-type]
 
 
 FILE = """

@@ -39,8 +39,9 @@ def limited(words, megabytes, folder, **variables):
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_without_memory_says_so_in_one_line(command, megabytes, tmp_path):
     done = limited(COMMANDS[command], megabytes, tmp_path)
-    if command == "run":  # needs more than these limits
-        assert done.returncode == 1
+    if command == "run":  # needs from 530 to 600 MB
+        assert done.returncode == (megabytes < 600)
+        assert done.returncode or sorted(os.listdir(tmp_path)) == ["a.nc", "a.png"]
     if done.returncode == 2:  # there was memory enough to find that run.nc does not exist
         assert command == "table" and "no such file" in done.stderr
     elif done.returncode:

@@ -17,7 +17,17 @@ from snapbeam.model.extension import check_defined, check_names
 from snapbeam.model.quantity import RUN, check_fields, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.diagnostics import Diagnostic
-from snapbeam.util.validation import InputError, choice, finite, finite_array, instance, positive, shown, within
+from snapbeam.util.validation import (
+    InputError,
+    checked,
+    choice,
+    finite,
+    finite_array,
+    instance,
+    positive,
+    shown,
+    within,
+)
 
 _Array = NDArray[np.float64]
 
@@ -366,6 +376,7 @@ class PiezoelectricPatches(_Layers):
         object.__setattr__(self, "patches", tuple(map(tuple, rows.tolist())))  # rows of numbers, so that == compares
 
     @classmethod
+    @checked
     def wired(
         cls, patches: Sequence[PiezoelectricHarvester], wiring: str = "parallel", *, resistance: float
     ) -> list[Harvester]:

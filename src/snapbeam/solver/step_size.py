@@ -82,6 +82,8 @@ _CONTACT_TURN = {"standard": math.pi, "reference": 1.0}
 SUBDIVISION = 1 << 20
 """Ticks of a flight step."""
 _MOST_TICKS = 2.0**61
+_MOST_TICKS_OF_RUN = 2.0**53
+"""Ticks to the end of a run, which the core counts in doubles."""
 _HOUR = 3600.0
 
 
@@ -499,6 +501,7 @@ def clocked(
             f"{'cycles' if periods is None else 'periods'} = {cycles:g}: must be at least {least:.2g}, a tick of the clock"
         )
     require_affordable(integration, system.model.modes, lengths, table["end"] / SUBDIVISION)
+    _require_counted(float(table["end"].max()), _MOST_TICKS_OF_RUN, cycle, lengths, cycles)
     if periods is None:
         table["output_interval"] = table["end"]
     table["last_quarter"] = table["end"] // 4 * 3
@@ -609,10 +612,13 @@ def _words(seconds: float) -> str:
 def _whole_steps(period: _Array, step: _Array, cycles: float) -> NDArray[np.int64]:
     """Flight steps in each period, the step made a little shorter to fit."""
     steps = np.ceil(period / step * (1.0 - 1e-12))
-    most = float(steps.max()) * max(cycles, 1.0)
-    if not most <= _MOST_TICKS / SUBDIVISION:
+    _require_counted(float(steps.max()) * max(cycles, 1.0) * SUBDIVISION, _MOST_TICKS, period, step, cycles)
+    return np.asarray(steps.astype(np.int64))
+
+
+def _require_counted(ticks: float, most: float, period: _Array, step: _Array, cycles: float) -> None:
+    if not ticks <= most:
         raise InputError(
             f"step = {float(step.min()):g} s with cycles = {cycles:g} of up to {float(period.max()):g} s: makes "
-            f"{most:.2g} steps, must be at most {_MOST_TICKS / SUBDIVISION:.2g}"
+            f"{ticks / SUBDIVISION:.2g} steps, must be at most {most / SUBDIVISION:.2g}"
         )
-    return np.asarray(steps.astype(np.int64))
