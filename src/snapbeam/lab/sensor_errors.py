@@ -419,9 +419,11 @@ def _filters(record: Record) -> list[Hypothesis]:
         # a notch rings where its noise has a hole
         seen = shown > (-_HOLE * max(gain, 0.0) if one.kind == "notch" else -_CONTRADICTS)
         gain = shown + max(gain, -_CONTRADICTS) if seen else min(shown, 0.0)
-        # what the start alone shows may be the shaker's own: it is in the standard error, and not told
+        # what the start alone shows may be the shaker's own: it is not told
         own = shown < limit and (one.kind == "high_pass" or (one.kind == "notch" and certain < _CONTRADICTS))
-        told.append(Hypothesis("" if own else one.kind, gain, 2, 1.0 / kept - 1.0, numbers=numbers))
+        # of a high-pass nothing but what noise and start do not exclude (_hidden_filters)
+        loss = 0.0 if own and one.kind == "high_pass" else 1.0 / kept - 1.0
+        told.append(Hypothesis("" if own else one.kind, gain, 2, loss, numbers=numbers))
     return told
 
 
