@@ -143,6 +143,7 @@ def test_tolerances_have_the_units_of_their_parameters() -> None:
     assert (of["contact.gap"].low, of["contact.gap"].high, of["contact.stiffness"].sigma) == (1e-5, 3e-5, 0.2)
 
 
+@pytest.mark.slow
 def test_a_structure_of_matrices_is_designed_and_has_probabilities(tmp_path) -> None:
     """Its constants, which are no parameters of the table, refused the result after the computation."""
     text = """

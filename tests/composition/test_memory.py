@@ -25,6 +25,7 @@ for seed in map(int, sys.argv[2:]):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the C library of Linux fills memory on request")
+@pytest.mark.slow
 def test_memory_changes_no_bit():
     """A system with circuits that follow the beam beside lossy contacts: it failed."""
     found = []

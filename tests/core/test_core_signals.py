@@ -212,6 +212,7 @@ def test_a_users_motion_begins_at_its_phase(monkeypatch, engine, beside):
     np.testing.assert_allclose(moved - moved[0], wanted - wanted[0], rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_derivative_by_a_users_motion(monkeypatch):
     """Its table of pieces depends on the parameter: differences between runs, not the table held still."""
     monkeypatch.setitem(DRIVES, "own_cycle", OwnCycle)

@@ -92,6 +92,7 @@ def test_the_result_follows_the_schema_of_a_run(tmp_path):
     tracked.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
 
 
+@pytest.mark.slow
 def test_rest_is_the_facing_well_unless_given(tmp_path):
     recording = rendered()
     well = followed(recording, tmp_path, rest_displacement=None, location=1 / 2.1)
@@ -122,6 +123,7 @@ def test_trouble_is_flagged_and_never_filled_in(tmp_path):
     assert quality["snr_db"] == pytest.approx(30.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_striker_that_never_touches_is_no_doubt_about_the_track(tmp_path):
     time, _, shaker, *_ = impacts(5)
     beam = -BUCKLING_LEVEL + 8.0 * PIXEL * np.exp(-20.0 * time) * np.sin(2.0 * np.pi * 190.0 * time)
@@ -134,6 +136,7 @@ def test_a_striker_that_never_touches_is_no_doubt_about_the_track(tmp_path):
     assert np.nanmax(np.abs(miss) / stated) < 6.0 and np.nanmedian(stated) < 0.2
 
 
+@pytest.mark.slow
 def test_a_flat_tip_without_sticker_merges_at_contact_and_says_so(tmp_path):
     recording = rendered(impacts(5, contact_frames=12.0), stage=PLAIN_TIP | {"tip_radius": 0.5})
     tracked = followed(recording, tmp_path)
