@@ -46,6 +46,7 @@ def run(tmp_path, text: str, *arguments: str):
     return CliRunner().invoke(app, [arguments[0], str(file), *arguments[1:]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("section", "words"),
     [

@@ -270,6 +270,7 @@ def test_times_and_rates_of_hdf5(tmp_path):
         open_recording(write("ms", 0.5 * np.array(NUMBERS), pixel_size=1e-5, pixel_size_m=2e-5))
 
 
+@pytest.mark.slow
 def test_lost_frames_of_a_video_shift_no_time_of_a_tracked_motion(tmp_path):
     time = np.arange(260) / 8e3
     motion = 8e-5 * np.sin(2.0 * np.pi * 110.0 * (time - 0.005)) * (time > 0.005)

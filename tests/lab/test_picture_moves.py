@@ -49,6 +49,7 @@ def codes(tracked):
     return {one.code for one in diagnostics_of(tracked)}
 
 
+@pytest.mark.slow
 def test_a_stabiliser_is_told_by_its_background(tmp_path):
     good, _ = scene(tmp_path / "good.cihx")
     tracked, ratio = scene(tmp_path / "moved.cihx", share=0.28)

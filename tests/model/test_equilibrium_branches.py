@@ -139,6 +139,7 @@ def test_a_parameter_that_changes_the_modes() -> None:
         assert frequency == pytest.approx(model.reference_frequency, rel=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
 def test_what_becomes_of_the_wells_under_a_magnet(side: float) -> None:
     """The far well snaps over to the near one before that one is pulled in; over a shorter range neither ends."""

@@ -135,6 +135,7 @@ def test_the_default_figure(result: str, style: str) -> None:
         check(resized(figure, width), f"{result}, {style}, {width} column")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("result", RESULTS)
 def test_the_text_of_every_figure_is_inside(result: str) -> None:
     """All but the default one, of one column; a figure that fits there fits two."""
