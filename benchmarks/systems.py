@@ -60,7 +60,7 @@ MODELS: dict[str, Parts] = {
     "a moving base": {
         "base_excitation": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
     },
-    "a changing load": {"axial_load": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))},
+    "a changing load": {"axial_load": sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=3.0))},
     "a piezo": {"harvesters": [PIEZO]},
     "a coil": {"harvesters": [COIL]},
     "a coil and a piezo": {"harvesters": [COIL, PIEZO]},

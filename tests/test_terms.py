@@ -42,7 +42,7 @@ MEMBERS = {
     "BoundaryConditions": {"left", "right", "axial", "turn"},
     "Imperfection": {"rise", "skew", "form", "side_load"},
     "BaseExcitation": {"carries_striker"},
-    "LoadRamp": {"hold"},
+    "RampForce": {"hold"},
     "PiezoelectricHarvester": {"start", "stop", "coupling"},
     "ElectromagneticHarvester": {"constant"},
     "Integration": {"early_decision"},

@@ -171,7 +171,7 @@ def draw_systems(images: Path) -> None:
     shaking = sb.Striker(drive=noise, gap=-0.1 * level, location=0.7)
     piezo = sb.PiezoelectricHarvester(moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_end=0.25)
     coil = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.7)
-    load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
+    load = sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=3.0))
     for name, system in {
         "body": sb.System(model, contacts=[sb.Contact(sb.HuntCrossley(4e8, 2.0), body)]),
         "sphere": sb.System(model, contacts=[sb.Contact(hertz, sphere)]),

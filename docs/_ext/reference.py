@@ -67,10 +67,9 @@ def _table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def parameter_tables() -> str:
     """Return a table of the keys of each section of a parameter file."""
-    from snapbeam.model.axial_load import LOADS
     from snapbeam.model.contact.base import LAWS
     from snapbeam.model.drive.base import DRIVES
-    from snapbeam.model.external_force import FORCES
+    from snapbeam.model.drive.force import FORCES
     from snapbeam.model.harvester import HARVESTERS
     from snapbeam.model.local_force import LOCAL_FORCES
     from snapbeam.model.parameter_file import Config
@@ -81,12 +80,12 @@ def parameter_tables() -> str:
         "contact": LAWS,
         "drive": {name: kind for name, kind in DRIVES.items() if name != "sum"},
         "base_excitation": {name: kind for name, kind in DRIVES.items() if name != "sum" and kind.can_excite_base()},
-        "axial_load": LOADS,
+        "axial_load": FORCES,
         "force": {**FORCES, **LOCAL_FORCES},
         "harvester": HARVESTERS,
     }
     listed = {
-        "laws": _listed(LAWS), "drives": _listed(types["drive"]), "loads": _listed(LOADS),
+        "laws": _listed(LAWS), "drives": _listed(types["drive"]), "loads": _listed(FORCES),
         "harvesters": _listed(HARVESTERS), "forces": _listed(FORCES), "local_forces": _listed(LOCAL_FORCES),
     }  # fmt: skip
     parts = []
@@ -155,7 +154,8 @@ def _listed(names: Iterable[str]) -> str:
 
 def _keys(kind: Any) -> set[str]:
     """Keys of a contact law, drive, load, force or harvester; a force in time has a location of its own."""
-    from snapbeam.model.external_force import FORCES, ExternalForce
+    from snapbeam.model.drive.force import FORCES
+    from snapbeam.model.external_force import ExternalForce
     from snapbeam.model.quantity import quantities
 
     own = {each.name for each in dataclasses.fields(kind)}
@@ -479,9 +479,9 @@ def _parts() -> dict[str, Any]:
             sb.RecordedAcceleration.from_psd([(20.0, 0.01), (200.0, 0.01)], duration_s=0.5, seed=1)
         ),
         "a load with a sine": struck(
-            axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.4, amplitude=3.0))
+            axial_load=sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.4, amplitude=3.0))
         ),
-        "a load with a ramp": struck(axial_load=sb.AxialLoadModulation(motion=sb.LoadRamp(change=1.0, duration=3.0))),
+        "a load with a ramp": struck(axial_load=sb.AxialLoadModulation(motion=sb.RampForce(change=1.0, duration=3.0))),
         "an external force": struck(
             forces=[sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.9, amplitude=0.1), location=0.4)]
         ),

@@ -6,8 +6,6 @@ from . import plot as plot
 from . import uncertainty as uncertainty
 from ._version import __version__ as __version__
 from .model.axial_load import AxialLoadModulation as AxialLoadModulation
-from .model.axial_load import HarmonicLoad as HarmonicLoad
-from .model.axial_load import LoadRamp as LoadRamp
 from .model.base_excitation import BaseExcitation as BaseExcitation
 from .model.beam import Beam as Beam
 from .model.boundary_conditions import BoundaryConditions as BoundaryConditions
@@ -24,6 +22,10 @@ from .model.drive.burst import Burst as Burst
 from .model.drive.chirp import Chirp as Chirp
 from .model.drive.constant_velocity import ConstantVelocity as ConstantVelocity
 from .model.drive.fixed_stop import FixedStop as FixedStop
+from .model.drive.force import ConstantForce as ConstantForce
+from .model.drive.force import HarmonicForce as HarmonicForce
+from .model.drive.force import RampForce as RampForce
+from .model.drive.force import RecordedForce as RecordedForce
 from .model.drive.half_sine import HalfSine as HalfSine
 from .model.drive.noise import BandLimitedNoise as BandLimitedNoise
 from .model.drive.recorded_acceleration import RecordedAcceleration as RecordedAcceleration
@@ -33,10 +35,7 @@ from .model.drive.sine import AccelerationSine as AccelerationSine
 from .model.drive.sine import DisplacementSine as DisplacementSine
 from .model.drive.sine import Sine as Sine
 from .model.drive.sum import SumDrive as SumDrive
-from .model.external_force import ConstantForce as ConstantForce
 from .model.external_force import ExternalForce as ExternalForce
-from .model.external_force import HarmonicForce as HarmonicForce
-from .model.external_force import RecordedForce as RecordedForce
 from .model.force_displacement import force_displacement as force_displacement
 from .model.harvester import ElectromagneticHarvester as ElectromagneticHarvester
 from .model.harvester import PiezoelectricHarvester as PiezoelectricHarvester

@@ -24,7 +24,7 @@ PARTS = {
     "contact": {"type": "hertz", "stiffness": 1e8, "location": 0.45, "gap": 1e-5},
     "drive": {"type": "sine", "frequency_ratio": 0.83, "velocity_amplitude": 0.11},
     "base_excitation": {"type": "acceleration_sine", "frequency_hz": 310.0, "amplitude_g": 30.0},
-    "axial_load": {"type": "sine", "frequency_ratio": 1.4, "amplitude": 0.7},
+    "axial_load": {"type": "harmonic_force", "frequency_ratio": 1.4, "amplitude": 0.7},
     "force": {"type": "harmonic_force", "frequency_ratio": 0.6, "amplitude": 0.02, "location": 0.35},
     "harvester": {"type": "piezo", "moment_per_volt": 1e-6, "capacitance": 2e-8, "resistance": 1e5},
     "initial_state": {"velocity[1]": 0.05},

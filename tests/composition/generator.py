@@ -26,16 +26,19 @@ __all__ = ["Composition", "Features", "composed", "features_of"]
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
+Acting = tuple[sb.Drive, Callable[[float], float], list[float]]
 DRIVES = (
     "sine", "sine", "displacement_sine", "sine+sine", "chirp", "burst", "half_sine", "fixed", "sum", "constant_velocity",
-    "recorded_motion", "noise",
+    "recorded_motion", "noise", "acceleration_chirp",
 )  # fmt: skip
 BASES = (
     "acceleration_sine", "displacement_sine", "sine+sine", "chirp", "burst", "shock", "recorded_acceleration", "noise",
-    "sum",
+    "sum", "acceleration_chirp",
 )  # fmt: skip
-FORCES = ("harmonic_force", "constant_force", "recorded_force")
-LOADS = ("sine", "ramp")
+FORCES = (
+    "harmonic_force", "constant_force", "half_sine_force", "burst_force", "chirp_force", "noise_force", "ramp_force",
+    "recorded_force", "sum",
+)  # fmt: skip
 CIRCUITS = ("piezo", "coil", "coil with inductance", "any piezo", "any coil")
 """Of any time constant, and of stronger couplings, too."""
 SEPARATE = frozenset(name for name, law in LAWS.items() if law.impulsive or law.memory)
@@ -112,7 +115,7 @@ def features_of(seed: int) -> Features:
         (str(rng.choice(laws())), str(rng.choice(DRIVES)), bool(rng.random() < 0.25)) for _ in range(count)
     )
     base = str(rng.choice(BASES)) if rng.random() < 0.35 else None
-    carried = bool(rng.random() < 0.7) or base in ("chirp", "shock", "recorded_acceleration")
+    carried = bool(rng.random() < 0.7) or base in ("chirp", "acceleration_chirp", "shock", "recorded_acceleration")
     features = Features(
         modes=modes,
         contacts=contacts,
@@ -120,7 +123,7 @@ def features_of(seed: int) -> Features:
         carried=carried,
         external=some(FORCES, 0.65, 0.25, 0.1),
         local=some(local_forces(), 0.55, 0.25, 0.12, 0.08),
-        load=str(rng.choice(LOADS)) if rng.random() < 0.25 else None,
+        load=str(rng.choice(FORCES)) if rng.random() < 0.25 else None,
         circuits=some(CIRCUITS, 0.6, 0.28, 0.12),
         uneven=bool(rng.random() < 0.35),
         started=not contacts or bool(rng.random() < 0.2),
@@ -200,8 +203,8 @@ def burst(rate: float, reach: float, duration: float, up: float, down: float) ->
     return motion, [up * period, (duration - down) * period, duration * period]
 
 
-def chirp(first: float, last: float, speed: float, length: float, log: bool) -> tuple[Motion, list[float]]:
-    """A sweep of the frequency."""
+def chirp(first: float, last: float, size: float, length: float, log: bool, p: int = 1) -> tuple[Motion, list[float]]:
+    """A sweep of the frequency at a constant value (p = 0), velocity (1) or acceleration (2)."""
 
     def motion(t: float) -> tuple[float, float, float]:
         s = min(t, length)
@@ -215,16 +218,16 @@ def chirp(first: float, last: float, speed: float, length: float, log: bool) -> 
             angle = first * s + 0.5 * change * s * s
         if t >= length:
             now, change, bend, angle = last, 0.0, 0.0, angle + last * (t - length)
-        a, b, c = speed / now, -speed * change / now**2, 2.0 * speed * change**2 / now**3
-        c -= speed * bend / now**2
+        a, b = size / now**p, -p * size * change / now ** (p + 1)
+        c = p * (p + 1) * size * change**2 / now ** (p + 2) - p * size * bend / now ** (p + 1)
         sn, cs = math.sin(angle), math.cos(angle)
         return a * sn, b * sn + a * now * cs, c * sn + 2.0 * b * now * cs + a * (change * cs - now**2 * sn)
 
     return motion, [length]
 
 
-def noise(seed: int, low: float, high: float, rms: float, rise: float) -> Motion:
-    """32 sines of equal velocity amplitude, one in each part of the band, under a rise."""
+def noise(seed: int, low: float, high: float, rms: float, rise: float, p: int = 1) -> Motion:
+    """32 sines of equal amplitude of the value (p = 0) or velocity (1), one in each part of the band, under a rise."""
     x = (seed * 2654435769 + np.arange(64, dtype=np.uint64) * np.uint64(2246822519) + np.uint64(374761393)) % np.uint64(
         2**32
     )
@@ -232,12 +235,13 @@ def noise(seed: int, low: float, high: float, rms: float, rise: float) -> Motion
         x = ((x ^ (x >> np.uint64(shift))) * np.uint64(factor)) % np.uint64(2**32)
     shares = (x ^ (x >> np.uint64(16))) / 2.0**32
     rates = low + (high - low) / 32.0 * (np.arange(32) + shares[::2])
-    phases, speed = 2.0 * math.pi * shares[1::2], rms * math.sqrt(2.0 / 32.0)
+    phases, sizes = 2.0 * math.pi * shares[1::2], rms * math.sqrt(2.0 / 32.0) / rates**p
 
     def motion(t: float) -> tuple[float, float, float]:
         angles, s = rates * t + phases, min(t / rise, 1.0)
         w, v, a = (
-            speed * float(np.sum(each)) for each in (np.sin(angles) / rates, np.cos(angles), -rates * np.sin(angles))
+            float(np.sum(sizes * each))
+            for each in (np.sin(angles), rates * np.cos(angles), -(rates**2) * np.sin(angles))
         )
         e, e1 = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * (s * (1.0 - s)) ** 2 / rise
         e2 = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / rise**2
@@ -276,6 +280,13 @@ def moving(kind: str, number: Numbers, side: float = 1.0) -> tuple[sb.Drive, Mot
             sweep_type="log" if log else "linear",
         )  # fmt: skip
         return drive, *chirp(rate, stop * first, speed, cycles * 2.0 * math.pi / rate, log)
+    if kind == "acceleration_chirp":
+        stop, cycles, log = ratio * number(0.6, 1.8), number(0.6, 3.0), bool(number(0.0, 1.0) < 0.5)
+        drive = sb.model.AccelerationChirp(
+            start_ratio=ratio, stop_ratio=stop, acceleration_amplitude=velocity * ratio, sweep_cycles=cycles,
+            sweep_type="log" if log else "linear",
+        )  # fmt: skip
+        return drive, *chirp(rate, stop * first, speed * rate, cycles * 2.0 * math.pi / rate, log, 2)
     if kind == "burst":
         up, flat, down = number(0.3, 0.8), number(0.1, 1.0), number(0.3, 0.8)
         drive = sb.Burst(
@@ -452,39 +463,68 @@ def acting(name: str, number: Numbers, beam: ReferenceBeam) -> tuple[sb.LocalFor
     return made, PointForce(row, lambda u: float(kind.force(law, u)), loss)
 
 
-def external(kind: str, number: Numbers) -> tuple[sb.ForceHistory, Callable[[float], float]]:
-    """The history of an external force."""
-    size, ratio, phase, mean = number(0.01, 0.15), number(0.5, 2.5), number(-1.5, 1.5), number(-0.05, 0.05)
-    rate = ratio * number.first
+def history(kind: str, number: Numbers, size: float, mean: float, flip: float) -> Acting:
+    """A force as a function of time, its formula for flip = 1, and the times of its corners."""
+    first, cycle = number.first, 2.0 * math.pi / number.first
+    ratio, phase, share = number(0.5, 2.5), number(-1.5, 1.5), number(0.0, 1.0)
+    rate = ratio * first
     if kind == "harmonic_force":
-        turned = phase if number.flip > 0.0 else phase + math.pi
-        history: sb.ForceHistory = sb.HarmonicForce(
-            frequency_ratio=ratio, amplitude=size, mean=number.flip * mean, phase=turned
-        )
-        return history, lambda t: mean + size * math.sin(rate * t + phase)
+        turned = phase if flip > 0.0 else phase + math.pi
+        harmonic = sb.HarmonicForce(frequency_ratio=ratio, amplitude=size, mean=flip * mean, phase=turned)
+        return harmonic, lambda t: mean + size * math.sin(rate * t + phase), []
     if kind == "constant_force":
-        return sb.ConstantForce(force=number.flip * mean), lambda t: mean
+        return sb.ConstantForce(force=flip * mean), lambda t: mean, []
     if kind == "half_sine_force":
-        lasts = 0.3 * ratio * 2.0 * math.pi / number.first
-        blow = sb.model.HalfSineForce(peak=number.flip * size, duration=0.3 * ratio)
-        return blow, lambda t: size * math.sin(math.pi * t / lasts) if t < lasts else 0.0
-    count = 480
-    times = np.arange(count) * (8.0 * 2.0 * math.pi / number.first / (count - 1))
+        end = 0.3 * ratio * cycle
+        blow = sb.model.HalfSineForce(peak=flip * size, duration=0.3 * ratio)
+        return blow, lambda t: size * math.sin(math.pi * t / end) if t < end else 0.0, [end]
+    if kind == "burst_force":
+        up, flat, down = 0.3 + 0.5 * share, 0.1 + share, 0.8 - 0.5 * share
+        sent = sb.model.BurstForce(
+            frequency_ratio=ratio, amplitude=size, duration_cycles=up + flat + down, ramp_up_cycles=up,
+            ramp_down_cycles=down,
+        )  # fmt: skip
+        motion, corners = burst(rate, size, up + flat + down, up, down)
+        return sent, lambda t: motion(t)[0], corners
+    if kind == "chirp_force":
+        last, lasts, log = rate * (0.6 + 1.2 * share), (0.6 + 2.0 * share) * 2.0 * math.pi / rate, phase > 0.0
+        swept = sb.model.ChirpForce(
+            start_ratio=ratio, stop_ratio=last / first, amplitude=size, sweep_cycles=0.6 + 2.0 * share,
+            sweep_type="log" if log else "linear",
+        )  # fmt: skip
+        motion, corners = chirp(rate, last, size, lasts, log, 0)
+        return swept, lambda t: motion(t)[0], corners
+    if kind == "noise_force":
+        wide, ramp, seed = 0.2 + 1.3 * share, 0.3 + 0.7 * share, int(2e9 * share)
+        random = sb.model.NoiseForce(
+            low_ratio=ratio, high_ratio=ratio + wide, rms=0.5 * size, seed=seed, ramp_up_cycles=ramp
+        )
+        rise = ramp * 4.0 * math.pi / ((2.0 * ratio + wide) * first)
+        summed = noise(seed, rate, rate + wide * first, 0.5 * size, rise, 0)
+        return random, lambda t: summed(t)[0], [rise]
+    if kind == "ramp_force":
+        end = ratio * cycle
+        ramp_force = sb.RampForce(change=flip * size * phase, duration=ratio)
+        return ramp_force, lambda t: size * phase * smooth(t / end)[0], [end]
+    if kind == "sum":
+        one, two = history("harmonic_force", number, size, mean, flip), history("burst_force", number, size, mean, flip)
+        return one[0] + two[0], lambda t: one[1](t) + two[1](t), two[2]
+    assert kind == "recorded_force", kind
+    times = np.arange(480) * (8.0 * cycle / 479)
     record = size * np.sin(rate * times + phase) + mean
     spline = CubicSpline(times, record)
-    made = sb.RecordedForce(record=number.flip * record, sampling_frequency=1.0 / times[1])
-    return made, lambda t: float(spline(t))
+    made = sb.RecordedForce(record=flip * record, sampling_frequency=1.0 / times[1])
+    return made, lambda t: float(spline(t)), []
 
 
-def loading(kind: str, number: Numbers) -> tuple[sb.Drive, Callable[[float], float], list[float]]:
+def external(kind: str, number: Numbers) -> Acting:
+    """An external force."""
+    return history(kind, number, number(0.01, 0.15), number(-0.05, 0.05), number.flip)
+
+
+def loading(kind: str, number: Numbers) -> Acting:
     """The change of the axial load."""
-    size, ratio, phase, length = number(1.0, 6.0), number(0.5, 2.5), number(-1.0, 1.0), number(0.3, 2.0)
-    rate, end = ratio * number.first, length * 2.0 * math.pi / number.first
-    if kind == "sine":
-        harmonic = sb.HarmonicLoad(frequency_ratio=ratio, amplitude=size, phase=phase)
-        return harmonic, lambda t: size * math.sin(rate * t + phase), []
-    ramp = sb.LoadRamp(change=size * phase, duration=length)
-    return ramp, lambda t: size * phase * smooth(t / end)[0], [end]
+    return history(kind, number, number(1.0, 6.0), number(-2.0, 2.0), 1.0)
 
 
 def tapping(kind: str, number: Numbers, beam: ReferenceBeam) -> tuple[sb.Harvester, Circuit, float]:
@@ -579,10 +619,11 @@ def composed(seed: int, features: Features | None = None, mirror: bool = False) 
     forces: list[Any] = []
     rows, local = [], []
     for kind in features.external:
-        history, value = external(kind, number)
+        pushing, value, corners = external(kind, number)
         place = number(0.25, 0.75)
-        forces.append(sb.ExternalForce(history=history, location=place))
+        forces.append(sb.ExternalForce(history=pushing, location=place))
         rows.append((beam.shape(place), value))
+        breaks += corners
     for kind in features.local:
         one, other = acting(kind, number, beam)
         forces.append(one)
@@ -610,7 +651,9 @@ def composed(seed: int, features: Features | None = None, mirror: bool = False) 
         initial_state=state,
     )  # fmt: skip
     parts = Parts(tips, rows, local, shaking, features.carried, load, circuits, start, tuple(sorted(breaks)))
-    known = set(features.local) <= {*KNOWN_FORCES, *ATTRACTIVE}
+    # their amplitudes are positive, and they have no phase
+    signless = {"burst_force", "chirp_force", "noise_force", "sum"}
+    known = set(features.local) <= {*KNOWN_FORCES, *ATTRACTIVE} and not signless & set(features.external)
     places = [tip.location for tip in tips] + [i / 8.0 for i in range(1, 8)]
     return Composition(features, system, beam, parts, volts, known, places)
 

@@ -46,7 +46,7 @@ SYSTEMS = {
     },
     "force and load": {
         "force": {"type": "harmonic_force", "frequency_ratio": 0.9, "amplitude": 0.01, "location": 0.5},
-        "axial_load": {"type": "sine", "frequency_ratio": 1.9, "amplitude": 1.0},
+        "axial_load": {"type": "harmonic_force", "frequency_ratio": 1.9, "amplitude": 1.0},
     },
 }  # fmt: skip
 

@@ -74,7 +74,7 @@ def system_of(seed: int) -> sb.System:
         contacts=tuple(contacts),
         base=drawn.base if keep or not drawn.base else str(rng.choice(REPEATING["base"])),
         external=tuple(each if keep else str(rng.choice(REPEATING["external"])) for each in drawn.external),
-        load=drawn.load if keep or not drawn.load else "sine",
+        load=drawn.load if keep or not drawn.load else "harmonic_force",
     )
     try:
         system = composed(seed, features).system

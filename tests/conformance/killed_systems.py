@@ -120,7 +120,7 @@ def try_one(system: sb.System, name: str, folder: Path) -> str:
     """What went wrong with one parameter; nothing if nothing did."""
     axes = {name: values_of(system, name)}
     # a base lifts the beam off its stop first; a burst and a ramp have to end
-    ends = any(type(drive).name in ("burst", "ramp") for _, drive in system.moving)
+    ends = any(type(drive).name in ("burst", "ramp_force") for _, drive in system.moving)
     integration = sb.Integration(cycles=6 if ends else 2 if system.base_excitation is None else 4)
 
     def sweep(store: Path | None) -> Any:

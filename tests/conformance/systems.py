@@ -101,7 +101,7 @@ def record(model: sb.ReducedModel) -> dict[str, object]:
     return {"contacts": [sb.Contact(default_values.CONTACT, sb.Striker(drive=drive))]}
 
 
-def loaded(motion: sb.LoadMotion):
+def loaded(motion: sb.Drive):
     return lambda model: {
         "contacts": [sb.Contact(default_values.CONTACT, sb.Striker(drive=sine()))],
         "axial_load": sb.AxialLoadModulation(motion=motion),
@@ -124,6 +124,9 @@ BURST = sb.Burst(
     retraction=0.3,
 )
 CHIRP = sb.Chirp(start_ratio=0.8, stop_ratio=2.0, velocity_amplitude=0.25, sweep_cycles=8.0)
+ACCELERATION_CHIRP = sb.model.AccelerationChirp(
+    start_ratio=0.6, stop_ratio=2.0, acceleration_amplitude=0.2, sweep_cycles=6.0, sweep_type="log"
+)
 NOISE = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2, seed=3, ramp_up_cycles=1.0)
 TWO = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2) + sb.Sine(frequency_ratio=2.4, velocity_amplitude=0.1)
 SPRUNG = default_values.BEAM.replace(
@@ -175,6 +178,10 @@ SYSTEMS: dict[str, ExtendedSystem] = {
     "logarithmic chirp": ExtendedSystem(
         struck(dataclasses.replace(CHIRP, sweep_type="log")),
         {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.02, 0.5)},
+    ),
+    "a chirp of constant acceleration": ExtendedSystem(
+        struck(ACCELERATION_CHIRP),
+        {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.acceleration_amplitude": (0.02, 0.5)},
     ),
     "half_sine": ExtendedSystem(
         struck(sb.HalfSine(displacement_amplitude=0.6, duration=0.5)),
@@ -233,12 +240,15 @@ SYSTEMS: dict[str, ExtendedSystem] = {
     "a base of two sines": ExtendedSystem(on_a_base(TWO), {"base_excitation.velocity_amplitude_1": (0.05, 0.5)}),
     "a burst of the base": ExtendedSystem(on_a_base(BURST), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
     "a swept base": ExtendedSystem(on_a_base(CHIRP), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
+    "a base of swept acceleration": ExtendedSystem(
+        on_a_base(ACCELERATION_CHIRP), {"base_excitation.acceleration_amplitude": (0.05, 0.5)}
+    ),
     "a noisy base": ExtendedSystem(on_a_base(NOISE), {"base_excitation.velocity_rms": (0.02, 0.3)}),
     "a changing load": ExtendedSystem(
-        loaded(sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)), SINE | {"axial_load.amplitude": (0.0, 20.0)}
+        loaded(sb.HarmonicForce(frequency_ratio=2.0, amplitude=3.0)), SINE | {"axial_load.amplitude": (0.0, 20.0)}
     ),
     "a load that falls": ExtendedSystem(
-        loaded(sb.LoadRamp(change=-5.0, duration=3.0, hold_periods=4.0)), SINE | {"axial_load.change": (-20.0, 10.0)}
+        loaded(sb.RampForce(change=-5.0, duration=3.0, hold_periods=4.0)), SINE | {"axial_load.change": (-20.0, 10.0)}
     ),
     "a piezo": ExtendedSystem(harvested(PIEZO), SINE | {"harvester.resistance": (1e3, 1e6)}),
     "a coil": ExtendedSystem(
@@ -256,7 +266,7 @@ SYSTEMS: dict[str, ExtendedSystem] = {
                 sb.Striker(drive=sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=1e-5),
             )],
             "base_excitation": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
-            "axial_load": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)),
+            "axial_load": sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=3.0)),
             "harvesters": [PIEZO],
         },
         SINE | PLACE,

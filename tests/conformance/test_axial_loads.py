@@ -32,7 +32,7 @@ def test_against_an_independent_solution(modes) -> None:
     system = sb.System(
         model(modes),
         base_excitation=sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
-        axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=1.7, amplitude=size, phase=0.4)),
+        axial_load=sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=1.7, amplitude=size, phase=0.4)),
     )
     for accuracy, bound in (("standard", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
@@ -50,7 +50,7 @@ def test_slow_unbuckling() -> None:
     """A load that falls slowly takes the well with it, quasi-statically."""
     beam = model(1)
     excess = float(beam.nonlinear_stiffness * beam.well_amplitude[0] ** 2)
-    ramp = sb.LoadRamp(change=-0.5 * excess, duration=60.0)
+    ramp = sb.RampForce(change=-0.5 * excess, duration=60.0)
     run = sb.simulate(sb.System(beam, axial_load=sb.AxialLoadModulation(motion=ramp)), sb.Integration(cycles=80))
     # quasi-statically alpha^2 = (P - P_cr)/gamma
     assert float(run.dataset.midspan_displacement[-1]) == pytest.approx(-math.sqrt(0.5), abs=2e-3)
@@ -59,12 +59,12 @@ def test_slow_unbuckling() -> None:
 
 
 def test_refusals() -> None:
-    with pytest.raises(InputError, match="must be a HarmonicLoad"):
+    with pytest.raises(InputError, match="must be a force"):
         sb.AxialLoadModulation(motion=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1))
     plain = sb.ReducedModel.from_matrices(
         [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0]
     )
-    load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))
+    load = sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=1.0))
     with pytest.raises(InputError, match="has its load in its stiffness"):
         sb.System(plain, axial_load=load)
     system = sb.System(model(1), axial_load=load)
@@ -74,7 +74,7 @@ def test_refusals() -> None:
 
 def test_time_at_the_changed_load() -> None:
     """A ramp of 2.5 periods, 4 periods at the changed value, 2.5 periods back."""
-    ramp = sb.LoadRamp(change=-0.7, duration=2.5, hold_periods=4.0)
+    ramp = sb.RampForce(change=-0.7, duration=2.5, hold_periods=4.0)
     system = sb.System(model(1), axial_load=sb.AxialLoadModulation(motion=ramp))
     period = 1.0 / model(1).natural_frequencies[0]
     times = np.arange(0.0, 12.0, 0.25) * period

@@ -176,7 +176,7 @@ def test_refusals():
         sb.System(model(), forces=[sb.ExternalForce(history=harmonic, shape=[1.0, 0.0, 0.0])])
     with pytest.raises(InputError, match="has no length; give shape"):
         sb.System(model(), forces=[sb.ExternalForce(history=harmonic, location=0.5)])
-    with pytest.raises(InputTypeError, match="use a HarmonicForce"):
+    with pytest.raises(InputTypeError, match="such as HarmonicForce"):
         sb.ExternalForce(history=sb.FixedStop())
     with pytest.raises(InputError, match="a base needs a motion"):
         sb.BaseExcitation(motion=harmonic)

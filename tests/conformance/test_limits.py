@@ -76,7 +76,7 @@ def test_a_base_and_a_load_that_hardly_move(plain) -> None:
         )
 
     def load(size: float) -> np.ndarray:
-        return end(axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=size)))
+        return end(axial_load=sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=size)))
 
     recedes(plain, base, (1e-4, 1e-6, 1e-8), 1e-7)
     recedes(plain, load, (1e-2, 1e-4, 1e-6), 1e-6)

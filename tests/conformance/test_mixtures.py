@@ -161,7 +161,7 @@ def mixture(seed: int, modes: int) -> Mixture:
         words.append("a base" if striker_on_base else "a base under what stands in space")
     if rng.random() < 0.4:
         ratio, size, phase = rng.uniform(0.5, 2.5), rng.uniform(1.0, 6.0), rng.uniform(-1.0, 1.0)
-        axial = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=ratio, amplitude=size, phase=phase))
+        axial = sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=ratio, amplitude=size, phase=phase))
 
         def load(t: float) -> float:
             return size * math.sin(ratio * first * t + phase)

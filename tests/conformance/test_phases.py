@@ -41,7 +41,7 @@ def system_of(names: tuple[str, ...], **phases: float) -> sb.System:
         motion = sb.AccelerationSine(frequency_ratio=RATIO, acceleration_amplitude=HARDEST, phase=at["base"])
         parts["base_excitation"] = sb.BaseExcitation(motion=motion)
     if "load" in names:
-        motion = sb.HarmonicLoad(frequency_ratio=2.0 * RATIO, amplitude=load_amplitude(), phase=at["load"])
+        motion = sb.HarmonicForce(frequency_ratio=2.0 * RATIO, amplitude=load_amplitude(), phase=at["load"])
         parts["axial_load"] = sb.AxialLoadModulation(motion=motion)
     return sb.System(MODEL, **parts)
 

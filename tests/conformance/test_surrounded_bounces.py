@@ -175,7 +175,7 @@ def surrounded(names: set[str], first: float, unit: float, beam: MixedBeam) -> t
         parts["base_excitation"] = sb.BaseExcitation(motion=motion, striker_on_base=carries)
         around |= {"base": sine(0.7 * first, 0.1 * unit, 0.0), "striker_on_base": carries}
     if "load" in names:
-        load = sb.HarmonicLoad(frequency_ratio=0.8, amplitude=5.0, phase=0.4)
+        load = sb.HarmonicForce(frequency_ratio=0.8, amplitude=5.0, phase=0.4)
         parts["axial_load"] = sb.AxialLoadModulation(motion=load)
         forces_of_beam.append(lambda t, a, v: 5.0 * math.sin(0.8 * first * t + 0.4) * a)
     if "force" in names:

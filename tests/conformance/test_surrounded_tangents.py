@@ -18,7 +18,7 @@ GAP, CHANGE = 20e-6, 1e-6
 BASE = sb.BaseExcitation(
     motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25), striker_on_base=False
 )
-LOAD = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
+LOAD = sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=3.0))
 SYSTEMS = {
     "base": ({"base_excitation": BASE}, sb.FixedStop(), 0.9),
     "load": ({"axial_load": LOAD}, sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.05), 1.21),

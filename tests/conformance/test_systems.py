@@ -14,9 +14,9 @@ from killed_systems import NOT_SWEPT
 from systems import SYSTEMS, mirror_image
 
 import snapbeam as sb
-from snapbeam.model.axial_load import LOADS
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.drive.force import FORCES
 from snapbeam.model.drive.random_vibration import RandomVibration
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.parameters import parameters
@@ -42,8 +42,9 @@ def swept(name: str, count: int, seed: int, *, mirrored: bool = False, modes: in
 
 
 def test_none_is_missing() -> None:
-    """Every kind of law, drive, motion of a base, load and harvester, and every parameter but those of runs.
+    """Every kind of law, drive, motion of a base and harvester, and every parameter but those of runs.
 
+    The composition test compares every force as an external force and as an axial load.
     Laws with a memory are in ``test_elastic_plastic.py``.  ``test_external_force.py``, ``test_local_force.py``, ``test_shock.py``,
     ``test_random_vibration.py``, ``test_recorded_acceleration.py`` and ``model/test_wired_patches.py`` compare those with independent solutions.
     """
@@ -51,6 +52,7 @@ def test_none_is_missing() -> None:
     elsewhere = {
         f"{section}.{name}" for section in ("drive", "base_excitation") for kind in others for name in quantities(kind)
     }
+    elsewhere |= {f"axial_load.{name}" for kind in FORCES.values() for name in quantities(kind)}
     elsewhere |= {f"contact.{name}" for law in LAWS.values() if law.memory for name in quantities(law)}
     wired = {"patches", "patch_imbalance"}
     elsewhere |= {f"harvester.{name}" for kind in wired for name in quantities(HARVESTERS[kind])}
@@ -64,7 +66,6 @@ def test_none_is_missing() -> None:
         "contact": [name for name, law in LAWS.items() if not law.memory],
         "drive": DRIVES,
         "base_excitation": shaking,
-        "axial_load": LOADS,
         "harvester": HARVESTERS,
     }
     for section, names in known.items():

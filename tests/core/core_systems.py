@@ -42,7 +42,7 @@ def crowded(modes: int) -> sb.System:
         base_excitation=sb.BaseExcitation(
             motion=sb.DisplacementSine(frequency_ratio=1.7, displacement_amplitude=0.02), striker_on_base=False
         ),
-        axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=2.0)),
+        axial_load=sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=2.0)),
     )
 
 

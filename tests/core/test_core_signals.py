@@ -59,7 +59,7 @@ def moved_by_everything(modes: int) -> sb.System:
         forces=[
             sb.ExternalForce(history=sb.RecordedForce(record=1e-4 * RECORD, sampling_frequency=1e4), location=0.4)
         ],
-        axial_load=sb.AxialLoadModulation(motion=sb.LoadRamp(change=2.0, duration=0.6, hold_periods=0.3)),
+        axial_load=sb.AxialLoadModulation(motion=sb.RampForce(change=2.0, duration=0.6, hold_periods=0.3)),
     )  # fmt: skip
 
 
@@ -68,7 +68,7 @@ def test_bounds_cover_the_motion(drive):
     """The signals of a motion together bound its speed: an onset is not looked for where they exclude it."""
     system = driven(drive)
     found, scale = arrays(system, 2).batch["signals"][0], system.scale
-    value, slope = found[:, 6].sum(), found[:, 7].sum()
+    value, slope = found[:, -3].sum(), found[:, -2].sum()
     moved, speed, _ = np.abs(motion_of(drive, scale, 0.05)(np.linspace(0.0, 0.05, 4001))).max(axis=1)
     assert value >= moved * (1.0 - 1e-12)
     assert speed * (1.0 - 1e-12) <= slope
@@ -201,7 +201,7 @@ del DRIVES["own_cycle"]
 def test_a_users_motion_begins_at_its_phase(monkeypatch, engine, beside):
     """Displacement of the tip over time: a later phase is the motion some time later, whatever else moves."""
     monkeypatch.setitem(DRIVES, "own_cycle", OwnCycle)
-    load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1e-3))
+    load = sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=1e-3))
     parts = {"axial_load": load} if beside else {}
     system = driven(OwnCycle(height=1e-6, phase=0.8), 1, **parts)
     times = np.linspace(0.0, 0.9, 40) * 2.0 * math.pi / (1.1 * system.scale.omega)

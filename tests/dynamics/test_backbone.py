@@ -218,7 +218,7 @@ def test_refusals() -> None:
     )
     with pytest.raises(InputError, match="system with drive: a backbone curve is of free motion"):
         sb.dynamics.backbone_curve(shaken)
-    load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))
+    load = sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=1.0))
     with pytest.raises(InputError, match="axial_load: a backbone curve is of free motion"):
         sb.dynamics.backbone_curve(sb.System(ONE, axial_load=load))
     with pytest.raises(InputError, match="well = 'middle'"):

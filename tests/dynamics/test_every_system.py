@@ -155,7 +155,7 @@ PARTS: dict[str, dict[str, Any]] = {
     "friction": {"forces": [sb.CoulombFriction(friction_force=2e-3, smoothing_velocity=0.02, location=0.45)]},
     "force": {"forces": [sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.3, amplitude=0.02), location=0.4)]},
     "base": {"base_excitation": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=1.3, acceleration_amplitude=0.2))},
-    "load": {"axial_load": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=1.3, amplitude=1.0))},
+    "load": {"axial_load": sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=1.3, amplitude=1.0))},
     "whole": WHOLE,
 }  # fmt: skip
 

@@ -158,7 +158,7 @@ def test_advance_with_motions_that_do_not_repeat(around: str) -> None:
     chirp = sb.Chirp(start_ratio=0.8, stop_ratio=1.2, velocity_amplitude=0.05, sweep_cycles=3.0)
     parts = {
         "chirp": {"base_excitation": sb.BaseExcitation(motion=chirp)},
-        "ramp": {"axial_load": sb.AxialLoadModulation(motion=sb.LoadRamp(change=2.0, duration=2.0))},
+        "ramp": {"axial_load": sb.AxialLoadModulation(motion=sb.RampForce(change=2.0, duration=2.0))},
     }
     system = struck(gap=0.0, **parts[around])
     run = sb.simulate(system, EXACT.replace(cycles=4), sample_times=[0.0])

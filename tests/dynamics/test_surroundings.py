@@ -15,7 +15,7 @@ DAMPING = 0.02
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2, damping_ratio=DAMPING)
 STRIKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
 BASE = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=1.2, acceleration_amplitude=0.2, phase=0.7))
-LOAD = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.4, amplitude=1.0, phase=-0.3))
+LOAD = sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.4, amplitude=1.0, phase=-0.3))
 SHAKEN = {
     "base": sb.System(MODEL, base_excitation=BASE),
     "load": sb.System(MODEL, axial_load=LOAD),
@@ -72,9 +72,9 @@ def test_periods_one_by_one_are_periods_at_once():
 @pytest.mark.parametrize(
     ("system", "words"),
     [
-        (sb.System(MODEL, base_excitation=BASE, axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=1.7317, amplitude=1.0))),
+        (sb.System(MODEL, base_excitation=BASE, axial_load=sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=1.7317, amplitude=1.0))),
          "axial_load: no common period with base_excitation; the ratio of its frequency .* is 1.44308333333"),
-        (sb.System(MODEL, axial_load=sb.AxialLoadModulation(motion=sb.LoadRamp(change=1.0, duration=3.0))),
+        (sb.System(MODEL, axial_load=sb.AxialLoadModulation(motion=sb.RampForce(change=1.0, duration=3.0))),
          "axial_load: a motion of type 'ramp' does not repeat"),
         (sb.System(MODEL, base_excitation=sb.BaseExcitation(motion=sb.Chirp(start_ratio=0.8, stop_ratio=1.2, velocity_amplitude=0.1, sweep_cycles=9.0))),
          "base_excitation: a motion of type 'chirp' does not repeat"),

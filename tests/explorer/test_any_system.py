@@ -26,7 +26,7 @@ FILES = {
     "external force": {"beam": BEAM} | ONE_MODE | {
         "force": {"type": "harmonic_force", "frequency_ratio": 0.5, "amplitude": 0.05, "location": 0.4}
     },
-    "axial load": {"beam": BEAM} | ONE_MODE | {"axial_load": {"type": "sine", "frequency_ratio": 2.0, "amplitude": 0.1}},
+    "axial load": {"beam": BEAM} | ONE_MODE | {"axial_load": {"type": "harmonic_force", "frequency_ratio": 2.0, "amplitude": 0.1}},
 }  # fmt: skip
 HOW = sb.Integration(cycles=5)
 

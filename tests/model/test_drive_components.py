@@ -11,7 +11,6 @@ from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 import snapbeam as sb
-from snapbeam.model.axial_load import HarmonicLoad, LoadRamp
 from snapbeam.model.drive.base import Scale
 from snapbeam.model.drive.components import Motion, Pieces, Sweep, Tone, in_pieces
 from snapbeam.solver.excitation import displacements, motion_of
@@ -40,8 +39,13 @@ DRIVES = [
     sb.HarmonicForce(frequency_ratio=1.4, amplitude=0.3, mean=0.1, phase=0.2),
     sb.ConstantForce(force=-0.4),
     sb.RecordedForce(record=RECORD, sampling_frequency=1e4),
-    HarmonicLoad(frequency_ratio=2.0, amplitude=3.0, phase=0.3),
-    LoadRamp(change=-2.0, duration=3.0, hold_periods=4.0),
+    sb.RampForce(change=-2.0, duration=3.0, hold_periods=4.0),
+    sb.model.HalfSineForce(peak=-2.0, duration=0.7),
+    sb.model.BurstForce(frequency_ratio=1.1, amplitude=0.2, duration_cycles=6.0, ramp_up_cycles=2.0),
+    sb.model.ChirpForce(start_ratio=0.5, stop_ratio=2.0, amplitude=0.1, sweep_cycles=4.0),
+    sb.model.NoiseForce(low_ratio=0.5, high_ratio=3.0, rms=0.2, seed=7),
+    sb.HarmonicForce(frequency_ratio=1.4, amplitude=0.3, phase=1.0) + sb.RampForce(change=1.0, duration=2.0),
+    sb.model.AccelerationChirp(start_ratio=2.0, stop_ratio=0.5, acceleration_amplitude=0.1, sweep_cycles=9.0, sweep_type="log"),
 ]  # fmt: skip
 
 
@@ -54,12 +58,12 @@ def rise(x: float) -> float:
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
 
 
-def swept(first: float, last: float, duration: float, speed: float, logarithmic: bool):
+def swept(first: float, last: float, duration: float, size: float, logarithmic: bool, power: int = 1):
     def rate(t: float) -> float:
         x = min(t / duration, 1.0)
         return first * (last / first) ** x if logarithmic else first + (last - first) * x
 
-    return lambda t: speed / rate(t) * math.sin(quad(rate, 0.0, t, points=[min(duration, t)], epsabs=1e-11, limit=200)[0])  # fmt: skip
+    return lambda t: size / rate(t) ** power * math.sin(quad(rate, 0.0, t, points=[min(duration, t)], epsabs=1e-11, limit=200)[0])  # fmt: skip
 
 
 def shocked(pulse):
@@ -108,8 +112,16 @@ FORMULAS = [
     lambda t: 0.1 + 0.3 * math.sin(1.4 * W * t + 0.2),
     lambda t: -0.4,
     SPLINE,
-    lambda t: 3.0 * math.sin(2.0 * W * t + 0.3),
     lambda t: -2.0 * rise(t / (3.0 * PERIOD)) * (1.0 - rise(t / (3.0 * PERIOD) - 1.0 - 4.0 / 3.0)),
+    lambda t: -2.0 * math.sin(math.pi * t / (0.7 * PERIOD)) * (t < 0.7 * PERIOD),
+    lambda t: 0.2 * math.sin(1.1 * W * t) * rise(1.1 * t / PERIOD / 2.0) * rise(6.0 - 1.1 * t / PERIOD),
+    swept(0.5 * W, 2.0 * W, 8.0 * PERIOD, 0.1, False, 0),
+    lambda t: (
+        rise(t / (PERIOD / 1.75)) * 0.2 * math.sqrt(2.0 / 32.0)
+        * sum(math.sin((0.5 + 2.5 / 32.0 * j) * W * t + phase) for j, phase in NOISE._sines().reshape(2, -1).T.tolist())
+    ),
+    lambda t: 0.3 * math.sin(1.4 * W * t + 1.0) + rise(t / (2.0 * PERIOD)),
+    swept(2.0 * W, 0.5 * W, 4.5 * PERIOD, 0.1 * B * W * W, True, 2),
 ]  # fmt: skip
 EVERY = pytest.mark.parametrize("drive", DRIVES, ids=lambda each: each.name)
 
@@ -175,9 +187,6 @@ def test_bounds_are_not_exceeded(drive):
     columns = drive.columns()
     w, v, a = motion_of(drive, SCALE, 0.2)(np.linspace(0.0, 0.2, 20_001))
     tight = 1.0 + 1e-9
-    if drive.name.endswith("_force"):
-        assert np.abs(w).max() <= drive.peak_acceleration(columns, SCALE)[0] * tight
-        return
     highest, fastest = drive.bounds(columns, SCALE)
     assert w.max() <= highest[0] * tight + 1e-15
     assert -w.min() <= drive.mirrored_bounds(columns, SCALE)[0] * tight + 1e-15

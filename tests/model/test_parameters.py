@@ -10,10 +10,9 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model import default_values
-from snapbeam.model.axial_load import LOADS
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES
-from snapbeam.model.external_force import FORCES
+from snapbeam.model.drive.force import FORCES
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
@@ -30,10 +29,13 @@ CLASSES = {
     "contact": [sb.Striker, *LAWS.values()],
     "drive": list(DRIVES.values()),
     "base_excitation": [sb.BaseExcitation, *(kind for kind in DRIVES.values() if kind.can_excite_base())],
-    "axial_load": list(LOADS.values()),
+    "axial_load": list(FORCES.values()),
     "force": [sb.ExternalForce, *FORCES.values(), *LOCAL_FORCES.values()],
     "harvester": list(HARVESTERS.values()),
 }
+
+
+OF = {"base_excitation": "base", "axial_load": "axial load", "force": "force"}
 
 
 @pytest.mark.parametrize("section", CLASSES)
@@ -43,9 +45,9 @@ def test_every_quantity_of_every_class_is_in_it(section: str) -> None:
     for kind in CLASSES[section]:
         for name, item in quantities(kind).items():
             own = TABLE[f"{section}.{name}"].quantity
-            if section == "base_excitation" and kind is not sb.BaseExcitation:
+            if section in OF and issubclass(kind, sb.Drive):
                 comma = "," if " over " in item.long_name else ""
-                assert own.long_name == f"{item.long_name}{comma} of the base"
+                assert own.long_name == f"{item.long_name}{comma} of the {OF[section]}"
                 own = dataclasses.replace(own, long_name=item.long_name)
             if name == "location" and section == "force":
                 own = dataclasses.replace(own, closed=item.closed)
@@ -193,6 +195,9 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
     drives = {
         "burst": sb.Burst(**pair, duration_cycles=5.0),
         "chirp": sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=20.0),
+        "acceleration_chirp": sb.model.AccelerationChirp(
+            start_ratio=0.5, stop_ratio=2.0, acceleration_amplitude=0.1, sweep_cycles=20.0
+        ),
         "half_sine": sb.HalfSine(displacement_amplitude=0.1, duration=0.5),
         "band_limited_noise": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
         "random_vibration": sb.RecordedAcceleration.from_psd([(20.0, 0.04), (200.0, 0.04)], duration_s=0.5),
@@ -201,15 +206,18 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         "displacement_sine": sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.1),
         "acceleration_sine": sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=0.1),
     }
-    loads = {"ramp": sb.LoadRamp(change=1.0, duration=1.0), "sine": sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0)}
     forces = {
+        "ramp_force": sb.RampForce(change=1.0, duration=1.0),
+        "burst_force": sb.model.BurstForce(frequency_ratio=2.0, amplitude=1.0, duration_cycles=4.0),
+        "chirp_force": sb.model.ChirpForce(start_ratio=0.5, stop_ratio=2.0, amplitude=1.0, sweep_cycles=4.0),
+        "noise_force": sb.model.NoiseForce(low_ratio=0.5, high_ratio=2.0, rms=1.0),
         "harmonic_force": sb.HarmonicForce(frequency_ratio=2.0, amplitude=1.0),
         "constant_force": sb.ConstantForce(force=1.0),
         "half_sine_force": sb.model.HalfSineForce(peak=1.0, duration=0.1),
     }
     around = {
         "base_excitation": lambda kind: sb.BaseExcitation(motion=drives.get(kind, sb.Sine(**pair))),
-        "axial_load": lambda kind: sb.AxialLoadModulation(motion=loads[kind]),
+        "axial_load": lambda kind: sb.AxialLoadModulation(motion=forces[kind]),
         "forces": lambda kind: [sb.ExternalForce(history=forces[kind], location=0.5)],
         "harvesters": lambda kind: [sb.PiezoelectricHarvester(moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4)],
     }

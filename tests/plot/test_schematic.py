@@ -55,7 +55,7 @@ def test_what_surrounds_the_beam_is_drawn_and_named(model) -> None:
     """A base, a load that changes, and a harvester of each kind, beside the beam that has none of them."""
     striker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2)
     base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25))
-    load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
+    load = sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=3.0))
     piezo = sb.PiezoelectricHarvester(
         moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.0, patch_end=0.25
     )

@@ -250,7 +250,7 @@ def test_all_that_drives_is_changed() -> None:
     stop = sb.Striker(drive=sb.FixedStop(), gap=1e-4)
     around = {
         "base_excitation": sb.BaseExcitation(motion=MOTIONS["chirp"]),
-        "axial_load": sb.AxialLoadModulation(motion=sb.LoadRamp(change=2.0, duration=3.0)),
+        "axial_load": sb.AxialLoadModulation(motion=sb.RampForce(change=2.0, duration=3.0)),
     }
     second = sb.Striker(drive=MOTIONS["noise"], location=0.3, gap=1e-4)
     contacts = [sb.Contact(CONTACT, stop), sb.Contact(CONTACT, second)]

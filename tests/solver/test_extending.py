@@ -20,7 +20,7 @@ import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES, Drive, Timed
-from snapbeam.model.external_force import FORCES, ForceHistory
+from snapbeam.model.drive.force import FORCES, ForceHistory
 from snapbeam.model.harvester import HARVESTERS, Harvester
 from snapbeam.model.local_force import LOCAL_FORCES
 from snapbeam.model.parameters import lookup, parameters
@@ -320,7 +320,7 @@ CIRCUIT = {name: (lambda self, given: given) for name in ("row", "loss", "share"
         (Timed, {k: v for k, v in TIMED.items() if k != "bounds"}, r"has no bounds"),
         (Timed, {k: v for k, v in TIMED.items() if k != "motion"}, r"has no components and no motion; .* define one"),
         (Drive, TIMED | {"numbers": TIMED["cycle"], "harmonic": True, "shape_numbers": TIMED["cycle"]}, r"set harmonic"),
-        (ForceHistory, {"cycle": TIMED["cycle"]} | MOVING, r"has no peak_acceleration"),
+        (ForceHistory, {"cycle": TIMED["cycle"]} | MOVING, r"has no bounds"),
         (ForceHistory, TIMED | {"max_acceleration": TIMED["cycle"]}, r"max_acceleration: .* did you mean 'peak_acceleration'"),
         (Harvester, CIRCUIT | {"voltage": 1.0}, r"voltage: is no hook"),
         (Harvester, {k: v for k, v in CIRCUIT.items() if k != "share"}, r"has no share"),

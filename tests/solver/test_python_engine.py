@@ -61,7 +61,7 @@ def test_the_papers_system(modes):
     ("seed", "features"),
     [
         (1, Features(1, (("hertz", "sine", False),), base="acceleration_sine", uneven=True)),
-        (2, Features(2, (("power", "displacement_sine", True),), load="sine", circuits=("piezo", "coil"))),
+        (2, Features(2, (("power", "displacement_sine", True),), load="harmonic_force", circuits=("piezo", "coil"))),
         (3, Features(3, external=("harmonic_force",), local=("quadratic_damping", "magnetic_force"), started=True)),
     ],
 )
@@ -138,7 +138,7 @@ def test_energy_of_everything_at_once_is_balanced():
         beam(2),
         contacts=[striking(sb.HuntCrossley(3e8, 2.0), mass=2e-3, suspension_stiffness=50.0, suspension_damping=0.02)],
         base_excitation=sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)),
-        axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=2.0)),
+        axial_load=sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=2.0)),
         forces=[
             sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.7, amplitude=0.02), location=0.4),
             sb.QuadraticDamping(coefficient=0.2, location=0.55),

@@ -56,8 +56,8 @@ enum RunNumber : int {
 // its own at which a run begins, s; MOST_ are bounds of value, slope and second derivative.
 enum SignalKind : int { TONE, PIECES, SWEEP, SIGNAL_KINDS };
 enum SignalNumber : int {
-    MEAN, AMPLITUDE, RATE, PHASE, PERIOD, EXPONENTIAL, MOST_VALUE, MOST_SLOPE, MOST_BEND, SIGNAL_NUMBERS,
-    GAIN = 0, FIRST_PIECE = 1, PIECE_COUNT = 2, SHIFT = 3, SPEED = 0, FIRST_RATE = 1, LAST_RATE = 2, DURATION = 4
+    MEAN, AMPLITUDE, RATE, PHASE, PERIOD, EXPONENTIAL, POWER, MOST_VALUE, MOST_SLOPE, MOST_BEND, SIGNAL_NUMBERS,
+    GAIN = 0, FIRST_PIECE = 1, PIECE_COUNT = 2, SHIFT = 3, SIZE = 0, FIRST_RATE = 1, LAST_RATE = 2, DURATION = 4
 };
 constexpr int PIECE_NUMBERS = 7;  // begin of a piece, s, and six coefficients
 enum Status : int { OK, EARLY_STOP, RUNNING, DIVERGED, STEP_LIMIT };

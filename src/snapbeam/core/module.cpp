@@ -232,7 +232,8 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
     for (size_t i = 0; i < runs * size_t(p.signals); ++i) {
         const double *s = b.signals + i * SIGNAL_NUMBERS;
         const int kind = p.signal_kinds[i % size_t(p.signals)];
-        if (kind == SWEEP && !(s[FIRST_RATE] > 0.0 && s[LAST_RATE] > 0.0 && s[DURATION] > 0.0)) a.refuse("signals", "must have sweeps of positive rates and durations");
+        if (kind == SWEEP && !(s[FIRST_RATE] > 0.0 && s[LAST_RATE] > 0.0 && s[DURATION] > 0.0 && (s[POWER] == 0.0 || s[POWER] == 1.0 || s[POWER] == 2.0)))
+            a.refuse("signals", "must have sweeps of positive rates and durations, and of power 0, 1 or 2");
         if (kind == PIECES && !(s[FIRST_PIECE] >= 0.0 && s[PIECE_COUNT] >= 1.0 && s[FIRST_PIECE] + s[PIECE_COUNT] <= double(pieces) &&
                                 s[FIRST_PIECE] == std::floor(s[FIRST_PIECE]) && s[PIECE_COUNT] == std::floor(s[PIECE_COUNT])))
             a.refuse("signals", "must have pieces of the table");

@@ -2,7 +2,7 @@
 //
 //   TONE     s(t) = mean + amplitude sin(rate t + phase)
 //   PIECES   s(t) = gain sum_k c_ik x^k, x = t - begin_i in [0, begin_(i+1) - begin_i): polynomials of degree five, from a table
-//   SWEEP    s(t) = speed/w(t) sin(integral of w), w from first to last within a duration, linear in time or exponential
+//   SWEEP    s(t) = size/w(t)^p sin(integral of w), w from first to last within a duration, linear in time or exponential; p = 0, 1, 2
 //
 // with t from the signal's own beginning.  A signal may have a window, another signal by which it is multiplied: a burst is a tone in
 // a window of pieces.  A channel adds its signals with factors.  A signal is taken to the end of a step at once, and to the kicks
@@ -76,7 +76,7 @@ template <class L> struct Signal {
         } else {
             for (int l = 0; l < L::runs; ++l) {
                 double own[snapbeam::SIGNAL_NUMBERS], value, slope, bend;
-                for (int k = 0; k <= snapbeam::EXPONENTIAL; ++k) own[k] = lane(p[k], l);
+                for (int k = 0; k <= snapbeam::POWER; ++k) own[k] = lane(p[k], l);
                 evaluate(l, lane(at.now, l), own, value, slope, bend);
                 set_lane(at.value, l, value), set_lane(at.slope, l, slope), set_lane(at.bend, l, bend);
             }
@@ -102,7 +102,7 @@ template <class L> struct Signal {
     }
     template <class T> SNAPBEAM_FN static void of_sweep(T t, const T *own, T &value, T &slope, T &bend) {
         using namespace snapbeam;
-        const T first = own[FIRST_RATE], last = own[LAST_RATE], duration = own[DURATION], speed = own[SPEED], s = min(t, duration);
+        const T first = own[FIRST_RATE], last = own[LAST_RATE], duration = own[DURATION], size = own[SIZE], s = min(t, duration);
         T now, angle, change, curve = T(0.0);
         if (lane(own[EXPONENTIAL], 0) != 0.0 && differ(last, first)) {
             const T grows = log(last / first) / duration;
@@ -113,8 +113,10 @@ template <class L> struct Signal {
         angle = angle + last * (t - s);
         if (!(t < duration)) now = last, change = curve = T(0.0);
         const Turn<T> of = turn(angle - T(6.283185307179586 * ::floor(lane(angle, 0) / 6.283185307179586)));
-        const T a = speed / now, falls = -a * change / now, curves = a * (T(2.0) * change * change / (now * now) - curve / now);
-        value = a * of.sine, slope = speed * of.cosine + falls * of.sine;
+        const double p = lane(own[POWER], 0);
+        const T a = p == 0.0 ? size : p == 1.0 ? size / now : size / (now * now), falls = T(-p) * a * change / now;
+        const T curves = T(p) * a * (T(p + 1.0) * change * change / (now * now) - curve / now);
+        value = a * of.sine, slope = a * now * of.cosine + falls * of.sine;
         bend = (curves - a * now * now) * of.sine + (T(2.0) * falls * now + a * change) * of.cosine;
     }
 

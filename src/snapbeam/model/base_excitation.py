@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.boundary_conditions import modes_between
-from snapbeam.model.drive.base import Drive
+from snapbeam.model.drive.base import DRIVES, Drive
+from snapbeam.model.drive.chirp import SweptSine
 from snapbeam.model.quantity import STRUCTURE, check_fields, quantity
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError, instance
@@ -77,12 +78,12 @@ class BaseExcitation:
         instance("motion", self.motion, Drive, "a drive, such as AccelerationSine(frequency_ratio=1.2, ...)")
         check_fields(self)
         if not self.motion.can_excite_base():
-            known = ", ".join(repr(name) for name, kind in _shaking().items() if kind.can_excite_base())
+            known = ", ".join(repr(name) for name, kind in DRIVES.items() if kind.can_excite_base())
             raise InputError(
                 f"motion = {self.motion.name!r}: a base needs a motion with a known bound on its acceleration; must be "
                 f"one of {known}"
             )
-        if self.motion.name == "chirp" and not self.striker_on_base:
+        if isinstance(self.motion, SweptSine) and not self.striker_on_base:
             raise InputError(
                 "striker_on_base = False with a chirp: at the end of its sweep the displacement has a kink that the "
                 "acceleration leaves out; let the base carry the striker, or use another motion"
@@ -101,9 +102,3 @@ def rigid_mass(model: ReducedModel) -> NDArray[np.float64]:
         return np.asarray(model.mass @ model.base_shape)
     modes = modes_between(beam.boundary, beam.length, beam.bending_stiffness, model.modes)
     return np.asarray(beam.mass_per_length * modes.integral)
-
-
-def _shaking() -> dict[str, type[Drive]]:
-    from snapbeam.model.drive.base import DRIVES
-
-    return DRIVES

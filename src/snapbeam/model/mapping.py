@@ -14,7 +14,8 @@ from snapbeam.model.axial_load import AxialLoadModulation
 from snapbeam.model.base_excitation import BaseExcitation
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions
-from snapbeam.model.external_force import FORCES, ExternalForce
+from snapbeam.model.drive.force import FORCES
+from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import PiezoelectricHarvester, PiezoelectricPatches
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.parameters import SECTIONS, kind_of, kinds_of, row_of

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
-from snapbeam.model.external_force import FORCES
+from snapbeam.model.drive.force import FORCES
 from snapbeam.model.harvester import WIRINGS
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import OF_MATRICES, START, flattened, labels_of, parts_from_mapping, read_file, resolved

@@ -15,14 +15,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from snapbeam.model.axial_load import LOADS
 from snapbeam.model.base_excitation import BaseExcitation
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import BoundaryConditions
 from snapbeam.model.contact.base import LAWS
-from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.drive.base import DRIVES, Drive
+from snapbeam.model.drive.force import FORCES
 from snapbeam.model.drive.shock import GRAVITY
-from snapbeam.model.external_force import FORCES, ExternalForce
+from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import HARVESTERS
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
@@ -124,7 +124,7 @@ def _rows() -> Iterable[Parameter]:
     for section in ("contact", "drive", *_AROUND):
         for kind_name, kind in kinds_of(section).items():
             for row in _of_class(section, kind):
-                row = _around(row) if section in _AROUND else row
+                row = _around(row, kind) if section in _AROUND else row
                 yield dataclasses.replace(row, kinds=(kind_name,))
 
 
@@ -133,9 +133,9 @@ _INITIAL_WELL = ParameterField("1", "well that runs begin in", kind=object, opti
 
 def kind_of(section: str, name: object) -> Any:
     """Return the class that the key ``type`` of a section names, a sum of drives such as ``"sine+burst"`` too, or None."""
-    if section == "base_excitation" and isinstance(name, str) and "+" in name:
-        found = DRIVES[name] if name in DRIVES else None
-        return found if found is not None and found.can_excite_base() else None
+    if section in _OF_SUMS and isinstance(name, str) and "+" in name:
+        found = _OF_SUMS[section].get(name)
+        return found if found is not None and (section == "force" or found.can_excite_base()) else None
     known = kinds_of(section)
     return known[name] if isinstance(name, str) and name in known else None
 
@@ -147,28 +147,26 @@ def kinds_of(section: str) -> Mapping[str, Any]:
     known: dict[str, Mapping[str, Any]] = {
         "contact": LAWS,
         "drive": DRIVES,
-        "axial_load": LOADS,
+        "axial_load": FORCES,
         "force": {**FORCES, **LOCAL_FORCES},
         "harvester": HARVESTERS,
     }
     return known.get(section, {})
 
 
-_AROUND = {"base_excitation": "the base", "axial_load": "", "force": "", "harvester": ""}
-"""Sections of base, axial load and forces, with prefixes for dataset names and long names."""
+_OF_SUMS: dict[str, Any] = {"base_excitation": DRIVES, "force": FORCES}
+"""Drives of the sections that take only some of them, or others too."""
+_AROUND = {"base_excitation": "the base", "axial_load": "the axial load", "force": "the force", "harvester": ""}
+"""Sections of base, axial load, forces and harvesters, with the words that the names of their motions end with."""
 
 
-def _around(row: Parameter) -> Parameter:
+def _around(row: Parameter, kind: type) -> Parameter:
     """Parameter of base, axial load or a force, with a name distinct from that of the striker."""
     section, name = split_name(row.name)
-    of = _AROUND[section]
-    words = (
-        f"{row.quantity.long_name}{',' * (' over ' in row.quantity.long_name)} of {of}"
-        if of
-        else row.quantity.long_name
-    )
-    plain = name if row.short == name or section == "base_excitation" else row.short
-    plain = plain.removeprefix("load_").removeprefix("force_")
+    words = row.quantity.long_name
+    if issubclass(kind, Drive):
+        words = f"{words}{',' * (' over ' in words)} of {_AROUND[section]}"
+    plain = name if row.short == name or section == "base_excitation" else row.short.removeprefix("force_")
     return dataclasses.replace(
         row, short=f"{section}_{plain}", quantity=dataclasses.replace(row.quantity, long_name=words)
     )
@@ -181,7 +179,7 @@ def _of_class(section: str, kind: type) -> Iterable[Parameter]:
         yield Parameter(f"{section}.{name}", item.short or name, item, None if default is _NONE else default)
 
 
-_REGISTERED: tuple[Mapping[str, type], ...] = (LAWS, DRIVES, LOADS, FORCES, LOCAL_FORCES, HARVESTERS)
+_REGISTERED: tuple[Mapping[str, type], ...] = (LAWS, DRIVES, FORCES, LOCAL_FORCES, HARVESTERS)
 
 
 def parameters() -> dict[str, Parameter]:
@@ -208,6 +206,8 @@ def _table(registered: tuple[tuple[tuple[str, type], ...], ...]) -> dict[str, Pa
 
 _OF_NUMBER = re.compile(r"(.+)_(contact|force|harvester)_([1-9][0-9]*)")
 _OF_TERM = re.compile(r"(.+)_([1-4])")
+_MOVED = ("drive", "base_excitation", "axial_load", "force")
+"""Sections whose motion may be a sum."""
 
 
 def row_of(name: str) -> Parameter | None:
@@ -216,7 +216,7 @@ def row_of(name: str) -> Parameter | None:
     kind, number = numbered(section)
     row = table.get(f"{kind}.{field}")
     found = _OF_TERM.fullmatch(field)
-    if row is None and found is not None and kind in ("drive", "base_excitation"):
+    if row is None and found is not None and kind in _MOVED:
         row = table.get(f"{kind}.{found[1]}")
         if row is not None:
             words = f"{row.quantity.long_name}, of term {found[2]}"
@@ -373,7 +373,7 @@ def _in_units() -> Iterable[tuple[str, Physical]]:
             name = section_of(section, number)
             text = of if number == 1 else f"{of} {number}"
             yield f"{name}.{own}", Physical(f"{name}.{field}", unit, text)
-        if section in ("drive", "base_excitation"):  # the terms of a sum
+        if section in _MOVED:  # the terms of a sum
             for term in "1234":
                 yield f"{section}.{own}_{term}", Physical(f"{section}.{field}_{term}", unit, f"{of}, of term {term}")
 

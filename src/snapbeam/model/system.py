@@ -47,7 +47,7 @@ _A: dict[str, tuple[Any, str]] = {
     ),
     "harvesters": (Harvester, "a PiezoelectricHarvester(...) or an ElectromagneticHarvester(...)"),
     "base_excitation": (BaseExcitation, "a BaseExcitation(motion=AccelerationSine(...))"),
-    "axial_load": (AxialLoadModulation, "an AxialLoadModulation(motion=HarmonicLoad(...))"),
+    "axial_load": (AxialLoadModulation, "an AxialLoadModulation(motion=HarmonicForce(...))"),
 }
 """Parts of a system other than the model: their classes and names."""
 

@@ -27,7 +27,6 @@ from snapbeam.model.contact.restitution import Restitution
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.components import Pieces, Sweep, Tone
 from snapbeam.model.drive.fixed_stop import FixedStop
-from snapbeam.model.external_force import ForceHistory
 from snapbeam.model.local_force import (
     CoulombFriction,
     ElectrostaticForce,
@@ -63,8 +62,10 @@ LAWS: dict[type, tuple[int, tuple[str, ...]]] = {
 LINEAR_DAMPING, EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT = 10, 11, 12, 13, 14
 USER_LAWS = {"contact": 15, "lossy contact": 16, "force": 17, "lossy force": 18, "contact with memory": 21}
 """Number of the law that calls a user's, by :attr:`snapbeam.solver.user_laws.UserLaw.kind`."""
-SIGNAL = ("mean", "amplitude", "rate", "phase", "period", "exponential", "most_value", "most_slope", "most_bend")
-"""Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep speed, first and last rate, time, duration."""
+SIGNAL = (
+    "mean", "amplitude", "rate", "phase", "period", "exponential", "power", "most_value", "most_slope", "most_bend"
+)  # fmt: skip
+"""Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep size, first and last rate, time, duration, power."""
 STEEP = tuple(LAWS[kind][0] for kind in (ElectrostaticForce, MagneticForce))
 """Laws whose force grows without bound towards an end of their range."""
 
@@ -81,7 +82,7 @@ class Channels:
     uses: _Array
     """Factor of each signal in each channel, shape (channels, signals)."""
     signals: _Array
-    """Numbers of the signals, in the order of ``core/api.hpp: SignalNumber``; shape (runs, signals, 9)."""
+    """Numbers of the signals, in the order of ``core/api.hpp: SignalNumber``; shape (runs, signals, 10)."""
     kinds: NDArray[np.int32]
     """0: tone, 1: pieces, 2: sweep; shape (signals,)."""
     windows: NDArray[np.int32]
@@ -191,7 +192,7 @@ class _Builder:
         numbers = np.zeros((self.runs, len(SIGNAL)))
         numbers[:, 0], numbers[:, 1] = sign * each.gain, sum(map(len, self.pieces)) + which * length
         numbers[:, 2], numbers[:, 3] = length, begun
-        numbers[:, 6:] = 0.0 if most is None else most
+        numbers[:, -3:] = 0.0 if most is None else most
         self.pieces.append(tables.reshape(-1, 7))
         return self.add_signal(section, 1, numbers)
 
@@ -295,9 +296,6 @@ def _bounds(drive: Drive, own: Mapping[str, _Array], system: System) -> _Array:
     """Bounds of the value, slope and second derivative of a motion, shape (runs, 3)."""
     runs = next(iter(own.values())).size
     found = np.full((runs, 3), _FAR)
-    if isinstance(drive, ForceHistory):
-        found[:, 0] = drive.peak_acceleration(own, system.scale)
-        return found
     highest, found[:, 1] = drive.bounds(own, system.scale)
     found[:, 0] = np.maximum(highest, drive.mirrored_bounds(own, system.scale))
     if type(drive).can_excite_base():
@@ -332,8 +330,8 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
                 window = windows[id(each.window)]
             kind_of = 0
         elif isinstance(each, Sweep):
-            signal[:, 0], signal[:, 1], signal[:, 2], signal[:, 3] = each.speed, each.first, each.last, begun
-            signal[:, 4], signal[:, 5] = each.duration, float(each.exponential)
+            signal[:, 0], signal[:, 1], signal[:, 2], signal[:, 3] = each.size, each.first, each.last, begun
+            signal[:, 4], signal[:, 5], signal[:, 6] = each.duration, float(each.exponential), each.power
             kind_of = 2
         else:
             built.add_pieces(section, each, begun, most, side_of(system, section, drive))
@@ -341,7 +339,7 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
             continue
         if most is bounds:  # those of the whole motion, stated once; a tone alone has its own
             bounds = np.zeros((runs, 3))
-        signal[:, 6:] = most
+        signal[:, -3:] = most
         built.add_signal(section, kind_of, signal, window)
     for name, times in drive.jumps(own, system.scale).items():
         built.jumps[f"{section} {name}"] = times - begun

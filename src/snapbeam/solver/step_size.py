@@ -18,6 +18,7 @@ from snapbeam.model.integration import ACCURACIES, Integration
 from snapbeam.model.matrix_pairs import coupled_blocks
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
+from snapbeam.solver.channels import SIGNAL
 from snapbeam.solver.ensemble import Records
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.cores import usable_cores
@@ -352,7 +353,7 @@ def _free_runs(rest: _Array, velocity: _Array, steps: _Array, counts: _Array) ->
     run[:, 6] = 1.0
     run[:, 8], run[:, 10], run[:, 13] = -math.inf, -1.0, math.inf
     return {
-        "run": run, "signals": np.zeros((runs, 0, 9)), "pieces": np.zeros((0, 7)), "jumps": np.zeros((runs, 0)), "numbers": np.zeros((runs, 0, 0)), "offset": np.zeros((runs, 0)),
+        "run": run, "signals": np.zeros((runs, 0, len(SIGNAL))), "pieces": np.zeros((0, 7)), "jumps": np.zeros((runs, 0)), "numbers": np.zeros((runs, 0, 0)), "offset": np.zeros((runs, 0)),
         "since": np.zeros((runs, 0)), "rows": np.zeros((1, n)), "row_of": np.zeros((runs, 1), np.int32), "rest": np.zeros((runs, 1)),
         "q": np.tile(rest, (runs, 1)), "p": np.tile(velocity, (runs, 1)), "order": np.argsort(-counts, kind="stable").astype(np.int32),
         "outputs": 1, "states": np.full((runs, 1, 2 * n + 1), np.nan), "statistics": np.zeros((runs, _core.STATISTICS)),

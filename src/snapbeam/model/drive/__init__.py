@@ -1,4 +1,4 @@
-"""Motions of strikers and bases, one per module; importing the package registers all of them in ``DRIVES``."""
+"""Motions of strikers and bases in ``DRIVES``, forces in ``FORCES``; importing the package registers all of them."""
 
 from snapbeam.model.drive import (  # noqa: F401, I001  the order of DRIVES
     burst,
@@ -12,5 +12,6 @@ from snapbeam.model.drive import (  # noqa: F401, I001  the order of DRIVES
     shock,
     sine,
     fixed_stop,
+    force,
     sum,
 )

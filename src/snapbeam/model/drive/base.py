@@ -25,13 +25,7 @@ _Array = NDArray[np.float64]
 
 SUMS: dict[str, Callable[..., Any]] = {}
 """Functions on sums of drives, which :mod:`snapbeam.model.drive.sum` enters: "of" adds drives, "named" finds a kind of sum."""
-
-
-def _sum_named(name: str) -> type[Drive] | None:
-    return SUMS["named"](name) if "+" in name else None
-
-
-DRIVES: dict[str, type[Drive]] = NamedTable(_sum_named)
+DRIVES: dict[str, type[Drive]] = NamedTable(lambda name: SUMS["named"](name, DRIVES))
 """Every drive by the name it has in parameter files; one such as ``sine+burst`` is found too, though not listed."""
 
 
@@ -52,6 +46,11 @@ def velocity_ratio() -> Any:
 def displacement_ratio() -> Any:
     """Return the field of a displacement amplitude."""
     return quantity("1", "displacement amplitude over b", low=0.0, closed="left", scope=RUN, symbol="A/b")
+
+
+def acceleration_ratio() -> Any:
+    """Return the field of an acceleration amplitude."""
+    return quantity("1", "acceleration amplitude over b omega_1^2", low=0.0, closed="left", scope=RUN)
 
 
 class Scale(NamedTuple):

@@ -18,49 +18,20 @@ _Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Burst(Timed):
-    """Sine burst: the envelope rises from 0 to 1, stays at 1, and falls to 0.
-
-    The displacement of the tip is
-
-        w_s(t) = w_0 + E(t) (V b omega_1/omega) sin(omega t),
-
-    with E = x^3 (10 - 15 x + 6 x^2) of the fraction x of the rise or fall, without jumps up to the acceleration.
-    Afterwards the tip stays at its mid-position or, with *retraction*, leaves the beam. A burst longer than the run is
-    a start-up.
-
-    Parameters
-    ----------
-    frequency_ratio, velocity_amplitude : float
-        Omega and V, as of a :class:`~snapbeam.Sine`.
-    duration_cycles : float
-        Cycles from the beginning of the rise to the end of the fall.
-    ramp_up_cycles, ramp_down_cycles : float
-        Cycles of rise and fall, each greater than 0, together at most *duration_cycles*.
-    retraction : float
-        Withdrawal of the tip in the cycle after the burst, over b; it releases the beam.
-
-    See Also
-    --------
-    snapbeam.Sine, snapbeam.HalfSine
-
-    Examples
-    --------
-    >>> import snapbeam as sb
-    >>> striker = sb.Striker(drive=sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.1, duration_cycles=20.0))
-    """
+class EnvelopedSine(Timed):
+    """A sine whose envelope rises from 0 to 1 and falls to 0; its kind gives the amplitude (m, N) and the withdrawal after it."""
 
     frequency_ratio: float = excitation_ratio()
-    velocity_amplitude: float = velocity_ratio()
     duration_cycles: float = quantity("1", "cycles of the burst", low=0.0, scope=RUN)
     ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
     ramp_down_cycles: float = quantity("1", "cycles in which the drive falls", default=1.0, low=0.0, scope=RUN)
-    retraction: float = quantity(
-        "1", "distance that the tip withdraws after the burst, over b", default=0.0, low=0.0, closed="left", scope=RUN,
-    )  # fmt: skip
-
-    name = "burst"
     discontinuities = ("risen", "falling", "ended", "retracted")
+
+    def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        raise NotImplementedError
+
+    def _retraction(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        return np.zeros(columns["frequency_ratio"].size)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -94,13 +65,12 @@ class Burst(Timed):
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """Rates in rad/s, lengths in m, ends of the ramps and of the retraction in s."""
         rate = columns["frequency_ratio"] * scale.omega
-        amplitude = columns["velocity_amplitude"] * scale.length * scale.omega / rate
+        amplitude, retreat = self._amplitude(columns, scale), self._retraction(columns, scale)
         cycle, ended = self.cycle(columns, scale), columns["duration_cycles"]
         times = {
             "risen": columns["ramp_up_cycles"], "falling": ended - columns["ramp_down_cycles"], "ended": ended,
             "retracted": ended + 1.0,
         }  # fmt: skip
-        retreat = columns["retraction"] * scale.length
         return {"fastest": rate, "rate": rate, "amplitude": amplitude, "retraction": retreat} | {
             name: value * cycle for name, value in times.items()
         }
@@ -125,3 +95,49 @@ class Burst(Timed):
         shape = rate**2 + 2.0 * rate * STEEPEST / shortest + SHARPEST / shortest**2
         retreat = found["retraction"] * SHARPEST / (found["retracted"] - found["ended"]) ** 2
         return np.asarray(found["amplitude"] * shape + retreat)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Burst(EnvelopedSine):
+    """Sine burst: the envelope rises from 0 to 1, stays at 1, and falls to 0.
+
+    The displacement of the tip is
+
+        w_s(t) = w_0 + E(t) (V b omega_1/omega) sin(omega t),
+
+    with E = x^3 (10 - 15 x + 6 x^2) of the fraction x of the rise or fall, without jumps up to the acceleration.
+    Afterwards the tip stays at its mid-position or, with *retraction*, leaves the beam. A burst longer than the run is
+    a start-up.
+
+    Parameters
+    ----------
+    frequency_ratio, velocity_amplitude : float
+        Omega and V, as of a :class:`~snapbeam.Sine`.
+    duration_cycles : float
+        Cycles from the beginning of the rise to the end of the fall.
+    ramp_up_cycles, ramp_down_cycles : float
+        Cycles of rise and fall, each greater than 0, together at most *duration_cycles*.
+    retraction : float
+        Withdrawal of the tip in the cycle after the burst, over b; it releases the beam.
+
+    See Also
+    --------
+    snapbeam.Sine, snapbeam.HalfSine
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> striker = sb.Striker(drive=sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.1, duration_cycles=20.0))
+    """
+
+    velocity_amplitude: float = velocity_ratio()
+    retraction: float = quantity(
+        "1", "distance that the tip withdraws after the burst, over b", default=0.0, low=0.0, closed="left", scope=RUN,
+    )  # fmt: skip
+    name = "burst"
+
+    def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        return np.asarray(columns["velocity_amplitude"] * scale.length / columns["frequency_ratio"])
+
+    def _retraction(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        return np.asarray(columns["retraction"] * scale.length)

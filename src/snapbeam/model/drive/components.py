@@ -2,7 +2,7 @@
 
     tone     mean + amplitude sin(rate t + phase), times a window
     pieces   gain sum_k c_k (t - begin)^k, a polynomial of degree five from each begin to the next
-    sweep    speed/w(t) sin(integral of w), with w from first to last in a duration
+    sweep    size/w(t)^power sin(integral of w), with w from first to last in a duration
 
 The motion of a drive is the sum of its components; t is the time since the drive began, s.  Every array has shape (runs,), or
 begins with that axis, or with one of length 1 that all runs share.  :class:`Motion` evaluates them in Python.
@@ -54,13 +54,14 @@ class Tone(NamedTuple):
 class Sweep(NamedTuple):
     """A sine of changing frequency."""
 
-    speed: _Array
-    """Velocity amplitude, m/s."""
+    size: _Array
+    """Amplitude of the value (power 0), of its rate (1) or of its second derivative (2)."""
     first: _Array
     last: _Array
     """rad/s."""
     duration: _Array
     exponential: bool
+    power: int = 1
 
 
 Component = Tone | Pieces | Sweep
@@ -85,7 +86,7 @@ class Motion:
     def __init__(self, components: Sequence[Component], runs: int | NDArray[np.int64] = 0) -> None:
         own = partial(_of_runs, runs=runs)
         self._sweeps = [
-            Sweep(own(each.speed), own(each.first), own(each.last), own(each.duration), each.exponential)
+            Sweep(own(each.size), own(each.first), own(each.last), own(each.duration), each.exponential, each.power)
             for each in components
             if isinstance(each, Sweep)
         ]
@@ -121,11 +122,6 @@ class Motion:
         return found.reshape(3, *given.shape)
 
 
-def half_tone(amplitude: _Array, duration: _Array) -> list[Component]:
-    """A sin(pi t/T) for t < T, and 0 after it."""
-    return [Tone(amplitude, math.pi / duration, window=in_pieces((np.zeros(1), {0: np.ones(1)}), (duration, {})))]
-
-
 def _of_runs(values: _Array | float, runs: int | NDArray[np.int64]) -> _Array:
     """Numbers of some runs, from one for all or one for each."""
     array = np.asarray(values, dtype=np.float64)
@@ -156,7 +152,7 @@ def _product(one: _Array, other: _Array) -> _Array:
 
 def _swept(t: _Array, sweep: Sweep) -> _Array:
     """Value and derivatives of a sweep."""
-    speed, first, last, duration, exponential = sweep
+    size, first, last, duration, exponential, power = sweep
     s = np.minimum(t, duration)
     if exponential:
         grows = np.log(last / first) / duration
@@ -169,11 +165,11 @@ def _swept(t: _Array, sweep: Sweep) -> _Array:
         angle = s * (first + 0.5 * change * s)
     angle, over = angle + last * (t - s), t >= duration
     now, change, bend = np.where(over, last, now), np.where(over, 0.0, change), np.where(over, 0.0, bend)
-    sine, cosine, a = np.sin(angle), np.cos(angle), speed / now
-    falls = -a * change / now
-    curves = a * (2.0 * change * change / (now * now) - bend / now)
+    sine, cosine, a = np.sin(angle), np.cos(angle), size / now**power
+    falls = -power * a * change / now
+    curves = power * a * ((power + 1) * change * change / (now * now) - bend / now)
     return np.stack((
-        a * sine, speed * cosine + falls * sine,
+        a * sine, a * now * cosine + falls * sine,
         (curves - a * now * now) * sine + (2.0 * falls * now + a * change) * cosine,
     ))  # fmt: skip
 

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Drive, Scale, displacement_ratio, excitation_ratio, velocity_ratio
+from snapbeam.model.drive.base import (
+    Drive,
+    Scale,
+    acceleration_ratio,
+    displacement_ratio,
+    excitation_ratio,
+    velocity_ratio,
+)
 from snapbeam.model.quantity import RUN, quantity
 from snapbeam.util.diagnostics import Diagnostic
 
@@ -30,8 +37,8 @@ def _phase() -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Harmonic(Drive):
-    """A sine of the tip, whose amplitude (m) its kind gives."""
+class HarmonicMotion(Drive):
+    """A sine, whose amplitude (m, N) its kind gives."""
 
     frequency_ratio: float = excitation_ratio()
     harmonic = True
@@ -59,7 +66,7 @@ class _Harmonic(Drive):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sine(_Harmonic):
+class Sine(HarmonicMotion):
     """Harmonic motion of the tip with the velocity amplitude V b omega_1 (Eq. 16).
 
     The displacement of the tip is
@@ -121,7 +128,7 @@ class Sine(_Harmonic):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DisplacementSine(_Harmonic):
+class DisplacementSine(HarmonicMotion):
     """A sine of the tip by its displacement, w_s(t) = w_0 + A sin(omega t + phase).
 
     Parameters
@@ -152,7 +159,7 @@ class DisplacementSine(_Harmonic):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AccelerationSine(_Harmonic):
+class AccelerationSine(HarmonicMotion):
     """A sine of the tip by its acceleration, whose amplitude is a: A = a/omega^2.
 
     Parameters
@@ -174,9 +181,7 @@ class AccelerationSine(_Harmonic):
     >>> base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25))
     """
 
-    acceleration_amplitude: float = quantity(
-        "1", "acceleration amplitude over b omega_1^2", low=0.0, closed="left", scope=RUN
-    )
+    acceleration_amplitude: float = acceleration_ratio()
     phase: float = _phase()
     name = "acceleration_sine"
 

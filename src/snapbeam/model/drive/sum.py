@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import DRIVES, SUMS, Drive, Scale, Timed
 from snapbeam.model.drive.components import Component, Tone
+from snapbeam.model.drive.force import FORCES, ForceHistory
 from snapbeam.util.validation import InputError, instance
 
 _Array = NDArray[np.float64]
@@ -167,6 +168,24 @@ class SumDrive(Timed):
         return np.asarray(sum(drive.peak_acceleration(own, scale) for _, drive, own in self.each_term(columns)))
 
 
+class SumForce(ForceHistory, SumDrive):
+    """Sum of two to four forces, F(t) = sum_i F_i(t)."""
+
+    @property
+    def constant_part(self) -> float:
+        """Sum of the constant parts of the terms, N."""
+        return sum(each.constant_part for each in self.parts_of_sum if isinstance(each, ForceHistory))
+
+    @classmethod
+    def can_excite_base(cls) -> bool:
+        """A force moves no base."""
+        return False
+
+    def _begun(self, drive: Drive, own: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Zero: a force may begin with a jump."""
+        return np.zeros(next(iter(own.values())).size)
+
+
 def _names(kind: type[Drive]) -> list[str]:
     return [item.name for item in dataclasses.fields(kind)]  # type: ignore[arg-type]
 
@@ -177,9 +196,9 @@ def mixture(kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
     if not 2 <= len(kinds) <= MOST_TERMS:
         raise InputError(f"{words or 'no drive'}: a sum has 2 to {MOST_TERMS} terms")
     for kind in kinds:
-        if kind.recorded or kind.name == "fixed" or DRIVES.get(kind.name) is not kind:
+        if kind.recorded or kind.name == "fixed" or kinds[0].registry.get(kind.name) is not kind:
             raise InputError(
-                f"{words}: {kind.name!r} cannot be a term of a sum; a recording has its own time axis, and a stop adds nothing"
+                f"{words}: {kind.name!r} cannot be a term of a sum; a recording has its own time axis, a stop adds nothing, and a force is no motion"
             )
     name = _SEPARATOR.join(["SumDrive", *(kind.name for kind in kinds)])
     if name not in globals():
@@ -204,31 +223,30 @@ def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
         "__doc__": f"The sum of {', '.join(kind.name for kind in kinds)}.",
         "terms": kinds,
     }
-    found: Any = dataclasses.make_dataclass(name, fields, bases=(SumDrive,), namespace=body, frozen=True, kw_only=True)
+    bases = (SumForce if issubclass(kinds[0], ForceHistory) else SumDrive,)
+    found: Any = dataclasses.make_dataclass(name, fields, bases=bases, namespace=body, frozen=True, kw_only=True)
     found.name = _JOIN.join(kind.name for kind in kinds)  # later than the class, so that no table of drives has it
     mixed: type[SumDrive] = found
     return mixed
 
 
-def named(name: str) -> type[SumDrive] | None:
-    """The class of a kind such as ``"sine+burst"``; None if it is none."""
-    words = name.split(_JOIN) if isinstance(name, str) else []
-    if len(words) < 2 or not all(word in DRIVES for word in words):
-        return None
-    return mixture(tuple(DRIVES[word] for word in words))
+def named(name: str, known: Mapping[str, type[Drive]], join: str = _JOIN) -> type[SumDrive] | None:
+    """The class of a kind such as ``"sine+burst"`` of *known* ones; None if it is none."""
+    words = name.split(join)
+    return (
+        mixture(tuple(known[word] for word in words))
+        if len(words) > 1 and all(map(known.__contains__, words))
+        else None
+    )
 
 
 def __getattr__(name: str) -> type[SumDrive]:
     """A mixture by its name, as another process knows it."""
-    words = _words(name)
-    if words is None:
+    kinds = name.removeprefix(f"SumDrive{_SEPARATOR}")
+    found = named(kinds, {**DRIVES, **FORCES}, _SEPARATOR) if kinds != name else None
+    if found is None:
         raise AttributeError(name)
-    return mixture(tuple(DRIVES[word] for word in words))
-
-
-def _words(name: str) -> list[str] | None:
-    first, *words = name.split(_SEPARATOR)
-    return words if first == "SumDrive" and len(words) > 1 and all(word in DRIVES for word in words) else None
+    return found
 
 
 SUMS |= {"of": SumDrive.of, "named": named}
