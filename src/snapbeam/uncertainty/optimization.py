@@ -203,7 +203,7 @@ class Objective:
         Of an outcome Wilson's interval, of a mean Student's, of a quantile that of order statistics; none of a
         positive statistic goes below 0.
         """
-        n, positive = values.size, is_positive(self.quantity)
+        n, positive = values.size, is_positive(self.quantity) and not bool((values < 0.0).any())
         least = 0.0 if positive else -np.inf
         if self._quantity.kind == "outcome":
             found = proportion(int(values.sum()), n, confidence, failed)

@@ -51,8 +51,9 @@ def mean_interval(
     good = (count > 1) & known.all(axis=-1)
     low, high = mean - half, mean + half
     if positive:
-        factor = np.exp(np.divide(half, mean, where=mean > 0.0, out=np.zeros(mean.shape)))
-        low, high = mean / factor, mean * factor
+        as_said = (mean > 0.0) & ~(given < 0.0).any(axis=-1)
+        factor = np.exp(np.divide(half, mean, where=as_said, out=np.zeros(mean.shape)))
+        low, high = np.where(as_said, mean / factor, low), np.where(as_said, mean * factor, high)
     return mean, np.where(good, low, 0.0 if positive else -np.inf), np.where(good, high, np.inf)
 
 
