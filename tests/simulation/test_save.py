@@ -62,7 +62,9 @@ def test_parts_of_a_run(tmp_path) -> None:
             with pytest.raises(InputError, match="without modal_amplitude"):
                 again.plot("modal_amplitudes")
         if content == "states":
-            at = np.argmin(abs(run.dataset["cycle"].values[:, None] - np.arange(run.dataset["cycle"][-1] + 1e-6)), axis=0)
+            at = np.argmin(
+                abs(run.dataset["cycle"].values[:, None] - np.arange(run.dataset["cycle"][-1] + 1e-6)), axis=0
+            )
             xr.testing.assert_identical(again.dataset, run.dataset.isel(time=at))
     assert sizes[0] > 1.2 * sizes[1] > 1.4 * sizes[3] and sizes[1] > 1.2 * sizes[2] > sizes[3]
     for kind in ("run", "spectrum"):

@@ -356,7 +356,7 @@ def pace(done: int, total: int, rate: WorkRate, what: str = "points") -> str:
     if speed is None:
         return ""
     left = f", {duration((total - done) / speed)} left" if done < total else ""
-    return f"{speed:.3g} {what}/s{left}"
+    return f"{float(f'{speed:.3g}'):g} {what}/s{left}"
 
 
 def count_text(count: int, what: str = "points") -> str:

@@ -370,10 +370,9 @@ def _lines_probability(dataset: xr.Dataset, elapsed: float) -> list[str]:
         one = dataset.sel(outcome=name)
         sure = int((one["probability_low"] > 0.95).sum())
         never = int((one["probability_high"] < 0.05).sum())
-        lines.append(
-            f"{name}, {outcome_named(str(name))[1].long_name}: lower limit above 0.95 at {count_text(sure)}, "
-            f"upper limit below 0.05 at {never}"
-        )
+        event = outcome_named(str(name))[1]
+        words = event.long_name if event.statistic else f"{name} ({event.long_name})"
+        lines.append(f"{words}: lower limit above 0.95 at {count_text(sure)}, upper limit below 0.05 at {never}")
         lines += _intervals(one)
     for name in [str(name)[: -len("_quantile")] for name in dataset.data_vars if str(name).endswith("_quantile")]:
         lines += [f"{dataset[name].attrs['long_name']}:", *_intervals(dataset, name)]

@@ -62,9 +62,10 @@ class Saddle(NamedTuple):
 def _text_of(law: LocalForce) -> str:
     """A force with its parameters and their units."""
     values = ((name, getattr(law, name), row) for name, row in quantities(type(law)).items())
-    told = [f"{name.replace('_', ' ')} {with_unit(value, row.unit)}" for name, value, row in values if value is not None]
+    told = [
+        f"{name.replace('_', ' ')} {with_unit(value, row.unit)}" for name, value, row in values if value is not None
+    ]
     return ", ".join([law.name.replace("_", " "), *told])
-
 
 
 @dataclass(frozen=True, eq=False)

@@ -220,8 +220,10 @@ def _shape(system: System, amplitude: _Array) -> tuple[_Array, _Array]:
     """Places in units of the picture and displacements over b."""
     beam = system.model.beam
     x = np.linspace(0.0, 1.0, _POINTS)
-    if beam is None:  # a body that moves as the contact point does
-        return _WIDE * x, np.full(x.size, amplitude @ system.model.contact_shape) / system.scale.length
+    one = system.model.contact_shape
+    if beam is None and one is not None:  # a body that moves as the contact point does
+        return _WIDE * x, np.full(x.size, amplitude @ one) / system.scale.length
+    assert beam is not None
     shapes = beam.buckling_modes(system.model.modes).shape(x * beam.length)
     return _WIDE * x, amplitude @ shapes / system.scale.length
 

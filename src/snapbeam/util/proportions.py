@@ -33,9 +33,7 @@ def proportion(
     return share, low, high
 
 
-def mean_interval(
-    values: ArrayLike, confidence: float = 0.95, positive: bool = False
-) -> tuple[_Array, _Array, _Array]:
+def mean_interval(values: ArrayLike, confidence: float = 0.95, positive: bool = False) -> tuple[_Array, _Array, _Array]:
     """Return the mean along the last axis, without NaN, and Student's interval, infinite for fewer than two values.
 
     That of the mean m of a *positive* quantity is of its logarithm, of which s/m is the standard error: it stays positive,
