@@ -279,9 +279,10 @@ def _force_displacement(
     from snapbeam.util.si_prefixes import prefixed
 
     curve = force_displacement(potential, location, well=well)
+    where = f"{location:g} of the length" if system.model.beam is not None else "the contact point"
     console = out()
     console.print(
-        f"force at {location:g} of the length, from the {curve.attrs['well']} well ({curve.attrs['well_chosen_as']}); "
+        f"force at {where}, from the {curve.attrs['well']} well ({curve.attrs['well_chosen_as']}); "
         f"branches: {curve.sizes['branch_number']}, critical points: {curve.sizes['critical_point']}"
     )
     for name, words in (("snap_through", "snap-through"), ("snap_back", "snap-back")):

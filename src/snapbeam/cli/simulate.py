@@ -117,6 +117,8 @@ def simulate(
         if named:
             raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
         system = system.replace(drive=sb.RecordedMotion.from_dataset(_recorded(recorded_drive)))
+    if animate is not None and system.model.beam is None:
+        raise sb.InputError("--animate: a structure given by matrices has no shape that moves; use --plot")
     start = time.monotonic()
     run = None
     with _share_done() as progress:

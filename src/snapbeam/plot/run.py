@@ -657,6 +657,10 @@ def _column(
             axes[0].plot(x, values, color=color, label=label, rasterized=pixels)
     if at == 0:
         _straight(axes[0])
+    elif "striker_displacements" in part:  # the beam, not a stop far from it
+        low, high = (getattr(part["displacement_at_striker"], each)() for each in ("min", "max"))
+        room = max(0.5 * float(high - low), 2.0 * float(part["penetration_normalised"].max()))
+        axes[0].set_ylim(float(low) - room, float(high) + room)
     for row, name in enumerate((each for each in _PANELS if each in part), 1):
         factor, unit = scales[name]
         values = part[name].values / factor

@@ -1038,6 +1038,8 @@ def _dataset(
         attrs |= {"initial_well": trials.system.start_well, "initial_well_reason": trials.system.initial_well_reason}
     attrs |= {f"fixed_{lookup(name).short}": +value for name, value in in_table(trials.system.parameters).items()
               if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
+    if trials.system.model.beam is None:
+        attrs["length_scale"] = trials.system.scale.length
     dataset = xr.Dataset(attrs=attrs)
     x, objectives, violation, distances = tried
     reported = _distances(problem, x[chosen], found)
