@@ -48,6 +48,7 @@ REFUSALS = [
     (("map", "--thickness", "0.4"), "is it given in mm?"),
     (("map", "-o", "none/map.nc"), "cannot be written, 'none' is not an existing folder"),
     (("map", "-o", "map.txt"), "must end in .nc"),
+    (("map", "-o", "map.csv"), "snapbeam info map.nc --export map.csv"),
     (("map", "--plot", "map.gif"), "must end in .png or .pdf or .svg"),
     (("map", "--plot", "map.png", "--location", "0.2:0.5:3"), "drawn over one or two axes, not 3"),
     (("map", "--measurements", "none.csv"), "none.csv': cannot be read"),

@@ -118,5 +118,16 @@ def test_commands_of_runs(kind, saved) -> None:
 def test_commands_at_rest(kind, saved) -> None:
     done("equilibria", "-c", saved)
     done("frequencies", "-c", saved)
-    if SYSTEMS[kind].model.beam is not None:  # matrices have no shape to draw
-        done("schematic", "-c", saved, "-o", "schematic.png")
+    done("schematic", "-c", saved, "-o", "schematic.png")
+
+
+def test_what_a_structure_by_matrices_is_told(tmp_path) -> None:
+    """Its force acts on the contact point, not at a part of a length; it is not animated, which is said before the run."""
+    file = str(tmp_path / "cell.toml")
+    SYSTEMS["matrices with wells"].save(file)
+    said = done("equilibria", "-c", file, "--force-displacement")
+    assert "force at the contact point, from" in said and "of the length" not in said
+    refused = CliRunner().invoke(
+        app, ["simulate", "-c", file, "-o", str(tmp_path / "run.nc"), "--animate", str(tmp_path / "a.gif")]
+    )
+    assert refused.exit_code == 2 and "has no shape that moves" in refused.output and not (tmp_path / "run.nc").exists()

@@ -220,8 +220,8 @@ label = "magnet"
     ]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
-    assert "limit point at force.strength = " in done.output
-    assert ": branch 0, a stable branch ends" in done.output or "does not end, force.strength = " in done.output
+    assert "limit point at strength of the magnet = " in done.output
+    assert ": branch 0, a stable branch ends" in done.output or "does not end, strength of the magnet = " in done.output
     assert (tmp_path / "b.png").stat().st_size > 5_000
     refused = CliRunner().invoke(app, [*command, "--force-displacement"])
     assert refused.exit_code == 2

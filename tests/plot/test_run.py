@@ -145,3 +145,22 @@ def test_a_structure_given_by_matrices_between_two_stops_on_a_random_base():
     assert words == ["structure, centre", "structure, at the striker", "strikers"]
     assert "x_" not in figure.axes[0].get_title() + str(figure._suptitle)
     assert any(each.get_xlabel().startswith("Time (") for each in figure.axes)
+
+
+def test_a_long_run_after_a_shock_is_drawn_over_time_as_it_is() -> None:
+    """Intervals of whole cycles would be seconds there; and its spectrum is over hertz."""
+    model = sb.ReducedModel.from_matrices(
+        [[1e-3]], [400.0], contact_shape=[1.0], base_shape=[1.0], length_scale=1e-3, damping_ratio=0.01
+    )
+    shock = sb.BaseExcitation(motion=sb.Shock(acceleration_g=2.0, duration_ms=4.0))
+    run = sb.simulate(sb.System(model, base_excitation=shock), sb.Integration(cycles=150))
+    ax = plot_run(run)
+    (curve,) = (line for line in ax.lines if line.get_label() == "structure, centre")
+    assert np.asarray(curve.get_ydata()) == pytest.approx(run.dataset["midspan_displacement"].values)
+    assert not ax.collections
+    spectrum = sb.plot.plot_spectrum(run)
+    assert "Hz)" in spectrum.get_xlabel()
+    frequency, level = (np.asarray(each) for each in spectrum.lines[0].get_data())
+    hertz = frequency * (1e3 if "kHz" in spectrum.get_xlabel() else 1.0)
+    assert hertz[np.argmax(level)] == pytest.approx(np.sqrt(400.0 / 1e-3) / (2.0 * np.pi), rel=0.02)
+    plt.close("all")

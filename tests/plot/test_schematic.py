@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
 import snapbeam as sb
 from snapbeam.model import default_values
 from snapbeam.plot.schematic import plot_system
-from snapbeam.util.validation import InputError
 
 LEVEL = default_values.BEAM.buckling_level
 
@@ -29,10 +29,10 @@ def test_says_what_signs_do_not(model) -> None:
     striker = sb.Striker(drive=drive, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=0.1 * LEVEL)
     said = words(plot_system(sb.System(model, contacts=[sb.Contact(sb.HuntCrossley(4e8, 2.0), striker)])))
     assert "Hunt–Crossley" in said
-    assert "gap 0.1 $b$" in said
+    assert "gap 33.5 µm" in said
     assert "= 20 g" in said
     pressed = sb.Striker(drive=sb.FixedStop(), gap=-0.2 * LEVEL)
-    assert "preload 0.2 $b$" in words(
+    assert "preload 67 µm" in words(
         plot_system(sb.System(model, contacts=[sb.Contact(default_values.CONTACT, pressed)]))
     )
 
@@ -75,13 +75,43 @@ def test_what_surrounds_the_beam_is_drawn_and_named(model) -> None:
     assert drawn(axial_load=load) == (plain, said.replace("$P$", "$P(t)$")) and "$P$" in said
 
 
-def test_free_beam_and_refusal(model) -> None:
+def test_free_beam(model) -> None:
     figure = plot_system(sb.System(model))
     assert len(figure.axes) == 1
     plt.close(figure)
-    given = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0])
-    with pytest.raises(InputError, match="given by matrices has no shape"):
-        plot_system(sb.System(given))
+
+
+def test_a_structure_by_matrices_is_a_body_in_both_of_its_wells() -> None:
+    model = sb.ReducedModel.from_matrices(
+        np.diag([2e-3, 1e-3]), [[-300.0, -500.0], [-500.0, 500.0]], contact_shape=[0.0, 1.0], base_shape=[1.0, 1.0],
+        nonlinear_stiffness=5e8, elongation_matrix=[[1.0, 0.0], [0.0, 0.0]], well_amplitude=[-((800.0 / 5e8) ** 0.5)] * 2,
+        length_scale=1.265e-3,
+    )  # fmt: skip
+    stop = sb.Contact(sb.HertzContact(1e9), sb.Striker(drive=sb.FixedStop(), side="above", gap=5e-4), label="end")
+    shock = sb.BaseExcitation(motion=sb.Shock(acceleration_g=50.0, duration_ms=5.0))
+    figure = plot_system(sb.System(model, contacts=[stop], base_excitation=shock))
+    faces = [patch.get_y() for patch in figure.axes[0].patches if getattr(patch, "get_height", float)() == 0.24]
+    assert sorted(faces) == pytest.approx([-1.24, 0.76], abs=1e-3)  # their upper faces are in the wells
+    assert figure.axes[1].get_ylabel() == "Base acceleration (g)" and figure.axes[1].get_xlabel() == "Time (ms)"
+    assert figure.axes[1].lines[0].get_ydata().max() == pytest.approx(50.0, rel=1e-4)
+    said = words(figure)
+    assert "2 coordinates" in said and "end: Hertz" in said and "gap 500 µm" in said
+
+
+def test_stops_on_both_sides_lie_in_the_picture(model) -> None:
+    stops = [
+        sb.Contact(sb.HertzContact(1e9), sb.Striker(drive=sb.FixedStop(), side=side, gap=gap * LEVEL))
+        for side, gap in (("above", 0.5), ("below", 2.4))
+    ]
+    figure = plot_system(sb.System(model, contacts=stops))
+    ax = figure.axes[0]
+    low, high = ax.get_ylim()
+    tips = [patch for patch in ax.patches if hasattr(patch, "radius")]
+    assert [tip.center[1] for tip in tips] == pytest.approx([1.6, -1.5], abs=1e-2)
+    for patch in ax.patches:
+        box = patch.get_extents().transformed(ax.transData.inverted())
+        assert low <= box.ymin and box.ymax <= high
+    plt.close(figure)
 
 
 def test_unequal_wells_and_what_makes_them(model) -> None:

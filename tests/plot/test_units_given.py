@@ -60,7 +60,35 @@ type = "acceleration_sine"
 frequency_hz = "40 kHz"
 amplitude_g = "20000 g"
 """
-FILES = {"base": BEAM + BASE, "striker": BEAM + STRIKER, "arch": ARCH, "free": BEAM}
+SHOCK = """
+[base_excitation]
+type = "shock"
+acceleration_g = "20 g"
+duration_ms = "5 ms"
+"""
+RANDOM = """
+[base_excitation]
+type = "random_vibration"
+psd = [["20 Hz", "1 m^2/s^3"], ["200 Hz", "1 m^2/s^3"]]
+duration_s = "500 ms"
+seed = 1
+"""
+POWER = """
+[harvester]
+type = "piezo"
+moment_per_volt = -1.66e-4
+capacitance = "767 nF"
+resistance = "10 kohm"
+"""
+FILES = {
+    "powered": BEAM + BASE + POWER,
+    "shock": BEAM + SHOCK,
+    "random": BEAM + RANDOM,
+    "base": BEAM + BASE,
+    "striker": BEAM + STRIKER,
+    "arch": ARCH,
+    "free": BEAM,
+}
 SHORT = sb.Integration(cycles=12)
 HERTZ = "base_excitation.frequency_hz", "30 Hz:45 Hz:4"
 GRAVITIES = "base_excitation.amplitude_g", "0.2 g:2 g:4"
@@ -167,6 +195,12 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
         "striker", lambda s: U.probability_map(s, axes(SPEED), tolerance(), 4, integration=SHORT),
         (MM_S, "Probability of snap-through"),
     ),
+    "power beyond a value": (
+        "powered", lambda s: U.probability_map(
+            s, axes(GRAVITIES), tolerance(), 4, outcomes=["harvested_power > 20 uW"], statistics=["harvested_power"],
+            integration=SHORT,
+        ), (G, "Probability of snap-through"),
+    ),
     "quantiles of the base": (
         "base", lambda s: quantiles(s, GRAVITIES[0], (0.2, 4.0), HERTZ), (HZ, "Threshold: acceleration amplitude of the\nbase (g)")
     ),
@@ -204,6 +238,8 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
     "section": ("base", lambda s: D.poincare_section(s), (f"Displacement at mid-span {OVER_B}",)),
     "attractors": ("base", lambda s: D.find_attractors(s, 6).to_dataset(), ()),
     "run of the base": ("base", lambda s: sb.simulate(s, SHORT).dataset, ("Displacement $w/b$\n($b$ = 700 µm)",)),
+    "run under a shock": ("shock", lambda s: sb.simulate(s, SHORT).dataset, ("Base\nacceleration (g)", "Time (ms)")),
+    "run in random vibration": ("random", lambda s: sb.simulate(s, SHORT).dataset, ("Base\nacceleration (g)", "Time (ms)")),
     "run of the striker": ("striker", lambda s: sb.simulate(s, SHORT).dataset, ("Displacement $w/b$\n($b$ = 700 µm)",)),
     "growth": (
         "striker", lambda s: sb.perturbation_growth(s, SHORT), ("Maximum change of the displacement\n" + OVER_B,)
@@ -242,6 +278,7 @@ def test_figures_have_the_units_that_were_given(case: str, systems: dict[str, sb
         figure = ax.get_figure(root=True)
         figure.canvas.draw()
         drawn = [label for each in figure.axes for label in (each.get_xlabel(), each.get_ylabel())]
+        swept_over = [label for label in drawn if not label.startswith("Base")]  # its motion in time is no axis
         if number == 0:
             assert set(labels) <= set(drawn), drawn
         texts, heading = texts_of(figure), ax.get_title()
@@ -254,7 +291,7 @@ def test_figures_have_the_units_that_were_given(case: str, systems: dict[str, sb
         for word in ("cycles", "$N$ ="):
             assert heading.count(word) <= 1
         for unit in ("Hz)", "(g)", "m/s)"):
-            if any(unit in label for label in drawn):
+            if any(unit in label for label in swept_over):
                 swept = {"Hz)": "Hz", "(g)": "$g$", "m/s)": "m/s"}[unit]
                 assert swept not in heading.partition("steps")[0], (
                     f"{name}: the heading {heading!r} has a value that is swept"

@@ -46,7 +46,7 @@ def test_parts_of_a_run(tmp_path) -> None:
     """Without the modes or all samples a file has the same statistics, impacts and final state, and says what it lacks."""
     run = sb.simulate(*CASES["plain"])
     sizes = []
-    for content in ("samples", "waveforms", "statistics"):
+    for content in ("samples", "waveforms", "states", "statistics"):
         path = tmp_path / f"{content}.nc"
         run.save(path, content)
         sizes.append(path.stat().st_size)
@@ -61,12 +61,17 @@ def test_parts_of_a_run(tmp_path) -> None:
             assert len(again.plot("spectrum").lines) > 0
             with pytest.raises(InputError, match="without modal_amplitude"):
                 again.plot("modal_amplitudes")
-    assert sizes[0] > 1.2 * sizes[1] > 1.4 * sizes[2]
+        if content == "states":
+            at = np.argmin(
+                abs(run.dataset["cycle"].values[:, None] - np.arange(run.dataset["cycle"][-1] + 1e-6)), axis=0
+            )
+            xr.testing.assert_identical(again.dataset, run.dataset.isel(time=at))
+    assert sizes[0] > 1.2 * sizes[1] > 1.4 * sizes[3] and sizes[1] > 1.2 * sizes[2] > sizes[3]
     for kind in ("run", "spectrum"):
         with pytest.raises(InputError, match="run with 0 samples: has no figures"):
             again.plot(kind)
-    with pytest.raises(InputError, match="content = 'states': must be one of"):
-        run.save(path, "states")
+    with pytest.raises(InputError, match="content = 'state': must be one of"):
+        run.save(path, "state")
 
 
 def test_save_of_the_command(tmp_path) -> None:
@@ -84,7 +89,13 @@ def test_save_of_the_command(tmp_path) -> None:
     assert again.dataset.sizes["time"] == 0
     figure = CliRunner().invoke(app, ["plot", str(tmp_path / "run.nc"), "-o", str(tmp_path / "run.png")])
     assert figure.exit_code == 2 and "run with 0 samples: has no figures" in figure.output
-    for more in (["states"], ["waveforms", "--stream"]):
+    done = CliRunner().invoke(app, [*words, "states"])
+    assert done.exit_code == 0, done.output
+    states = sb.load(tmp_path / "run.nc").dataset
+    assert states["cycle"].values == pytest.approx(np.arange(6.0), abs=1e-12)
+    orbit = sb.simulate(again.system, again.integration, sample_times=states["time"].values).dataset
+    np.testing.assert_array_equal(states["modal_velocity"], orbit["modal_velocity"])
+    for more in (["state"], ["waveforms", "--stream"]):
         assert CliRunner().invoke(app, [*words, *more]).exit_code == 2
 
 

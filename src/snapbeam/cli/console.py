@@ -356,7 +356,7 @@ def pace(done: int, total: int, rate: WorkRate, what: str = "points") -> str:
     if speed is None:
         return ""
     left = f", {duration((total - done) / speed)} left" if done < total else ""
-    return f"{speed:.3g} {what}/s{left}"
+    return f"{float(f'{speed:.3g}'):g} {what}/s{left}"
 
 
 def count_text(count: int, what: str = "points") -> str:
@@ -444,6 +444,12 @@ def check_outputs(output: Path, plot: Path | None, suffixes: tuple[str, ...] = (
     """Refuse, before any computation, results and figures that cannot be written; *begin* begins such tables."""
     from snapbeam.util.files import check_writable
 
+    if output.suffix.lower() == ".csv" and ".csv" not in suffixes:
+        name = shlex.quote(str(output.with_suffix(".nc")))
+        raise InputError(
+            f"output = {str(output)!r}: must end in {' or '.join(suffixes)}; write a table of it afterwards by "
+            f"snapbeam info {name} --export {shlex.quote(str(output))}"
+        )
     check_writable(output, "output", suffixes, begin)
     check_pictures(("plot", plot))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -211,7 +212,7 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None, 
     """Print the critical points over a parameter, and write the branches and their figure."""
     from snapbeam.model.equilibrium_branches import equilibrium_branches
     from snapbeam.model.parameters import lookup
-    from snapbeam.util.si_prefixes import WITH_PREFIX, prefixed
+    from snapbeam.util.si_prefixes import prefixed, with_unit
     from snapbeam.util.validation import InputError, choice
 
     if variable is not None:
@@ -220,27 +221,25 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None, 
         choice("variable", variable, BRANCH_FIGURES)
     name, equals, text = over.partition("=")
     name = settings.full_name(name.strip())
-    unit = lookup(name).quantity.unit
+    row = lookup(name).quantity
     if not equals:
         raise InputError(f"over = {over!r}: must be name=start:stop, such as force.voltage=0:40")
-    ends = opt.parse_range(name, text, unit)
+    ends = opt.parse_range(name, text, row.unit)
     with progress(None, "equilibrium branches", "equilibria") as report:
         found = equilibrium_branches(settings.static_system, name, ends, progress=report)
     console = out()
 
-    def shown(value: float) -> str:
-        return prefixed(value, unit, 6) if unit in WITH_PREFIX else f"{value:.6g}{'' if unit == '1' else ' ' + unit}"
-
+    words, shown = row.long_name, functools.partial(with_unit, unit=row.unit)
     columns = ("kind", "value", "displacement", "branch", "outcome")
     for kind, value, place, branch, outcome in zip(
         *(found[f"critical_{each}"].values for each in columns), strict=True
     ):
         console.print(
-            f"{kind} point at {name} = {shown(value)}, centre at {prefixed(float(place), 'm', 4)}: branch {branch}, "
+            f"{kind} point at {words} = {shown(float(value))}, centre at {prefixed(float(place), 'm', 4)}: branch {branch}, "
             f"{_OUTCOMES[str(outcome)]}"
         )
     if not found.sizes["critical_point"]:
-        console.print(f"no critical points over {name}")
+        console.print(f"no critical points over {words}")
     for part in range(found.sizes["stable_part"]):
         own = found.isel(stable_part=part)
         stable = zip(
@@ -252,8 +251,8 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None, 
         console.print(f"stable part {part + 1}: first frequency from {' to '.join(told)}")
         if (own["stable_end_kind"] == "none").all():
             first, last = (prefixed(float(each), "m", 4) for each in own["stable_displacement"].values)
-            between = " to ".join(shown(float(each)) for each in own["stable_value"].values)
-            console.print(f"the stable branch with the centre at {first} to {last} does not end, {name} = {between}")
+            between = " to ".join(shown(each) for each in own["stable_value"].values)
+            console.print(f"the stable branch with the centre at {first} to {last} does not end, {words} = {between}")
     add_json(
         parameter=name,
         critical_values=found["critical_value"].values,
@@ -279,9 +278,10 @@ def _force_displacement(
     from snapbeam.util.si_prefixes import prefixed
 
     curve = force_displacement(potential, location, well=well)
+    where = f"{location:g} of the length" if system.model.beam is not None else "the contact point"
     console = out()
     console.print(
-        f"force at {location:g} of the length, from the {curve.attrs['well']} well ({curve.attrs['well_chosen_as']}); "
+        f"force at {where}, from the {curve.attrs['well']} well ({curve.attrs['well_chosen_as']}); "
         f"branches: {curve.sizes['branch_number']}, critical points: {curve.sizes['critical_point']}"
     )
     for name, words in (("snap_through", "snap-through"), ("snap_back", "snap-back")):

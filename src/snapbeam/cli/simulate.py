@@ -63,8 +63,8 @@ def simulate(
         str,
         typer.Option(
             "--save",
-            help="Samples in the file of --output: samples (all, default), waveforms (without those of the modes) or statistics "
-            "(none, for long runs).",
+            help="Samples in the file of --output: samples (all, default), waveforms (without those of the modes), states "
+            "(one each cycle) or statistics (none, for long runs).",
             rich_help_panel="Output",
             metavar="CONTENT",
         ),
@@ -117,20 +117,24 @@ def simulate(
         if named:
             raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
         system = system.replace(drive=sb.RecordedMotion.from_dataset(_recorded(recorded_drive)))
+    if animate is not None and system.model.beam is None:
+        raise sb.InputError("--animate: a structure given by matrices has no shape that moves; use --plot")
     start = time.monotonic()
     run = None
     with _share_done() as progress:
         times = _even(system, integration, samples)
-        if save == "statistics" and not pictures:
-            times = [0.0]  # samples that nobody sees are not recorded
+        if save in ("states", "statistics") and not pictures:  # samples that nobody sees are not recorded
+            times = [0.0] if save == "statistics" else _even(system, integration, 1)
         if output is not None and not stream:
+            kept = _even(system, integration, 1) if save == "states" else times
             size = (
                 0.0
                 if save == "statistics"
-                else least_file_size(system, integration, None if times is None else len(times))
+                else least_file_size(system, integration, None if kept is None else len(kept))
             )
-            _tell_size(size, output) if save == "samples" else None
-            require_room_of({"output": (output, size if save == "samples" else 0.0), **pictures})
+            size = 0.0 if save == "waveforms" else size
+            _tell_size(size, output)
+            require_room_of({"output": (output, size), **pictures})
         if stream and output is not None:
             summary = sb.simulate_to_file(system, integration, path=output, sample_times=times, progress=progress)
         else:
@@ -163,7 +167,7 @@ def _tell_size(least: float, path: Path) -> None:
     if 2.0 * least > _LARGE_FILE:
         notes().print(
             f"{path}: about {2.0 * least / 1e6:.2g} MB; smaller are files with fewer samples per cycle (--samples 50), without "
-            "those of the modes (--save waveforms), or without any (--save statistics)",
+            "those of the modes (--save waveforms), with one each cycle (--save states), or without any (--save statistics)",
             markup=False,
         )
 

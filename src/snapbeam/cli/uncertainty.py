@@ -11,7 +11,16 @@ import numpy as np
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, check_outputs, cli_command, duration, notes, print_written, progress
+from snapbeam.cli.console import (
+    add_json,
+    check_outputs,
+    cli_command,
+    count_text,
+    duration,
+    notes,
+    print_written,
+    progress,
+)
 from snapbeam.cli.summary import initial_well_lines
 
 if TYPE_CHECKING:
@@ -351,13 +360,19 @@ def _intervals(one: xr.Dataset, name: str = "probability") -> list[str]:
 
 
 def _lines_probability(dataset: xr.Dataset, elapsed: float) -> list[str]:
+    from snapbeam.uncertainty.monte_carlo import outcome_named
+
     runs, points = int(dataset.attrs["runs_made"]), int(dataset["runs"].size)
-    lines = [f"{runs} runs at {points} points in {duration(elapsed)}", *initial_well_lines(dataset)]
+    lines = [
+        f"{count_text(runs, 'runs')} at {count_text(points)} in {duration(elapsed)}", *initial_well_lines(dataset)
+    ]  # fmt: skip
     for name in dataset["outcome"].values:
         one = dataset.sel(outcome=name)
         sure = int((one["probability_low"] > 0.95).sum())
         never = int((one["probability_high"] < 0.05).sum())
-        lines.append(f"{name}: lower limit above 0.95 at {sure} points, upper limit below 0.05 at {never}")
+        event = outcome_named(str(name))[1]
+        words = event.long_name if event.statistic else f"{name} ({event.long_name})"
+        lines.append(f"{words}: lower limit above 0.95 at {count_text(sure)}, upper limit below 0.05 at {never}")
         lines += _intervals(one)
     for name in [str(name)[: -len("_quantile")] for name in dataset.data_vars if str(name).endswith("_quantile")]:
         lines += [f"{dataset[name].attrs['long_name']}:", *_intervals(dataset, name)]
@@ -365,7 +380,7 @@ def _lines_probability(dataset: xr.Dataset, elapsed: float) -> list[str]:
             one = dataset.sel(quantile=level)
             lines += [f"{level:g} {one[f'{name}_quantile'].attrs['long_name']}:", *_intervals(one, f"{name}_quantile")]
     if not bool(dataset["reached"].all()):
-        lines.append(f"interval wider than requested at {int((~dataset['reached']).sum())} points")
+        lines.append(f"interval wider than requested at {count_text(int((~dataset['reached']).sum()))}")
     lines.append(f"stopped: {dataset.attrs['termination_reason']}")
     failed = int(dataset["runs_failed"].sum())
     return (

@@ -893,10 +893,12 @@ def sections_as_given(system: System) -> dict[str, dict[str, Any]]:
     for full, raw in system.as_given.items():
         section, name = split_name(full)
         key = split_name(ratio_of(full))[1]
+        own = sections.get(section, {})
+        if key not in own:  # of a material, from which another parameter was computed
+            continue
         unit = PHYSICAL[full].unit if full in PHYSICAL else lookup(full).quantity.unit
         number = number_in_unit(raw, unit) if isinstance(raw, str) else raw
-        own = sections.get(section, {})
-        if key not in own or number is None:
+        if number is None:
             continue
         value = number / unit_of(system, full) if full in PHYSICAL else number
         if value == own[key]:

@@ -16,7 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.model.equilibria import Equilibrium, dot, landscape_of, product, tangent_stiffness
 from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.local_force import LocalForce
+from snapbeam.model.quantity import quantities
 from snapbeam.model.reduced_model import LinearModes, ReducedModel, linear_modes_about
+from snapbeam.util.si_prefixes import with_unit
 from snapbeam.util.validation import InputError, finite_array, shown
 
 _Array = NDArray[np.float64]
@@ -55,6 +57,15 @@ class Saddle(NamedTuple):
     equilibrium: Equilibrium
     wells: tuple[int | None, int | None]
     """Numbers of the wells, by the height of mid-span; None if the descent leaves the range of a law (pull-in)."""
+
+
+def _text_of(law: LocalForce) -> str:
+    """A force with its parameters and their units."""
+    values = ((name, getattr(law, name), row) for name, row in quantities(type(law)).items())
+    told = [
+        f"{name.replace('_', ' ')} {with_unit(value, row.unit)}" for name, value, row in values if value is not None
+    ]
+    return ", ".join([law.name.replace("_", " "), *told])
 
 
 @dataclass(frozen=True, eq=False)
@@ -571,7 +582,7 @@ class Potential:
     @property
     def force_texts(self) -> list[str]:
         """Description of the additional forces, one sentence for each."""
-        found = [f"with {shown(law)}" for law in self.local_forces]
+        found = [f"with {_text_of(law)}" for law in self.local_forces]
         return [*found, "with the constant part of the external force"] if self.constant.any() else found
 
     @cached_property

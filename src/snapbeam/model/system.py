@@ -8,6 +8,7 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar
@@ -36,7 +37,7 @@ from snapbeam.model.striker import Contact, Striker
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.si_prefixes import prefixed
+from snapbeam.util.si_prefixes import prefixed, with_unit
 from snapbeam.util.validation import InputError, InputTypeError, instance, shown
 
 _A: dict[str, tuple[Any, str]] = {
@@ -563,8 +564,11 @@ class System:
     def describe(self) -> str:
         """The system in a few lines, for a person to read."""
         lines = []
-        for section, values in self.to_mapping().items():
-            words = ", ".join(f"{name} = {_brief(value)}" for name, value in values.items() if value is not None)
+        from snapbeam.model.parameter_file import sections_as_given
+
+        for section, values in sections_as_given(self).items():
+            given = {name: value for name, value in values.items() if value is not None}
+            words = ", ".join(f"{name} = {_brief(value, f'{section}.{name}')}" for name, value in given.items())
             lines.append(f"{section:8s}  {words}")
         return "\n".join(lines)
 
@@ -609,10 +613,14 @@ def _without_none(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[s
     }
 
 
-def _brief(value: Any) -> str:
+def _brief(value: Any, name: str) -> str:
     if isinstance(value, np.ndarray):
         return f"array of shape {value.shape}" if value.size > 4 else json.dumps(value.tolist())
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    with suppress(InputError):  # of a part of the user's own
+        return with_unit(value, lookup(name).quantity.unit)
+    return f"{value:.6g}"
 
 
 def _parted(line: str) -> tuple[str, str, str]:

@@ -289,7 +289,7 @@ class _BeamShape:
     def __init__(self, dataset: xr.Dataset) -> None:
         for name in ("beam_length", "length_scale"):
             if name not in dataset.attrs:
-                raise InputError(f"run without the attribute {name}: its modal amplitudes have no shape")
+                raise InputError(f"run without the attribute {name}: it is of no beam, whose shape could be drawn")
         self.position = np.linspace(0.0, 1.0, _POSITIONS)
         self.length, self.scale = (float(dataset.attrs[name]) for name in ("beam_length", "length_scale"))
         self.time = dataset["time"].values

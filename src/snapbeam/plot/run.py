@@ -163,7 +163,7 @@ def plot_spectrum(
     Returns
     -------
     matplotlib.axes.Axes
-        Over the excitation frequency where the run has cycles, else over hertz.
+        Over the excitation frequency where the run has cycles, else, as of a shock or random vibration, over hertz.
 
     Examples
     --------
@@ -183,17 +183,25 @@ def plot_spectrum(
     frequency = np.fft.rfftfreq(even.size, float(even[1] - even[0]))
     unit = dataset[variable].attrs.get("units", "1")
     with frame(ax, dataset, height=66.0) as ax:
+        frequency, top, label = _frequencies(dataset, name, frequency)
         ax.plot(frequency[1:], spectrum[1:], color=BEAM_COLOR, linewidth=0.6)
-        top = 12.0 if name == "cycle" else float(frequency[-1])
         shown = spectrum[1:][frequency[1:] <= top]
         ax.set(xlim=(0.0, top), yscale="log", ylim=(max(shown.max() * 1e-5, 1e-300), shown.max() * 2.0))
-        ax.set_xlabel(_FREQUENCY[name])
+        ax.set_xlabel(label)
         words = _words(dataset, variable)
         ax.set_ylabel(wrapped(words if unit == "1" else f"{words} ({unit})", 40))
     return ax
 
 
-_FREQUENCY = {"cycle": r"Frequency $f\,/\,f_\mathrm{excitation}$", "time": "Frequency (Hz)"}
+def _frequencies(dataset: xr.Dataset, name: str, given: np.ndarray) -> tuple[np.ndarray, float, str]:
+    """Frequencies in the unit of their axis, the highest to show, and the label; of no cycle in hertz."""
+    if name == "cycle":
+        return given, max(12.0, given[2]), r"Frequency $f\,/\,f_\mathrm{excitation}$"
+    top = float(given[-1])
+    if _is_of_one_event(dataset):
+        top = min(top, 12.0 * float(dataset.attrs["reference_frequency"]))
+    factor, unit = scale_of([top], "Hz")
+    return given / factor, top / factor, f"Frequency ({unit})"
 
 
 def _even_samples(run: Run | xr.Dataset, variable: str | None, window: Any) -> tuple[xr.Dataset, str, str, Any, Any]:
@@ -202,12 +210,9 @@ def _even_samples(run: Run | xr.Dataset, variable: str | None, window: Any) -> t
     if variable is None:
         variable = "midspan_displacement" if "midspan_displacement" in dataset else "displacement_at_striker"
     choice("variable", variable, tuple(str(key) for key in dataset.data_vars if dataset[key].dims == ("time",)))
-    name, _ = across(dataset)
-    x, y = dataset[name].values, dataset[variable].values
-    if window is not None:
-        first, last = interval("window", window)
-        inside = (x >= first) & (x <= last)
-        x, y = x[inside], y[inside]
+    part = cut(dataset, across(dataset)[0], window)
+    name = "time" if _is_of_one_event(dataset) else across(dataset)[0]
+    x, y = part[name].values, part[variable].values
     if x.size < 16:
         raise InputError(f"window = {window}: must hold at least 16 samples")
     if not np.isfinite(y).all():
@@ -222,6 +227,7 @@ def _even_samples(run: Run | xr.Dataset, variable: str | None, window: Any) -> t
 def _words(dataset: xr.Dataset, variable: str) -> str:
     """Long name of a variable, as the label of an axis."""
     words = in_symbols(str(dataset[variable].attrs.get("long_name", variable)))
+    words = words.replace("beam ", "structure ") if is_of_matrices(dataset.attrs) else words
     words = scale_text(dataset.attrs, words) if "$b$" in words else words
     return f"{words[:1].upper()}{words[1:]}"
 
@@ -284,15 +290,18 @@ def plot_spectrogram(
     first, last = transform.lower_border_end[1], transform.upper_border_begin(y.size)[1]
     level = np.abs(transform.stft_detrend(y, "constant", p0=first, p1=last))
     level = 20.0 * np.log10(np.maximum(level / level.max(), 1e-12)) if level.max() > 0.0 else level
-    rows = transform.f <= (max(12.0, transform.f[2]) if name == "cycle" else transform.f[-1])
+    frequency, top, label = _frequencies(dataset, name, transform.f)
+    rows = frequency <= top
     with frame(ax, dataset, height=66.0) as ax:
         mesh = ax.pcolormesh(
-            transform.t(y.size, p0=first, p1=last) + even[0], transform.f[rows], level[rows], vmin=-60.0, vmax=0.0,
+            transform.t(y.size, p0=first, p1=last) + even[0], frequency[rows], level[rows], vmin=-60.0, vmax=0.0,
             cmap=cm.batlow, shading="nearest", rasterized=True,
         )  # fmt: skip
         color_bar(mesh, ax, "Amplitude (dB of the maximum)")
-        extend_title(ax, _words(dataset, variable))
-        ax.set(xlabel=across(dataset)[1], ylabel=_FREQUENCY[name], ylim=(0.0, transform.f[rows][-1]))
+        extend_title(ax, _words(dataset.assign_attrs(length_scale=None), variable))  # the heading states b
+        ax.set(
+            xlabel=across(dataset)[1] if name == "cycle" else "Time (s)", ylabel=label, ylim=(0.0, frequency[rows][-1])
+        )
     return ax
 
 
@@ -530,7 +539,7 @@ def plot_run(run: Run | xr.Dataset, window: tuple[float, float] | None = None, a
             for name, (_, unit) in _PANELS.items()
             if name in part
         }
-        left = _column(figure, grid, 0, part, part[axis_name].values, scales)
+        left = _column(figure, grid, 0, part, part[axis_name].values, scales, _interval(part, axis_name))
         if "power_load" in part:
             row = 1 + [name for name in _PANELS if name in part].index("power_load")
             _mean_power(left[row], dataset, dataset[axis_name].values / period, scales["power_load"])
@@ -562,14 +571,14 @@ def plot_run(run: Run | xr.Dataset, window: tuple[float, float] | None = None, a
     return left[0]
 
 
-_ONE_EVENT = ("shock", "half_sine", "recorded_acceleration", "random_vibration")
+ONE_EVENT = ("shock", "half_sine", "recorded_acceleration", "random_vibration")
 """Types of excitation without a cycle: their runs are drawn over seconds."""
 
 
 def _is_of_one_event(dataset: xr.Dataset) -> bool:
     """Return whether a base without a striker moves the beam by a shock or a record, which has no cycle."""
     moves = "striker_displacement" in dataset and np.ptp(dataset["striker_displacement"].values) > 1e-9
-    return dataset.attrs.get("base_excitation_type") in _ONE_EVENT and not moves
+    return dataset.attrs.get("base_excitation_type") in ONE_EVENT and not moves
 
 
 def _with_base_acceleration(part: xr.Dataset) -> xr.Dataset:
@@ -629,7 +638,8 @@ def _range(inside: np.ndarray) -> slice:
 
 
 def _column(
-    figure: Figure, grid: GridSpec, at: int, part: xr.Dataset, x: np.ndarray, scales: dict[str, tuple[float, str]]
+    figure: Figure, grid: GridSpec, at: int, part: xr.Dataset, x: np.ndarray, scales: dict[str, tuple[float, str]],
+    far: float = 0.0,
 ) -> list[Axes]:  # fmt: skip
     rows, axes = grid.nrows, list[Axes]()
     for row in range(rows):
@@ -638,16 +648,19 @@ def _column(
         axes[-1].tick_params(labelbottom=row == rows - 1)
         axes[-1].margins(x=0.0)
     pixels = x.size > _MANY
-    far = at == 0 and "cycle" in part.variables and float(np.ptp(part["cycle"].values)) > _ENVELOPE
     for values, label, color in _curves(part):
         if far:
-            _envelope(axes[0], x, values, color, f"{label} (range)")
+            _envelope(axes[0], x, values, far, color, f"{label} (range)")
         elif at == 1 and x.size < _FEW:
             axes[0].plot(*_smooth(x, values), color=color, label=label)
         else:
             axes[0].plot(x, values, color=color, label=label, rasterized=pixels)
     if at == 0:
         _straight(axes[0])
+    elif "striker_displacements" in part:  # the beam, not a stop far from it
+        low, high = (getattr(part["displacement_at_striker"], each)() for each in ("min", "max"))
+        room = max(0.5 * float(high - low), 2.0 * float(part["penetration_normalised"].max()))
+        axes[0].set_ylim(float(low) - room, float(high) + room)
     for row, name in enumerate((each for each in _PANELS if each in part), 1):
         factor, unit = scales[name]
         values = part[name].values / factor
@@ -655,7 +668,7 @@ def _column(
             factor, unit = 1.0, "$10^{-3}\\,b$"
             values = 1e3 * np.maximum(part[name].values, 0.0)
         if far:
-            _envelope(axes[row], x, values, BEAM_COLOR, None)
+            _envelope(axes[row], x, values, far, BEAM_COLOR, None)
         elif at == 1 and x.size < _FEW:
             axes[row].plot(*_smooth(x, values), color=BEAM_COLOR)
             axes[row].plot(x, values, ".", color=BEAM_COLOR, markersize=2.5)
@@ -714,9 +727,16 @@ def _slope_at_end(h: np.ndarray, secant: np.ndarray) -> float:
     return float(3.0 * secant[0] if turns and abs(slope) > 3.0 * abs(secant[0]) else slope)
 
 
-def _envelope(ax: Axes, x: np.ndarray, y: np.ndarray, color: str, label: str | None) -> None:
-    """Draw the range of a curve in each of about :data:`_ENVELOPE` intervals of whole cycles."""
-    width = np.ceil((x[-1] - x[0]) / _ENVELOPE)
+def _interval(part: xr.Dataset, across: str) -> float:
+    """Length of the intervals, whole cycles or times, of which the range is drawn; 0 where the curve itself is."""
+    span = float(np.ptp(part["cycle"].values)) if "cycle" in part.variables else 0.0
+    if across == "cycle":
+        return float(np.ceil(span / _ENVELOPE)) if span > _ENVELOPE else 0.0
+    return float(np.ptp(part[across].values)) / (5 * _ENVELOPE) if span > 10 * _ENVELOPE else 0.0  # an event is short
+
+
+def _envelope(ax: Axes, x: np.ndarray, y: np.ndarray, width: float, color: str, label: str | None) -> None:
+    """Draw the range of a curve in intervals."""
     interval = np.floor((x - x[0]) / width).astype(int)
     starts = np.flatnonzero(np.diff(interval, prepend=-1))
     low, high = (np.asarray(f.reduceat(y, starts)) for f in (np.fmin, np.fmax))

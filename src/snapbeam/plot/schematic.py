@@ -11,19 +11,20 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
-from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.constant_velocity import ConstantVelocity
 from snapbeam.model.drive.fixed_stop import FixedStop
+from snapbeam.model.drive.shock import GRAVITY
 from snapbeam.model.harvester import ElectromagneticHarvester, PiezoelectricHarvester, PiezoelectricPatches
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import numbered
-from snapbeam.model.striker import Striker
+from snapbeam.model.striker import Contact, Striker
 from snapbeam.model.system import System
+from snapbeam.plot.run import ONE_EVENT
 from snapbeam.plot.style import BEAM_COLOR, CENTER_COLOR, SERIES_COLORS, SHAKER_COLOR, figure_style, new_figure
 from snapbeam.solver.excitation import motion_of
-from snapbeam.util.si_prefixes import prefixed
-from snapbeam.util.validation import InputError, checked, instance
+from snapbeam.util.si_prefixes import prefixed, scale_of
+from snapbeam.util.validation import checked, instance
 
 # ----------------------------------------------------------------------------------------------------
 # The motions of tips in the schematic of a system: one, or those of several strikers in one pair of axes.
@@ -146,6 +147,8 @@ _RADIUS = 0.10
 """Radius of the tip, in units of the picture: b upwards, L/7 sideways."""
 _WIDE = 7.0
 """Length of the beam in those units."""
+_END = 1.6
+"""Distance of a body from the supports of its springs."""
 _MOTIONS = {
     "drive": ("Drive", "Tip displacement $/\\,b$"),
     "base_excitation": ("Base", "Base displacement $y/b$"),
@@ -176,7 +179,7 @@ def plot_system(system: System, title: str = "") -> Figure:
     Parameters
     ----------
     system : System
-        Of a beam; a structure given by matrices has no shape to draw.
+        A structure given by matrices, which has no shape, is drawn as a body on springs.
     title : str
 
     Examples
@@ -188,9 +191,8 @@ def plot_system(system: System, title: str = "") -> Figure:
     """
     instance("system", system, System, "a System")
     instance("title", title, str, "text")
-    if system.model.beam is None:
-        raise InputError("system: a structure given by matrices has no shape; give a model made from a beam")
-    figure = new_figure("double", 52.0)
+    both = len({each.striker.side for each in system.contacts}) > 1
+    figure = new_figure("double", 72.0 if both else 52.0)
     with figure_style():
         striker = system.striker
         widths = [2.6, 1.0] if striker is not None or system.primary_excitation is not None else [1.0]
@@ -198,7 +200,7 @@ def plot_system(system: System, title: str = "") -> Figure:
         axes = [part.subplots() for part in figure.subfigures(1, len(widths), squeeze=False, width_ratios=widths)[0]]
         _draw_beam(axes[0], system)
         for number, each in enumerate(system.contacts, 1 if system.contacts[1:] else 0):
-            _draw_striker(axes[0], system, each.striker, each.law, number)
+            _draw_striker(axes[0], system, each, number)
         tips = [(numbered(name)[1], drive) for name, drive in system.moving if numbered(name)[0] == "drive"]
         if len(tips) > 1:
             draw_tips(axes[1], system, tips)
@@ -206,8 +208,7 @@ def plot_system(system: System, title: str = "") -> Figure:
             _draw_drive(axes[1], system, *system.primary_excitation)
         if title:
             axes[0].set_title(title, loc="left")
-        both = len({each.striker.side for each in system.contacts}) > 1
-        outward, inward = (2.0, 1.7) if both else (2.55, 1.25)
+        outward, inward = 2.55, 2.55 if both else 1.25
         axes[0].set_xlim(-0.85, _WIDE + 0.85)
         axes[0].set_ylim(*((-outward, inward) if _sign(striker) > 0.0 else (-inward, outward)))
         axes[0].set_aspect("equal")
@@ -218,10 +219,13 @@ def plot_system(system: System, title: str = "") -> Figure:
 def _shape(system: System, amplitude: _Array) -> tuple[_Array, _Array]:
     """Places in units of the picture and displacements over b."""
     beam = system.model.beam
+    x = np.linspace(0.0, 1.0, _POINTS)
+    one = system.model.contact_shape
+    if beam is None and one is not None:  # a body that moves as the contact point does
+        return _WIDE * x, np.full(x.size, amplitude @ one) / system.scale.length
     assert beam is not None
-    x = np.linspace(0.0, beam.length, _POINTS)
-    shapes = beam.buckling_modes(system.model.modes).shape(x)
-    return _WIDE * x / beam.length, amplitude @ shapes / system.scale.length
+    shapes = beam.buckling_modes(system.model.modes).shape(x * beam.length)
+    return _WIDE * x, amplitude @ shapes / system.scale.length
 
 
 def _sign(striker: Striker | None) -> float:
@@ -233,15 +237,19 @@ def _draw_beam(ax: Axes, system: System) -> None:
     lower, upper = system.model.wells
     rest, other = (lower, upper) if sign > 0.0 else (upper, lower)
     ax.plot([0.0, _WIDE], [0.0, 0.0], color="0.75", linewidth=0.5, linestyle=(0, (6, 4)))
+    draw = _draw_shape if system.model.beam is not None else _draw_body
     if system.model.is_bistable:
-        ax.plot(*_shape(system, other), color=BEAM_COLOR, linewidth=0.8, linestyle="--")
-    ax.plot(*_shape(system, rest), color=BEAM_COLOR, linewidth=1.8, solid_capstyle="butt")
+        draw(ax, system, other, sign, {"linewidth": 0.8, "linestyle": "--"})
+    draw(ax, system, rest, sign, {"linewidth": 1.8})
     draw_surroundings(ax, system, *_shape(system, rest), sign, _WIDE)
     if system.model.imperfection is not None:
         _draw_imperfection(ax, system, system.model.imperfection, rest)
     clamp: Any = {"facecolor": "0.85", "edgecolor": BEAM_COLOR, "linewidth": 0.6, "hatch": "////"}
     beam = system.model.beam
-    assert beam is not None
+    if beam is None:
+        for left in (-0.3, _WIDE):
+            ax.add_patch(Rectangle((left, -0.35), 0.3, 0.7, **clamp))
+        return
     for at, outward, stiffness in (
         (0.0, -1.0, beam.boundary.left_rotational_stiffness),
         (_WIDE, 1.0, beam.boundary.right_rotational_stiffness),
@@ -260,6 +268,23 @@ def _draw_beam(ax: Axes, system: System) -> None:
         -0.62, 0.14, "$P(t)$" if changes else "$P$", ha="center", va="bottom",
         color=_LOAD_COLOR if changes else BEAM_COLOR,
     )  # fmt: skip
+
+
+def _draw_shape(ax: Axes, system: System, amplitude: _Array, sign: float, line: dict[str, Any]) -> None:
+    ax.plot(*_shape(system, amplitude), color=BEAM_COLOR, solid_capstyle="butt", **line)
+
+
+def _draw_body(ax: Axes, system: System, amplitude: _Array, sign: float, line: dict[str, Any]) -> None:
+    """A body between two springs, for a structure given by matrices; its face towards the striker is the contact point."""
+    height = float(_shape(system, amplitude)[1][0])
+    low = min(height, height + 0.24 * sign)
+    ax.add_patch(Rectangle((_END, low), _WIDE - 2.0 * _END, 0.24, facecolor="none", edgecolor=BEAM_COLOR, **line))
+    if "linestyle" in line:
+        return
+    for end, body in ((0.0, _END), (_WIDE, _WIDE - _END)):
+        _spring(ax, (body, low + 0.12), (end, 0.0))
+    words = f"{system.model.modes} coordinates, by matrices"
+    ax.text(0.5 * _WIDE, low + 0.12, words, ha="center", va="center", fontsize=6)
 
 
 def _draw_hinge(ax: Axes, at: float, outward: float, stiffness: float, sign: float, block: Any) -> None:
@@ -302,22 +327,24 @@ def _draw_imperfection(ax: Axes, system: System, imperfection: Imperfection, res
         ax.text(at + 0.12, height, "$F$", ha="left", va="center", color=_LOAD_COLOR)
 
 
-def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLaw, number: int) -> None:
+def _draw_striker(ax: Axes, system: System, contact: Contact, number: int) -> None:
     """The tip under (or above) the beam, the rod, and what holds it; *number* tells several apart, 0: there is one."""
+    striker = contact.striker
     sign = _sign(striker)
     x, w = _shape(system, system.model.wells[0 if _sign(system.striker) > 0.0 else 1])
-    at = striker.location * _WIDE
+    at = _WIDE * (0.5 if system.model.beam is None else striker.location)
     beam_there = float(np.interp(at, x, w))
     gap = 0.0 if striker.gap is None else striker.gap / system.scale.length
-    center = beam_there - sign * (float(np.clip(gap, -0.6, 0.6)) + _RADIUS)
+    center = beam_there - sign * (float(np.clip(gap, -0.6, 0.6 + abs(beam_there + sign))) + _RADIUS)
     ax.add_patch(Circle((at, center), _RADIUS, facecolor=SHAKER_COLOR, edgecolor="none", zorder=4))
-    _caption(ax, at, sign, contact, striker, gap, number, system.striker)
+    _caption(ax, at, sign, contact, number)
     below = center - sign * _RADIUS
     if striker.mass is None:
         _rod(ax, at, below, below - sign * 0.45)
         stands = isinstance(striker.drive, FixedStop)
         _block(ax, at, below - sign * 0.45, sign, "stop" if stands else "drive", moves=not stands)
-        if stands and system.base_excitation is not None and system.base_excitation.striker_on_base:
+        on_base = system.base_excitation is not None and system.base_excitation.striker_on_base
+        if stands and on_base and sign == _sign(system.striker):
             _rod(ax, at, below - sign * 0.67, -sign * FRAME)
         return
     if striker.suspension_stiffness == 0.0:
@@ -333,28 +360,24 @@ def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLa
     under = edge - sign * 0.26
     foot = under - sign * 0.5
     if striker.suspension_damping > 0.0:
-        _spring(ax, at - 0.15, under, foot)
+        _spring(ax, (at - 0.15, under), (at - 0.15, foot))
         _damper(ax, at + 0.15, under, foot)
     else:
-        _spring(ax, at, under, foot)
+        _spring(ax, (at, under), (at, foot))
     _block(ax, at, foot, sign, "")
 
 
-def _caption(
-    ax: Axes, at: float, sign: float, contact: ContactLaw, striker: Striker, gap: float, number: int, first: Striker | None
-) -> None:  # fmt: skip
-    """Write the contact law, gap and mass next to the striker, clear of the beam."""
-    law = _LAWS.get(contact.name, contact.name)
-    lines = [f"striker {number}: {law}" if number else f"contact: {law}"]
-    if gap != 0.0:
-        lines.append(f"gap {gap:.3g} $b$" if gap > 0.0 else f"preload {-gap:.3g} $b$")
+def _caption(ax: Axes, at: float, sign: float, contact: Contact, number: int) -> None:
+    """Write name, contact law, gap and mass next to the striker, clear of the beam."""
+    striker, law = contact.striker, _LAWS.get(contact.law.name, contact.law.name)
+    name = contact.label or (f"striker {number}" if number else "contact")
+    lines = [f"{name}: {law}"]
+    if striker.gap:
+        lines.append(f"{'gap' if striker.gap > 0.0 else 'preload'} {prefixed(abs(striker.gap), 'm')}")
     if striker.mass is not None:
         lines.append(r"$m_\mathrm{s}$ = " + prefixed(1e3 * striker.mass, "g"))
-    lines = [", ".join(lines)] if number else lines
     right = at < 0.6 * _WIDE
     x, side = (at + 0.75, "left") if right else (at - 0.75, "right")
-    if number and sign != _sign(first):  # over the other well there is room at the tip
-        x, side = float(np.clip(at, 0.25 * _WIDE, 0.75 * _WIDE)), "center"
     for i, line in enumerate(lines):
         y = -sign * (1.35 + 0.42 * i)
         ax.text(x, y, line, ha=side, va="center", color=SHAKER_COLOR)
@@ -381,10 +404,12 @@ def _moves(ax: Axes, x: float, edge: float, sign: float) -> None:
     )  # fmt: skip
 
 
-def _spring(ax: Axes, x: float, one: float, other: float) -> None:
-    share = np.array([0.0, 0.15, 0.22, 0.36, 0.5, 0.64, 0.78, 0.85, 1.0])
-    swing = np.array([0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, 0.0, 0.0])
-    ax.plot(x + 0.07 * swing, one + share * (other - one), color=BEAM_COLOR, linewidth=0.8)
+def _spring(ax: Axes, one: tuple[float, float], other: tuple[float, float]) -> None:
+    share = np.array([0.0, 0.15, 0.22, 0.36, 0.5, 0.64, 0.78, 0.85, 1.0])[:, None]
+    swing = np.array([0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, 0.0, 0.0])[:, None]
+    along = np.subtract(other, one)
+    beside = np.array([-along[1], along[0]]) / np.hypot(*along)
+    ax.plot(*(one + share * along + 0.07 * swing * beside).T, color=BEAM_COLOR, linewidth=0.8)
 
 
 def _damper(ax: Axes, x: float, one: float, other: float) -> None:
@@ -401,16 +426,21 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     """Draw the motion of the tip without contact, the base motion, or the change of the axial load."""
     scale = system.scale
     period = float(drive.cycle(drive.columns(), scale)[0])
-    cycles = np.linspace(0.0, 2.0 if isinstance(drive, ConstantVelocity) else _CYCLES, 1601)
-    moved = _moved(drive, system, cycles * period)
     section = numbered(section)[0]
-    per = 1.0 if section in ("axial_load", "force") else scale.length
-    base = system.base_excitation if section == "base_excitation" else None
-    down = base is not None and base.direction == "down"
-    color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
-    ax.plot(cycles, (-moved if down else moved) / per, color=color)
-    ax.set_xlabel("Cycles")
     words, label = _MOTIONS[section]
-    ax.set_ylabel(label)
-    ax.set_xlim(0.0, cycles[-1])
+    base = system.base_excitation if section == "base_excitation" else None
+    side = -1.0 if base is not None and base.direction == "down" else 1.0
+    color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
+    if base is not None and drive.name in ONE_EVENT:
+        end = min(getattr(drive, "duration_ms", np.inf) * 2e-3, _CYCLES * period)
+        times = np.linspace(0.0, end, 1601)
+        factor, unit = scale_of(times, "s")
+        moved = motion_of(drive, scale, end)(times)[2] / GRAVITY
+        ax.plot(times / factor, side * moved, color=color)
+        ax.set(xlabel=f"Time ({unit})", ylabel="Base acceleration (g)", xlim=(0.0, end / factor))
+    else:
+        cycles = np.linspace(0.0, 2.0 if isinstance(drive, ConstantVelocity) else _CYCLES, 1601)
+        per = 1.0 if section in ("axial_load", "force") else scale.length
+        ax.plot(cycles, side * _moved(drive, system, cycles * period) / per, color=color)
+        ax.set(xlabel="Cycles", ylabel=label, xlim=(0.0, cycles[-1]))
     ax.set_title(f"{words}: {drive.name.replace('_', ' ')}", loc="left")

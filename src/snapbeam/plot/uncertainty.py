@@ -152,7 +152,11 @@ _WORDS = {
 
 
 def _words_of(outcome: str) -> str:
-    return _WORDS.get(outcome) or wrapped(f"Probability that {outcome.replace('_', ' ')}", 40)
+    if outcome in _WORDS:
+        return _WORDS[outcome]
+    from snapbeam.uncertainty.monte_carlo import outcome_named
+
+    return wrapped(f"Probability that {in_symbols(outcome_named(outcome)[1].long_name)}", 40)
 
 
 _DASHES: dict[float, Any] = {0.05: ":", 0.5: "-", 0.95: "--"}

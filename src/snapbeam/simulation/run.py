@@ -98,8 +98,9 @@ class Run:
         Parameters
         ----------
         path : path
-        content : {"samples", "waveforms", "statistics"}
-            All samples; those without the amplitudes and velocities of the modes; or none.  The statistics, the impacts and the
+        content : {"samples", "waveforms", "states", "statistics"}
+            All samples; those without the amplitudes and velocities of the modes; one at the start of each cycle, or the nearest
+            to it; or none.  The statistics, the impacts and the
             state at the end are always in the file.
         """
         from snapbeam.simulation.save import save_run

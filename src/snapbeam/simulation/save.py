@@ -7,6 +7,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import quantities
@@ -30,8 +31,8 @@ _GROUPS = ("impacts", "summary")
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 
 
-CONTENTS = ("samples", "waveforms", "statistics")
-"""Contents of a file: all samples of a run, the series without those of modes, or none."""
+CONTENTS = ("samples", "waveforms", "states", "statistics")
+"""Contents of a file: all samples of a run, the series without those of modes, one sample of each cycle, or none."""
 
 
 def save_run(run: Run, path: str | os.PathLike[str], content: str = CONTENTS[0]) -> None:
@@ -42,10 +43,20 @@ def save_run(run: Run, path: str | os.PathLike[str], content: str = CONTENTS[0])
     """
     target = check_writable(path, "path", (".nc",))
     kept = run.dataset.drop_dims("mode") if choice("content", content, CONTENTS) == "waveforms" else run.dataset
-    kept = kept.isel(time=slice(0)) if content == "statistics" else kept
+    if content == "states":
+        kept = kept.isel(time=_whole_cycles(kept["cycle"].values))
+    elif content == "statistics":
+        kept = kept.isel(time=slice(0))
     root = kept.assign_attrs(description(run.system, run.integration, run.accuracy, run.final_state))
     groups = {None: root, "impacts": run.impacts.assign_attrs({}), "summary": summary_dataset(run.summary)}
     write_netcdf(groups, target, {name: compressed(dataset) for name, dataset in groups.items()})
+
+
+def _whole_cycles(cycle: NDArray[np.float64]) -> NDArray[np.intp]:
+    """The samples at the starts of cycles, or nearest to them, one for each."""
+    wanted = np.arange(np.ceil(cycle[0] - 1e-9), np.floor(cycle[-1] + 1e-9) + 1.0)
+    after = np.clip(np.searchsorted(cycle, wanted), 1, cycle.size - 1)
+    return np.unique(np.where(wanted - cycle[after - 1] <= cycle[after] - wanted, after - 1, after))
 
 
 def description(

@@ -39,7 +39,8 @@ def mean_over_seeds(dataset: xr.Dataset, confidence: float = 0.95) -> xr.Dataset
     -------
     xarray.Dataset
         Mean of each real statistic over the seeds with Student's interval, as ``peak_voltage``, ``peak_voltage_low``
-        and ``peak_voltage_high``: infinite with one seed or where a run has no value. ``snap``, the fraction of runs
+        and ``peak_voltage_high``: infinite with one seed or where a run has no value. That of a statistic which is
+        positive stays so: it is of the logarithm of the mean. ``snap``, the fraction of runs
         that snap through, with Wilson's interval; ``runs``, ``runs_failed``.
 
     Raises
@@ -65,6 +66,7 @@ def mean_over_seeds(dataset: xr.Dataset, confidence: float = 0.95) -> xr.Dataset
     >>> found.peak_midspan_displacement.dims
     ('base_excitation_rms_g',)
     """
+    from snapbeam.sweeps.setup import is_positive
     from snapbeam.util.datasets import xr
     from snapbeam.util.proportions import mean_interval, proportion
 
@@ -83,7 +85,9 @@ def mean_over_seeds(dataset: xr.Dataset, confidence: float = 0.95) -> xr.Dataset
             runs = item.transpose(*over, *axes).values.reshape(*(item.sizes[each] for each in over), -1)
             words = str(item.attrs.get("long_name", name))
             words = f"mean {words}, {runs.shape[-1]} seeds"
-            for (ending, limit), values in zip(_LIMITS, mean_interval(runs, confidence), strict=True):
+            for (ending, limit), values in zip(
+                _LIMITS, mean_interval(runs, confidence, is_positive(str(name))), strict=True
+            ):
                 found[f"{name}{ending}"] = over, values, item.attrs | {"long_name": f"{limit}{words}"}
     failed = (kinds == ResponseClass.UNKNOWN).sum(axes)
     count = (kinds != ResponseClass.UNKNOWN).sum(axes)

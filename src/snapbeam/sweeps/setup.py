@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -451,6 +452,14 @@ def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.in
         return [every]
     upper = state.amplitude @ system.model.midspan_shape > 0.0
     return [part for part in (every[~upper], every[upper]) if part.size]
+
+
+_POSITIVE = re.compile(r"(peak|rms|harvested)_|energy_(dissipated|harvested|lost)|contact_time_fraction|impulse")
+
+
+def is_positive(name: str) -> bool:
+    """Return True for the name of a statistic of the package that is never negative."""
+    return name in STATISTICS and _POSITIVE.match(name) is not None
 
 
 def variable_attributes(name: str, metres: bool = False) -> dict[str, Any]:

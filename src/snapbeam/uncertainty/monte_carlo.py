@@ -449,7 +449,13 @@ def outcome_named(given: Any, name: str = "outcome") -> tuple[str, Event]:
         return np.asarray(_COMPARED[sign](found[statistic] * (found[key] if key else 1.0), limit))
 
     words = row.long_name.removesuffix(f", over {row.normalised_by}") if key else row.long_name
-    return f"{statistic} {sign} {value}", Event(f"{words} {sign} {value}", happened, statistic)
+    limit_text = value if unit_in_text(value) or unit == "1" else f"{value} {unit}"
+    return f"{statistic} {sign} {value}", Event(f"{words} {sign} {_micro(limit_text)}", happened, statistic)
+
+
+def _micro(words: str) -> str:
+    """A value with its unit as it is printed, µ for u."""
+    return re.sub(r"(?<=[\d ])u(?=[a-zA-Z])", "µ", words)
 
 
 def scale_key(statistic: str, unit: str, value: str) -> tuple[str, str]:

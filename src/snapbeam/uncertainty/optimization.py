@@ -17,6 +17,7 @@ from snapbeam.model.system import System
 from snapbeam.solver.statistics import STATISTICS
 from snapbeam.sweeps.compute import CheckpointOptions
 from snapbeam.sweeps.points import Columns
+from snapbeam.sweeps.setup import is_positive
 from snapbeam.uncertainty.differential_evolution import DifferentialEvolution, front_of
 from snapbeam.uncertainty.distributions import ParameterUncertainty
 from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, scale_key, trials_of
@@ -199,21 +200,24 @@ class Objective:
     def estimate(self, values: NDArray[Any], failed: int, confidence: float) -> tuple[float, float, float]:
         """Value and interval from runs that came to an end.
 
-        Of an outcome Wilson's interval, of a mean Student's, of a quantile that of order statistics.
+        Of an outcome Wilson's interval, of a mean Student's, of a quantile that of order statistics; none of a
+        positive statistic goes below 0.
         """
-        n = values.size
+        n, positive = values.size, is_positive(self.quantity) and not bool((values < 0.0).any())
+        least = 0.0 if positive else -np.inf
         if self._quantity.kind == "outcome":
             found = proportion(int(values.sum()), n, confidence, failed)
             return float(found[0]), float(found[1]), float(found[2])
         if n < 2 or failed:  # a run that failed might have been anything
             middle = float(np.mean(values)) if n else float("nan")
-            return middle, -np.inf, np.inf
+            return middle, least, np.inf
         if self.quantile is None:
             if not np.isfinite(values).all():
-                return np.inf, -np.inf, np.inf
-            middle, low, high = map(float, mean_interval(values, confidence))
+                return np.inf, least, np.inf
+            middle, low, high = map(float, mean_interval(values, confidence, positive))
             return middle, low, high
-        return _quantile(np.sort(values), self.quantile, confidence)
+        middle, low, high = _quantile(np.sort(values), self.quantile, confidence)
+        return middle, max(low, least), high
 
 
 def _quantile(ordered: _Array, share: float, confidence: float) -> tuple[float, float, float]:
@@ -1034,6 +1038,8 @@ def _dataset(
         attrs |= {"initial_well": trials.system.start_well, "initial_well_reason": trials.system.initial_well_reason}
     attrs |= {f"fixed_{lookup(name).short}": +value for name, value in in_table(trials.system.parameters).items()
               if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
+    if trials.system.model.beam is None:
+        attrs["length_scale"] = trials.system.scale.length
     dataset = xr.Dataset(attrs=attrs)
     x, objectives, violation, distances = tried
     reported = _distances(problem, x[chosen], found)

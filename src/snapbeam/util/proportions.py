@@ -33,8 +33,12 @@ def proportion(
     return share, low, high
 
 
-def mean_interval(values: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:
-    """Return the mean along the last axis, without NaN, and Student's interval, infinite for fewer than two values."""
+def mean_interval(values: ArrayLike, confidence: float = 0.95, positive: bool = False) -> tuple[_Array, _Array, _Array]:
+    """Return the mean along the last axis, without NaN, and Student's interval, infinite for fewer than two values.
+
+    That of the mean m of a *positive* quantity is of its logarithm, of which s/m is the standard error: it stays positive,
+    and holds skewed quantities more often.
+    """
     given = np.asarray(values, dtype=np.float64)
     known = ~np.isnan(given)
     count = known.sum(axis=-1)
@@ -42,8 +46,13 @@ def mean_interval(values: ArrayLike, confidence: float = 0.95) -> tuple[_Array, 
     squares = np.where(known, (given - mean[..., None]) ** 2, 0.0).sum(axis=-1)
     freedom = np.maximum(count - 1, 1)
     half = special.stdtrit(freedom, 0.5 * (1.0 + confidence)) * np.sqrt(squares / freedom / np.maximum(count, 1))
-    half = np.where((count > 1) & known.all(axis=-1), half, np.inf)
-    return mean, np.where(half < np.inf, mean - half, -np.inf), np.where(half < np.inf, mean + half, np.inf)
+    good = (count > 1) & known.all(axis=-1)
+    low, high = mean - half, mean + half
+    if positive:
+        as_said = (mean > 0.0) & ~(given < 0.0).any(axis=-1)
+        factor = np.exp(np.divide(half, mean, where=as_said, out=np.zeros(mean.shape)))
+        low, high = np.where(as_said, mean / factor, low), np.where(as_said, mean * factor, high)
+    return mean, np.where(good, low, 0.0 if positive else -np.inf), np.where(good, high, np.inf)
 
 
 def _limits(good: _Array, total: _Array, z: float) -> tuple[_Array, _Array]:

@@ -20,6 +20,17 @@ def prefixed(value: float, unit: str, digits: int = 3) -> str:
     return f"{value / 1000.0**step:.{digits}g} {_PREFIXES[step + 8]}{unit}"
 
 
+def with_unit(value: Any, unit: str, digits: int = 6) -> str:
+    """A value as text: a number with its unit, with a prefix where the unit takes one."""
+    if not isinstance(value, float):
+        return str(value)
+    return (
+        prefixed(value, unit, digits)
+        if unit in WITH_PREFIX
+        else f"{value:.{digits}g} {'' if unit == '1' else unit}".rstrip()
+    )
+
+
 def scale_of(values: Any, unit: str) -> tuple[float, str]:
     """Divisor for a short axis, and the resulting unit, such as ``(1e-3, "mN")``."""
     most = float(np.fmax.reduce(np.abs(np.asarray(values, dtype=float)), axis=None, initial=0.0))
