@@ -42,7 +42,6 @@ MEMBERS = {
     "BoundaryConditions": {"left", "right", "axial", "turn"},
     "Imperfection": {"rise", "skew", "form", "side_load"},
     "BaseExcitation": {"carries_striker"},
-    "RampForce": {"hold"},
     "PiezoelectricHarvester": {"start", "stop", "coupling"},
     "ElectromagneticHarvester": {"constant"},
     "Integration": {"early_decision"},

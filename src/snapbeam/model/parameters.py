@@ -163,10 +163,9 @@ _AROUND = {"base_excitation": "the base", "axial_load": "the axial load", "force
 def _around(row: Parameter, kind: type) -> Parameter:
     """Parameter of base, axial load or a force, with a name distinct from that of the striker."""
     section, name = split_name(row.name)
-    words = row.quantity.long_name
+    words, plain = row.quantity.long_name, row.short.removeprefix("force_")
     if issubclass(kind, Drive):
-        words = f"{words}{',' * (' over ' in words)} of {_AROUND[section]}"
-    plain = name if row.short == name or section == "base_excitation" else row.short.removeprefix("force_")
+        words, plain = f"{words}{',' * (' over ' in words)} of {_AROUND[section]}", name
     return dataclasses.replace(
         row, short=f"{section}_{plain}", quantity=dataclasses.replace(row.quantity, long_name=words)
     )

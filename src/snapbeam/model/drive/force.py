@@ -126,7 +126,7 @@ class ConstantForce(ForceHistory, Timed):
     >>> weight = sb.ExternalForce(history=sb.ConstantForce(force=-9.81e-3))
     """
 
-    force: float = quantity("N", "constant force", scope=RUN, short="constant_force")
+    force: float = quantity("N", "constant force", scope=RUN)
     name = "constant_force"
 
     @property
@@ -316,7 +316,7 @@ class RampForce(ForceHistory, Timed):
     change: float = quantity("N", "change", scope=RUN)
     duration: float = duration_of_pulse()
     hold_periods: float = quantity(
-        "1", "periods of the first mode at the change", default=1e9, low=0.0, closed="left", scope=RUN, short="hold"
+        "1", "periods of the first mode at the change", default=1e9, low=0.0, closed="left", scope=RUN
     )
     name = "ramp_force"
 
