@@ -168,8 +168,8 @@ class Drawn:
                 drawn = named.get(label) or self._artist(plot, axes, handle, empty=True)
                 items.append(models.LegendItem(label=plain(label), renderers=drawn))
         if items:
-            plot.add_layout(models.Legend(items=items, ncols=2, nrows="auto"))
-            style.legend(plot, self.look)
+            plot.add_layout(models.Legend(items=items))
+            style.legend(plot, self.look, ncols=2)
         return plot
 
     def _artist(self, plot: Any, axes: Axes, art: Any, empty: bool = False) -> list[Any]:

@@ -90,9 +90,9 @@ class RunPanel:
         """The name of something in this view, another one in each of two runs."""
         return f"{name}{self.cursor.suffix}"
 
-    def wrap(self, plot: Any) -> Any:
+    def wrap(self, plot: Any, **options: Any) -> Any:
         """A figure in the page."""
-        return style.framed_plot(plot, margin=(0, 0, 4, 0))
+        return style.framed_plot(plot, margin=(0, 0, 4, 0), **options)
 
 
 def across(run: Run) -> tuple[NDArray[np.float64], str]:
@@ -330,7 +330,7 @@ class BeamPanel(RunPanel):
         self.plot.y_range.update(start=-half, end=half)
         true = self.scale.value == "true proportions"
         drawn = "thickness to scale" if true else "the beam as a line, without its thickness"
-        self.plot.title.text = f"Displacements {true_half / half:.3g} times as large as lengths; {drawn}"
+        self.plot.title.text = f"Displacements {true_half / half:.3g} times as large as lengths;\n{drawn}"
         tall = 0.12 * half
         self.supports.data = {
             "left": [-0.02 * length, length], "right": [0.0, 1.02 * length], "low": [-tall] * 2, "top": [tall] * 2
@@ -405,7 +405,7 @@ class Energy(RunPanel):
                 "x", "y", source=self.sources[name], color=getattr(look, color), line_width=1.4, legend_label=label,
                 line_dash="dashed" if name in ("energy_contact", "energy_striker", "energy_circuit") else "solid",
             )  # fmt: skip
-        style.legend(self.plot, look)
+        style.legend(self.plot, look, ncols=2)
         self.words = style.Html("", sizing_mode="stretch_width")
         return [self.wrap(self.plot), self.words]
 
@@ -441,6 +441,7 @@ _MOST = 20_000
 _TABLE = """
 .slick-viewport, .grid-canvas, .slick-pane { background: var(--sb-card); }
 .slick-header-column, .slick-header-columns { background: var(--sb-card) !important; color: var(--sb-text); }
+.slick-header-column { font-size: 11px; padding: 4px 2px !important; }
 .slick-row, .slick-cell { background: var(--sb-card) !important; color: var(--sb-text); border-color: var(--sb-grid); }
 .slick-row.odd, .slick-row.odd .slick-cell { background: var(--sb-page) !important; }
 .slick-row .slick-cell.selected { background: var(--sb-grid) !important; }
@@ -557,7 +558,7 @@ class Modal(RunPanel):
         for at, source in enumerate(self.lines):
             color = _COLORS[at] or look.text
             plot.line("x", "y", source=source, color=color, line_width=1.2, legend_label=f"mode {at + 1}")
-        style.legend(plot, look)
+        style.legend(plot, look, ncols=3)
         self.bars = style.columns(mode=[], rms=[], top=[])
         self.bars.name = self.named("modal")
         low = style.figure(
@@ -653,7 +654,9 @@ class Phase(RunPanel):
         self.phase.param.watch(lambda _: self.cursor.later(self._draw, 1), "value_throttled")
         return [
             pn.FlexBox(self.where, self.phase, margin=0),
-            pn.Row(*(self.wrap(plot) for plot in plots), sizing_mode="stretch_width"),
+            pn.FlexBox(
+                *(self.wrap(plot, styles={"flex": "1 1 240px"}) for plot in plots), margin=0, sizing_mode="stretch_width"
+            ),
         ]
 
     def show(self, run: Run, low: float, high: float) -> None:
@@ -743,7 +746,7 @@ class Spectrum(RunPanel):
         ratio = next((value for name, value in given.items() if name.endswith(".frequency_ratio")), None)
         length, _, shown = self.scales(run)
         self.drive.location, self.first.location = ratio and ratio * shown, shown
-        self.plot.title.text = f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the excitation, dotted: f₁"
+        self.plot.title.text = f"Cycles {low:.4g} to {high:.4g}, Hann window;\ndashed: the excitation, dotted: f₁"
         most = 1e-12
         for name, source in self.sources.items():
             frequency, amplitude = amplitude_spectrum(time, run.dataset[name].values[inside])
