@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import panel as pn
 from bokeh import models
 from bokeh.core.properties import value as constant
+from bokeh.palettes import interp_palette
 from bokeh.transform import linear_cmap
 from markupsafe import Markup
 from numpy.typing import NDArray
@@ -78,6 +79,17 @@ class RunPanel:
             return 1.0, 1.0, 1.0
         length, first = 1e3 * run.system.scale.length, run.system.model.reference_frequency
         return length, length * run.system.scale.omega, first
+
+    def curves(self, plot: Any, sources: Iterable[Any], series: list[Any], run: Run, low: float, high: float) -> None:
+        """Draw some series from *low* to *high*, None for those that the run has not, and let the figure show all."""
+        x, plot.xaxis.axis_label = across(run)
+        shown = []
+        for source, item, values in zip(sources, plot.legend[0].items, series, strict=True):
+            item.visible = values is not None
+            own = [] if values is None else [envelope(x, values, low, high)]
+            source.data = _curve(own)
+            shown += [y for _, y in own]
+        style.fit(plot, *shown)
 
     @property
     def units(self) -> tuple[str, str, str]:
@@ -412,15 +424,8 @@ class Energy(RunPanel):
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
         dataset = run.dataset
-        x, label = across(run)
-        self.plot.xaxis.axis_label = label
-        shown = []
-        for (name, source), item in zip(self.sources.items(), self.plot.legend[0].items, strict=True):
-            own = [envelope(x, dataset[name].values, low, high)] if name in dataset else []
-            item.visible = bool(own)
-            source.data = _curve([(at, 1e6 * y) for at, y in own])
-            shown += [1e6 * y for _, y in own]
-        style.fit(self.plot, *shown)
+        series = [1e6 * dataset[name].values if name in dataset else None for name in _CURVES]
+        self.curves(self.plot, self.sources.values(), series, run, low, high)
         words = ""
         ends = {name: dataset[name].values[[0, -1]] for name in _CURVES if name in dataset}
         works = sum(float(each[1]) for name, each in ends.items() if name.endswith("_work"))
@@ -574,20 +579,11 @@ class Modal(RunPanel):
         """Show a run between two cycles."""
         if "modal_amplitude" not in run.dataset:
             return
-        x, label = across(run)
-        self.plot.xaxis.axis_label = label
         well = float(np.abs(run.system.model.wells[..., 0]).max()) or 1.0
         alpha = run.dataset["modal_amplitude"].values / well
-        shown = []
-        for at, source in enumerate(self.lines):
-            if at < alpha.shape[1]:
-                inside = envelope(x, np.ascontiguousarray(alpha[:, at]), low, high, 700)
-                source.data = {"x": inside[0], "y": inside[1].astype(np.float32)}
-                shown.append(inside[1])
-            else:
-                source.data = {"x": [], "y": []}
-        style.fit(self.plot, *shown)
-        part = alpha[within(x, low, high)]
+        shown = [alpha[:, at] if at < alpha.shape[1] else None for at in range(_SHOWN)]
+        self.curves(self.plot, self.lines, shown, run, low, high)
+        part = alpha[within(across(run)[0], low, high)]
         rms = np.sqrt(np.mean((part - part.mean(axis=0)) ** 2, axis=0))
         self.bars.data = {"mode": np.arange(1, rms.size + 1), "rms": np.maximum(rms, 1e-16), "top": rms}
         most = float(rms.max(initial=1e-12)) or 1e-12
@@ -643,7 +639,7 @@ class Phase(RunPanel):
         ]  # fmt: skip
         plots[0].line("w", "v", source=self.line, color=look.center, line_width=0.8)
         plots[0].scatter("w", "v", source=dot, size=9, color=look.accent)
-        palette = style.blend(look.accent, look.striker)
+        palette = interp_palette((look.accent, look.striker), 64)
         colors = linear_cmap("t", palette, 0.0, 1.0)
         self.mapper = colors.transform
         plots[1].scatter("w", "v", source=self.dots, size=5, color=colors)
@@ -655,7 +651,12 @@ class Phase(RunPanel):
         return [
             pn.FlexBox(self.where, self.phase, margin=0),
             pn.FlexBox(
-                *(self.wrap(plot, styles={"flex": "1 1 240px"}) for plot in plots), margin=0, sizing_mode="stretch_width"
+                *(
+                    self.wrap(plot, styles={"flex": "1 1 calc(50% - 2px)", "min-width": "min(240px, 100%)"})
+                    for plot in plots
+                ),
+                margin=0,
+                sizing_mode="stretch_width",
             ),
         ]
 
@@ -954,8 +955,6 @@ def _curves(curves: list[tuple[_Array, _Array]]) -> dict[str, Any]:
 # ----------------------------------------------------------------------------------------------------
 
 
-_PAUSE = 60
-"""Milliseconds between two views that are built while nobody looks at them."""
 _SETTLE = 60
 """Milliseconds that a range must rest before the samples in it are sent."""
 
@@ -1023,7 +1022,7 @@ class RunView:
     def wait(self, words: str, seconds: float = 0.0) -> None:
         """Say what is computed, over the run before, and for how long it has been."""
         self._write_notes()
-        self._head(style.BUSY.format(f"computing, {seconds:.0f} s" if seconds else "computing"), words)
+        self._head(style.BUSY.format(f"computing, {seconds:.0f} s" if seconds >= 0.5 else "computing"), words)
 
     def rename(self, words: str) -> None:
         """Write the point of the run that is shown with other digits."""
@@ -1093,13 +1092,6 @@ class RunView:
         self.active.activate()
         if self.run is not None:
             self.active.show(self.run, *self.window)
-
-    def complete(self) -> None:
-        """Build the views that are not seen, one after the other, so that what is asked for meanwhile need not wait."""
-        waiting = [part for part in self.parts if not part.built]
-        if waiting:
-            waiting[0].activate()
-            self.later(self.complete, _PAUSE)
 
     def _activated(self) -> None:
         self.turned()

@@ -170,11 +170,9 @@ def inner_size(plot: Any, otherwise: tuple[int, int]) -> tuple[int, int]:
         return otherwise
 
 
-def blend(first: str, last: str, steps: int = 64) -> list[str]:
-    """Colours from one to another."""
-    ends = [np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)]) for color in (first, last)]
-    mixed = np.round(np.linspace(ends[0], ends[1], steps)).astype(int)
-    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in mixed]
+def hexes(colors: NDArray[np.uint8]) -> list[str]:
+    """Colours of shape (n, 4) as text."""
+    return [f"#{r:02x}{g:02x}{b:02x}{a:02x}" for r, g, b, a in colors]
 
 
 def columns(**values: Any) -> ColumnDataSource:

@@ -153,7 +153,7 @@ _MOTIONS = {
     "force": ("Force", "Force $F(t)$ (N)"),
 }
 """Title of the motion in the schematic, and label of its axis."""
-_LAWS = {
+LAWS = {
     "elastic_plastic": "elastic-plastic",
     "hertz": "Hertz",
     "hunt_crossley": "Hunt–Crossley",
@@ -344,7 +344,7 @@ def _caption(
     ax: Axes, at: float, sign: float, contact: ContactLaw, striker: Striker, gap: float, number: int, first: Striker | None
 ) -> None:  # fmt: skip
     """Write the contact law, gap and mass next to the striker, clear of the beam."""
-    law = _LAWS.get(contact.name, contact.name)
+    law = LAWS.get(contact.name, contact.name)
     lines = [f"striker {number}: {law}" if number else f"contact: {law}"]
     if gap != 0.0:
         lines.append(f"gap {gap:.3g} $b$" if gap > 0.0 else f"preload {-gap:.3g} $b$")
