@@ -16,7 +16,7 @@ from snapbeam.explorer.address import Address
 from snapbeam.explorer.cards import draw
 from snapbeam.explorer.drawn import Drawn
 from snapbeam.explorer.jobs import Downloads, Tab, Token, check_run, drawing, file_bytes
-from snapbeam.explorer.maps import ResultSource, sections_of, started
+from snapbeam.explorer.maps import Point, ResultSource, brief, sections_of, started
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.style import NOTE, REFUSED, Html, button, framed_plot, look_of, sheet, styled
@@ -163,8 +163,8 @@ class ResultPage(Tab):
             found = start(self.source.skeleton, place)
             if found is None:
                 return None
-            given = {**found.parameters, **found.state}
-            words = ", ".join(f"{name} {value:.5g}" for name, value in given.items())
+            state = [f"{name} {brief(value)}" for name, value in found.state.items()]
+            words = ", ".join(filter(None, [Point(found.parameters).words(), *state]))
             system = started(sections_of(base.replace(**found.parameters), how), found.state)
             integration = how.replace(cycles=found.cycles or how.cycles, engine="auto", threads=None)
             check_run(system, integration)

@@ -102,9 +102,9 @@ class RunPanel:
         """The name of something in this view, another one in each of two runs."""
         return f"{name}{self.cursor.suffix}"
 
-    def wrap(self, plot: Any, **options: Any) -> Any:
+    def wrap(self, plot: Any) -> Any:
         """A figure in the page."""
-        return style.framed_plot(plot, margin=(0, 0, 4, 0), **options)
+        return style.framed_plot(plot, margin=(0, 0, 4, 0))
 
 
 def across(run: Run) -> tuple[NDArray[np.float64], str]:
@@ -648,17 +648,10 @@ class Phase(RunPanel):
         self.cursor.follow(_FOLLOW, source=self.line, dot=dot)
         self.where.param.watch(lambda _: self.cursor.later(self._draw, 1), "value")
         self.phase.param.watch(lambda _: self.cursor.later(self._draw, 1), "value_throttled")
-        return [
-            pn.FlexBox(self.where, self.phase, margin=0),
-            pn.FlexBox(
-                *(
-                    self.wrap(plot, styles={"flex": "1 1 calc(50% - 2px)", "min-width": "min(240px, 100%)"})
-                    for plot in plots
-                ),
-                margin=0,
-                sizing_mode="stretch_width",
-            ),
-        ]
+        parts = [self.wrap(plot) for plot in plots]
+        for part in parts:
+            part.styles = {"flex": "1 1 calc(50% - 2px)", "min-width": "min(240px, 100%)"}
+        return [pn.FlexBox(self.where, self.phase, margin=0), pn.FlexBox(*parts, margin=0, sizing_mode="stretch_width")]
 
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
@@ -895,7 +888,8 @@ class WaveformPanel(RunPanel):
         own += self._pair()
         style.fit(self.top, *shown, *(y for _, y in own))
         item = data[self.below.value]
-        factor, unit = scale_of(item.values, str(item.attrs.get("units", "1")).removesuffix("1"))
+        unit = str(item.attrs.get("units", "1"))
+        factor, unit = (1.0, unit) if unit in ("", "1") else scale_of(item.values, unit)  # 1e-3 is no metre
         own = [envelope(x, each / factor, *self.span) for each in _columns_of(data, self.below.value).T]
         self.force.data, self.further[1].data = _curve(own), _curves(own[1:])
         self.low.yaxis.axis_label = unit or "1"  # the words, too long for its height, stand in the field below it
