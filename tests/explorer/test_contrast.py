@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 
+import matplotlib.pyplot as plt
 import pytest
 
 pytest.importorskip("panel")
 
 from snapbeam import ResponseClass
+from snapbeam.explorer.drawn import Drawn
 from snapbeam.explorer.style import DARK, LIGHT, class_chip, sheet
 
 
@@ -49,3 +51,13 @@ def test_every_class_stands_out_from_the_card(look):
     for kind in ResponseClass:
         ground, ink = re.search(r"background:(#\w+);color:(#\w+)", class_chip(kind)).groups()
         assert contrast(ground, ink) >= 4.5, kind
+
+
+def test_dark_colours_of_a_printed_figure_stand_out_on_a_dark_page():
+    figure, axes = plt.subplots()
+    for color in ("#14235f", "black", "#b03a27", "0.3", "#70bbf0"):
+        axes.plot([0.0, 1.0], [0.0, 1.0], "o-", color=color)
+    plot = Drawn(axes, DARK).plots[0][0]
+    plt.close(figure)
+    colors = [each.glyph.line_color for each in plot.renderers]
+    assert len(colors) == 10 and all(contrast(color[:7], DARK.card) >= 3.0 for color in colors)

@@ -126,3 +126,17 @@ def test_shares_of_replicas_are_told(one_mode):
     first = int(shares.values.argmax())
     kind = sb.ResponseClass(int(found["class_code"][first]))
     assert f"{kind.label} {100 * float(shares[first]):.0f} %" in words
+
+
+def test_the_quasi_static_line_is_refused_for_a_system_that_it_does_not_describe(one_mode):
+    from snapbeam.explorer.map_view import MapView
+    from snapbeam.explorer.style import LIGHT
+
+    force = sb.ExternalForce(location=0.5, history=sb.HarmonicForce(amplitude=0.01, frequency_ratio=1.0))
+    loaded = sb.System(one_mode.model, contacts=one_mode.contacts, forces=[force])
+    for system, refused in ((one_mode, False), (loaded, True)):
+        source = opened(system)
+        plane = Plane.of(source, "frequency_ratio", "velocity_amplitude", {})
+        view = MapView(LIGHT, plane.x, plane.y)
+        words = view.show_quasi_static(True, source.attrs, source.scalars())
+        assert ("Eq. 21" in words) == refused == (len(view.curve.data["x"]) == 0), words

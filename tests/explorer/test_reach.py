@@ -212,6 +212,10 @@ def test_the_page_uses_the_height_of_the_window_and_the_width_of_a_phone(tab, se
     page.wait(lambda: page.js("() => document.scrollingElement.scrollWidth") <= 390, "no horizontal scroll")
     title, button = page.page.locator("h1"), page.page.get_by_role("button", name="Two points")
     assert title.bounding_box()["y"] + title.bounding_box()["height"] <= button.bounding_box()["y"]
+    for name in ("Phase", "Spectrum", "Modes", "Energy", "Impacts"):
+        _turn(page, name)
+        page.page.wait_for_timeout(600)
+        assert page.js("() => document.scrollingElement.scrollWidth") <= 390, name
     for name, shown in (("Beam", "beam-plot"), ("Numbers", "")):
         _turn(page, name)
         page.wait(
@@ -220,6 +224,8 @@ def test_the_page_uses_the_height_of_the_window_and_the_width_of_a_phone(tab, se
         )
         page.page.wait_for_timeout(300)
         assert page.js("() => document.scrollingElement.scrollWidth") <= 390, name
+    rows = page.page.locator("table.numbers tr")
+    assert max(rows.nth(at).bounding_box()["height"] for at in range(8)) < 100, "names in lines, not letter by letter"
     assert page.page.locator('meta[name="viewport"]').count() == 1
 
 

@@ -28,7 +28,7 @@ def test_a_click_on_a_point_of_a_branch_shows_its_orbit(branch, serve, tab):
     at = 2
     x, w = float(branch["velocity_amplitude"][at]), float(branch["midspan_displacement"][at])
     page.click(x, w)
-    assert f"drive.velocity_amplitude {x:.5g}" in page.head()
+    assert f"velocity amplitude {x:.6g}" in page.head()
     page.wait(lambda: page.data("mark", "x") == [x], "the mark of the orbit")
     assert page.data("mark", "y") == [w]
     page.page.get_by_text("Waveform", exact=True).click()

@@ -33,6 +33,7 @@ from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters
 from snapbeam.model.quantity import split_name
 from snapbeam.plot.dataset import plot_dataset
 from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
+from snapbeam.plot.schematic import LAWS
 from snapbeam.plot.style import CLASS_COLORS, save_figure
 from snapbeam.util.input_files import parsed_toml
 
@@ -475,7 +476,8 @@ class MapCard:
             self.view.show(name, values, limits, title)
         self.view.fade(self.changed)
         self.show_windows()
-        words.append(self.view.show_quasi_static("quasi" in layers, self.source.scalars() | self._fixed_short()))
+        fixed = self.source.scalars() | self._fixed_short()
+        words.append(self.view.show_quasi_static("quasi" in layers, self.source.attrs, fixed))
         if "threshold" in layers and self.source.is_list:
             words.append("the threshold is that of the columns of a grid; these are points")
         wanted = "threshold" in layers and values is not None and not self.source.is_list
@@ -627,7 +629,7 @@ class MapCard:
         left, right, low, high = self.view.view
         middle = self.plane.index(0.5 * (left + right), 0.5 * (low + high))
         kinds = None
-        if "response_class" in self.source.numbers() and not self.changed:
+        if "response_class" in self.source.layers and not self.changed:
             with suppress(InputError):  # the file is gone; a run can be computed
                 kinds = self.plane.values("response_class")
         if kinds is None:
@@ -687,9 +689,8 @@ class MapCard:
         place, found = self.plane.index(x, y), {}
         if not self.plane.at(*place).values == point.values:
             return {}
-        for each in {"response_class", "status", "zero_crossings", "peak_force", self.show.value} & set(
-            self.source.numbers()
-        ):
+        known = {"response_class", "status", "zero_crossings", "peak_force", self.show.value} & set(self.source.layers)
+        for each in known:
             try:
                 values = self.plane.values(each)
             except InputError:
@@ -736,10 +737,6 @@ _SECTIONS = {
 _ALWAYS = ("beam", "model", "integration")
 """Sections of which all parameters have a field; of contact and drive if there is a striker, else those that are set."""
 _INTEGRATION = tuple(f"integration.{name}" for name in ("cycles", "accuracy", "step", "early_termination"))
-_LAWS = {
-    "elastic_plastic": "elastic-plastic", "hertz": "Hertz", "hunt_crossley": "Hunt and Crossley", "kelvin_voigt": "Kelvin and Voigt", "layer": "elastic layer",
-    "power": "power law", "restitution": "coefficient of restitution",
-}  # fmt: skip
 _PRESETS: dict[str, dict[str, dict[str, Any]]] = {
     "the paper's beam": {},
     "the paper's, one mode": {"model": {"modes": 1}},
@@ -774,7 +771,7 @@ class SystemCard:
         self.slider = pn.widgets.FloatSlider(visible=False, width=330, format=digits)
         self.slider.param.watch(lambda event: page.post(lambda: self._dragged(event.new)), "value")
         self.slider.param.watch(lambda event: page.post(lambda: self._released(event.new)), "value_throttled")
-        laws = {_LAWS.get(kind, kind.replace("_", " ")): kind for kind in _kinds("contact")}
+        laws = {LAWS.get(kind, kind.replace("_", " ")): kind for kind in _kinds("contact")}
         self.law = pn.widgets.Select(name="Contact law", options=laws, width=160)
         self.law.param.watch(lambda _: page.post(self._law_changed), "value")
         self.file = pn.widgets.FileInput(accept=".toml", multiple=False, width=220)
@@ -1003,7 +1000,7 @@ def changed_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
         elif isinstance(value, (list, tuple, dict, np.ndarray)):
             found[title] = None
         elif name == "contact.type":
-            found[f"Contact law: {_LAWS.get(str(value), str(value).replace('_', ' '))}"] = None
+            found[f"Contact law: {LAWS.get(str(value), str(value).replace('_', ' '))}"] = None
         elif value is not None and (section in sections[0] or row is None or value != row.default):
             unit = "" if row is None or row.quantity.unit == "1" else f" {row.quantity.unit}"
             found[f"{title}: {key.replace('_', ' ')} {maps.brief(value)}{unit}"] = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 import unicodedata
+from colorsys import hls_to_rgb, rgb_to_hls
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,8 @@ _SAMPLES = 20_000
 """Samples of a line; of a longer one the extremes of each part are drawn."""
 _CELLS = 20_000
 """Cells of unequal size that are drawn one by one."""
+_LIGHT = 0.55
+"""Least lightness of a colour on a dark page."""
 _LINE = 48
 """Characters of a line of a label."""
 _SUPERSCRIPT = str.maketrans("0123456789-in", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ⁱⁿ")
@@ -121,12 +124,14 @@ class Drawn:
             self.plots.append((self._plot(each), each.get_position()))
 
     def _color(self, color: Any) -> str | None:
-        """A colour for the page; greys are turned on a dark one."""
+        """A colour for the page; on a dark one greys are turned, and dark colours are made lighter."""
         red, green, blue, alpha = to_rgba(color)
         if alpha == 0.0:
             return None
-        if self.look.name == "dark" and max(red, green, blue) - min(red, green, blue) < 0.03:
-            red = green = blue = 1.0 - red
+        if self.look.name == "dark":
+            hue, light, much = rgb_to_hls(red, green, blue)
+            grey = max(red, green, blue) - min(red, green, blue) < 0.03
+            red, green, blue = hls_to_rgb(hue, 1.0 - light if grey else max(light, _LIGHT), much)
         return str(to_hex((red, green, blue, alpha), keep_alpha=True))
 
     def _plot(self, axes: Any) -> Any:
@@ -168,8 +173,8 @@ class Drawn:
                 drawn = named.get(label) or self._artist(plot, axes, handle, empty=True)
                 items.append(models.LegendItem(label=plain(label), renderers=drawn))
         if items:
-            plot.add_layout(models.Legend(items=items, ncols=2, nrows="auto"))
-            style.legend(plot, self.look)
+            plot.add_layout(models.Legend(items=items))
+            style.legend(plot, self.look, ncols=2)
         return plot
 
     def _artist(self, plot: Any, axes: Axes, art: Any, empty: bool = False) -> list[Any]:

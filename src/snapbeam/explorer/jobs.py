@@ -197,7 +197,7 @@ def conditioned(run: Run, token: Token) -> str:
 # What a page says while one waits: for how long so far.
 
 
-_FIRST = 700
+_FIRST = 150
 """Milliseconds after which a wait is worth a word."""
 _AGAIN = 1000
 
@@ -209,8 +209,8 @@ class Waiting:
         self._later = later
         self._asked: dict[int, object] = {}
 
-    def begin(self, which: int, tell: Callable[[float], None]) -> object:
-        """Call ``tell(seconds)`` every second until *which* ends or begins again; return the mark of this wait."""
+    def begin(self, which: int, tell: Callable[[float], None]) -> None:
+        """Call ``tell(seconds)`` every second until *which* ends or begins again."""
         begun, mark = time.monotonic(), object()
         self._asked[which] = mark
 
@@ -220,11 +220,6 @@ class Waiting:
                 self._later(look, _AGAIN)
 
         self._later(look, _FIRST)
-        return mark
-
-    def waits(self, which: int, mark: object) -> bool:
-        """Return whether the wait that :meth:`begin` started for *mark* continues."""
-        return self._asked.get(which) is mark
 
     def end(self, which: int) -> None:
         """There is something to see, or no more to wait for."""
@@ -294,10 +289,20 @@ class Tab:
     def __init__(self) -> None:
         self.doc = pn.state.curdoc
         self.closed = False
+        self._runs: dict[int, Token] = {}
 
     def close(self) -> None:
         """The tab is closed: compute nothing for it any more."""
         self.closed = True
+        for token in self._runs.values():
+            token.cancel()
+
+    def begin_run(self, which: int = 0) -> Token:
+        """The token of another run of a number; the one before is cancelled."""
+        if which in self._runs:
+            self._runs[which].cancel()
+        self._runs[which] = token = Token(RUN_SECONDS)
+        return token
 
     def post(self, work: Callable[[], None]) -> None:
         """Do something on the page's own thread, unless the page is closed."""

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from bokeh import models
 from numpy.typing import NDArray
 
-from snapbeam import ResponseClass
+from snapbeam import InputError, ResponseClass
 from snapbeam.explorer.maps import Axis, Plane, Window, picture, visible_strides
-from snapbeam.explorer.style import Look, colors_of, colors_of_numbers, columns, figure, inner_size, style_axis
-from snapbeam.model import quasi_static_threshold
+from snapbeam.explorer.style import Look, colors_of, colors_of_numbers, columns, figure, hexes, inner_size, style_axis
+from snapbeam.plot.map import quasi_static_curve
 from snapbeam.plot.style import CLASS_COLORS
 
 View = tuple[float, float, float, float]
@@ -25,11 +25,6 @@ probe.tags = [now];
 probe.data = {x: [cb_obj.x], y: [cb_obj.y]};
 """
 _IMAGE = ("image", "x", "y", "dw", "dh")
-_QUASI_STATIC = {"frequency_ratio", "velocity_amplitude", "location"}
-
-
-def _palette(name: str) -> list[str]:
-    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b, _ in colors_of_numbers(name)]
 
 
 class MapView:
@@ -73,7 +68,7 @@ class MapView:
             "x", "y", "text", source=self.mark, x_offset="away", y_offset=-6, text_align="align", text_color="#ffffff",
             text_outline_color="#000000", text_font_style="bold", text_font_size=look.font(14),
         )  # fmt: skip
-        self.mapper = models.LinearColorMapper(palette=_palette(""), low=0.0, high=1.0)
+        self.mapper = models.LinearColorMapper(palette=hexes(colors_of_numbers("")), low=0.0, high=1.0)
         self.bar = models.ColorBar(
             color_mapper=self.mapper, visible=False, width=10, padding=4, label_standoff=5,
             background_fill_color=look.card, major_label_text_color=look.text, bar_line_color=look.faint,
@@ -179,7 +174,7 @@ class MapView:
         """Take the limits of the colours of a variable, and its title."""
         self.limits, self.bar.visible, self.plot.title.text = limits, name != "response_class", title
         high = limits[1] if limits[1] > limits[0] else limits[0] + 1.0
-        self.mapper.update(palette=_palette(name), low=limits[0], high=high)
+        self.mapper.update(palette=hexes(colors_of_numbers(name)), low=limits[0], high=high)
 
     def fade(self, old: bool) -> None:
         """Show the map pale, if it is of another system than what is computed."""
@@ -215,7 +210,7 @@ class MapView:
         """Show a list of points as dots in the colours of a variable; those without a number are clear."""
         self._scale(name, limits, title)
         packed = colors_of(name, values[None, :], limits)[0].view(np.uint8).reshape(-1, 4)
-        self.list.data = {"x": x, "y": y, "color": [f"#{r:02x}{g:02x}{b:02x}{a:02x}" for r, g, b, a in packed]}
+        self.list.data = {"x": x, "y": y, "color": hexes(packed)}
 
     def show_marks(self, marks: list[tuple[float, float, str]]) -> None:
         """Mark the points whose runs are shown."""
@@ -237,29 +232,15 @@ class MapView:
         marks = self.plot.scatter("x", "y", source=points, size=6, **unseen, **ring)
         self.plot.add_tools(models.BoxSelectTool(renderers=[marks]))
 
-    def show_quasi_static(self, visible: bool, fixed: dict[str, Any]) -> str:
+    def show_quasi_static(self, visible: bool, attributes: Mapping[str, Any], fixed: dict[str, Any]) -> str:
         """Draw V_QS1 of one mode (Eq. 21); returns the reason if it cannot be drawn."""
         self.curve.data = {"x": [], "y": []}
         if not visible:
             return ""
-        names = (self.x.name, self.y.name)
-        if set(names) - _QUASI_STATIC:
-            return "the quasi-static threshold V_QS1 is drawn over frequency ratio, location and velocity amplitude"
-        needed = _QUASI_STATIC - set(names)
-        if any(name not in fixed for name in needed):
-            return f"the quasi-static threshold needs {', '.join(sorted(needed))}"
-        first, last = self.x.span
-        across = np.linspace(first, last, 402)[1:-1]
-        if "velocity_amplitude" in names:
-            other = names[1 - names.index("velocity_amplitude")]
-            along = across if names[1] == "velocity_amplitude" else np.linspace(*self.y.span, 402)[1:-1]
-            location, ratio = (along, fixed["frequency_ratio"]) if other == "location" else (fixed["location"], along)
-            height = np.asarray(quasi_static_threshold(location, ratio)) * np.ones_like(along)
-            xy = (along, height) if names[1] == "velocity_amplitude" else (height, along)
-        else:
-            location = across if names[0] == "location" else np.linspace(*self.y.span, 402)[1:-1]
-            ratio = fixed["velocity_amplitude"] / np.asarray(quasi_static_threshold(location, 1.0))
-            xy = (ratio, location) if names[0] == "frequency_ratio" else (location, ratio)
+        try:
+            xy = quasi_static_curve(attributes, (self.x.name, self.y.name), (self.x.span, self.y.span), fixed)
+        except InputError as error:
+            return str(error)
         inside = (xy[0] <= self.x.span[1]) & (xy[1] <= self.y.span[1])
         self.curve.data = {"x": xy[0][inside], "y": xy[1][inside]}
         return ""

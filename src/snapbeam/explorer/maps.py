@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
+from snapbeam.explorer.drawn import plain as plain_formulas
 from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token, check_run
 from snapbeam.model.parameter_axes import to_physical
 from snapbeam.model.parameter_file import config_from_mapping, config_text
@@ -28,6 +29,7 @@ from snapbeam.plot.dataset import figures_of
 from snapbeam.sweeps.points import ratios_of
 from snapbeam.util.netcdf import read_result, split_group
 from snapbeam.util.proportions import proportion
+from snapbeam.util.validation import parsed_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -213,10 +215,6 @@ class Source:
         """Variables that can be shown, the response class first."""
         return [name for name, layer in self.layers.items() if layer.shown]
 
-    def numbers(self) -> list[str]:
-        """All that the map holds of a point."""
-        return list(self.layers)
-
     def label(self, name: str) -> tuple[str, str]:
         """Long name and unit of a variable or an axis."""
         if name in self.layers:
@@ -375,24 +373,13 @@ def default_axes(system: sb.System) -> dict[str, Any]:
 
 def axes_dataset(system: sb.System, axes: Mapping[str, Any], integration: sb.Integration) -> xr.Dataset:
     """Coordinates and attributes of a sweep that is not computed."""
+    from snapbeam.sweeps.setup import sweep_setup
     from snapbeam.util.datasets import xr
 
-    coords: dict[str, Any] = {}
-    shared = ("drive.frequency_ratio", "drive.velocity_amplitude", "contact.location")
-    values = {name: system.parameters[name] for name in shared if name in system.parameters} | dict(axes)
-    for name in [*axes, *(name for name in values if name not in axes)]:
-        row, dims = lookup(name), (lookup(name).short,) if name in axes else ()
-        labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
-        coords.setdefault(row.short, (dims, np.asarray(values[name]), labels))
-    attrs = {
-        "modes": system.model.modes,
-        "cycles": integration.cycles_or_default,
-        "reference_frequency": system.model.reference_frequency,
-        "system": json.dumps(plain(system.to_mapping())),
-        "integration": json.dumps(integration_mapping(integration)),
-        "snapbeam_version": "",
-    }
-    return xr.Dataset(coords=coords, attrs=attrs)
+    setup = sweep_setup(system, axes, integration.replace(tolerance=None))
+    whole = {"system": plain(system.to_mapping()), "integration": integration_mapping(integration)}
+    attrs = setup.attributes() | {name: json.dumps(values) for name, values in whole.items()}
+    return xr.Dataset(coords=setup.coordinates(), attrs=attrs)
 
 
 def integration_mapping(integration: sb.Integration) -> dict[str, Any]:
@@ -515,7 +502,7 @@ def system_of(attrs: Mapping[str, Any], name: str) -> sb.System:
     text = attrs.get("system")
     if not isinstance(text, str):
         raise sb.InputError(f"{name}: does not hold the system that it was computed of")
-    sections = _parsed(text, name)
+    sections = parsed_json(text, name)
     if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
         raise sb.InputError(f"{name}: was driven by a record, which is too long to be kept in it")
     arrays = {
@@ -525,19 +512,9 @@ def system_of(attrs: Mapping[str, Any], name: str) -> sb.System:
     return sb.System.from_mapping(arrays)
 
 
-def _parsed(text: str, name: str) -> dict[str, Any]:
-    try:
-        found = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise sb.InputError(f"{name}: its description is damaged ({error})") from None
-    if not isinstance(found, dict):
-        raise sb.InputError(f"{name}: its description is damaged")
-    return found
-
-
 def integration_of(attrs: Mapping[str, Any]) -> sb.Integration:
     """Solver settings stored in a map; the engine is left out, because single runs use the CPU."""
-    found = _parsed(str(attrs.get("integration", "{}")), "integration")
+    found = parsed_json(attrs.get("integration", "{}"), "integration")
     known = {item: value for item, value in found.items() if value is not None and item != "engine"}
     return sb.Integration(**known)
 
@@ -593,16 +570,6 @@ _Array = NDArray[np.float64]
 _MOST = 1_000_000
 """Cells that are sent as they are."""
 _EVEN = 1e-6
-_SIGNS = {r"\Omega": "Ω", r"\omega": "ω", r"\zeta": "ζ", r"\rho": "ρ", r"\phi": "φ", r"\varphi": "φ", r"\tau": "τ"}
-
-
-def plain_symbol(text: str) -> str:
-    """A symbol as a browser shows it without mathematics."""
-    for sign, letter in _SIGNS.items():
-        text = text.replace(sign, letter)
-    for sign, letter in ((r"\mathrm", ""), ("_s", "ₛ"), ("_{s}", "ₛ"), ("{", ""), ("}", ""), ("\\", "")):
-        text = text.replace(sign, letter)
-    return text
 
 
 @dataclass(frozen=True, eq=False)
@@ -648,7 +615,7 @@ class Axis:
         text = text.replace("omega_1", "ω₁").replace("^2", "²")
         symbol = ""
         if "parameter" in attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
-            symbol = plain_symbol(lookup(str(attrs.get("parameter", name))).quantity.symbol)
+            symbol = plain_formulas(f"${lookup(str(attrs.get('parameter', name))).quantity.symbol}$")
         return " ".join(part for part in (text, symbol, "" if unit == "1" else f"({unit})") if part)
 
     @property
@@ -659,13 +626,6 @@ class Axis:
     def nearest(self, value: float) -> int:
         """The number of the point in whose cell a place lies; the nearest one outside."""
         return int(np.clip(np.searchsorted(self.edges, value, side="right") - 1, 0, self.at.size - 1))
-
-    def spread(self, low: float, high: float, pixels: int) -> _Array:
-        """Centres of even pixels from *low* to *high*."""
-        share = (np.arange(pixels) + 0.5) / pixels
-        if self.log:
-            return np.exp(np.log(low) + share * np.log(high / low))
-        return low + share * (high - low)
 
     @property
     def even(self) -> bool:
@@ -694,7 +654,7 @@ def _cut(axis: Axis, view: tuple[float, float], pixels: int) -> tuple[NDArray[np
     first, last = axis.nearest(low), axis.nearest(np.nextafter(high, low))
     if axis.even and last - first < max(pixels, 2) * 2:
         return np.arange(first, last + 1), float(axis.edges[first]), float(axis.edges[last + 1])
-    where = axis.spread(low, high, pixels)
+    where = _spread(low, high, pixels, axis.log)
     index = np.clip(np.searchsorted(axis.edges, where, side="right") - 1, 0, axis.at.size - 1)
     return index, float(low), float(high)
 
@@ -1069,8 +1029,7 @@ class Window:
         """Which cells hold a run of their own, not that of the block they lie in; shape (ny, nx)."""
         rows, columns = np.indices(self.stride.shape)
         stride = np.maximum(self.stride.astype(np.int64), 1)
-        middle = [at // stride * stride + stride // 2 for at in (rows, columns)]
-        return (self.stride > 0) & (middle[0] == rows) & (middle[1] == columns)
+        return (self.stride > 0) & (_middle(rows, stride) == rows) & (_middle(columns, stride) == columns)
 
     def covers(self, x: float, y: float) -> bool:
         """Return whether a point is inside the window."""
@@ -1290,7 +1249,7 @@ def _same_cut(plane: Plane, other: Source) -> Plane:
     return cut
 
 
-def _middle(at: int, stride: int) -> int:
+def _middle(at: Any, stride: Any) -> Any:
     return at // stride * stride + stride // 2
 
 

@@ -69,10 +69,6 @@ def recorded(system: System, integration: Integration, token: jobs.Token) -> Run
 
 _GROWTH = 1500
 """Milliseconds between two looks at a checkpoint that may grow."""
-_AFTER = 700
-"""Milliseconds from the first picture of the page to the building of views that are not seen yet."""
-_PATIENT = 150
-"""Milliseconds after which a run that is still computed is said to be."""
 _EARLY = 0.5
 """Seconds for which a page that is not sent yet waits for its first run."""
 _DRAGGED = 30
@@ -97,7 +93,6 @@ class Page(jobs.Tab):
         self.runs = [RunView(self.look, "A", self.post, self.later)]
         self.runs[0].turned = self._turned
         self.points: list[maps.Point | None] = [None, None]
-        self._tokens: list[jobs.Token | None] = [None, None]
         self._dragged: Mapping[str, Any] = {}
         self._dragging = False
         self.runs_box: Any = None
@@ -176,7 +171,6 @@ class Page(jobs.Tab):
             self._quiet = False
             self.write_address()  # the state to which Back returns
         self.card.control.wake()  # after the run, for which windows wait
-        self.later(self.runs[0].complete, _AFTER)
 
     def system_card(self) -> SystemCard:
         """The card of the system, made when it is first needed."""
@@ -207,9 +201,6 @@ class Page(jobs.Tab):
         """The tab is closed: compute nothing for it any more."""
         super().close()
         self.card.control.cancel("")
-        for token in self._tokens:
-            if token is not None:
-                token.cancel()
 
     def _make_fields(self) -> None:
         names = self.card.plane.parameters
@@ -299,10 +290,7 @@ class Page(jobs.Tab):
             self._fill_fields(point)
             view.fail(self.shared.why_not)
             return
-        before = self._tokens[which]
-        if before is not None:
-            before.cancel()
-        self._tokens[which] = token = jobs.Token(jobs.RUN_SECONDS)
+        token = self.begin_run(which)
         self.points[which] = point
         words = self._words(which)
         base, how = self.card.system, self.card.integration
@@ -315,8 +303,7 @@ class Page(jobs.Tab):
 
         self.shared.jobs.run(work, done, token)  # what follows is said while it is computed
         view.notes = {}
-        mark = self.waiting.begin(which, lambda seconds: view.wait(words, seconds))
-        self.later(lambda: view.wait(words) if self.waiting.waits(which, mark) else None, _PATIENT)
+        self.waiting.begin(which, lambda seconds: view.wait(words, seconds))
         with self._together():
             self._fill_fields(point)
             self.card.select(point, words)
@@ -467,7 +454,6 @@ class Page(jobs.Tab):
             self.runs[1].tabs.active = self.runs[0].tabs.active
             styled(self.runs[1].layout, self.look)
             self.runs_box.append(self.runs[1].layout)
-            self.later(self.runs[1].complete, _AFTER)
         if len(self.runs) > 1:
             self.runs[1].layout.visible = self.compare.value
         self._pair()

@@ -15,8 +15,8 @@ from snapbeam import Run
 from snapbeam.explorer.address import Address
 from snapbeam.explorer.cards import draw
 from snapbeam.explorer.drawn import Drawn
-from snapbeam.explorer.jobs import RUN_SECONDS, Downloads, Tab, Token, check_run, drawing, file_bytes
-from snapbeam.explorer.maps import ResultSource, sections_of, started
+from snapbeam.explorer.jobs import Downloads, Tab, Token, check_run, drawing, file_bytes
+from snapbeam.explorer.maps import Point, ResultSource, brief, sections_of, started
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.style import NOTE, REFUSED, Html, button, framed_plot, look_of, sheet, styled
@@ -52,7 +52,6 @@ class ResultPage(Tab):
         self.place = pn.FlexBox(margin=0, sizing_mode="stretch_width")
         self.view = RunView(self.look, "A", self.post, self.later)
         self.view.tabs.active = int("multiplier_real" in self.source.skeleton)  # an orbit in its phase portrait
-        self._token: Token | None = None
         pn.config.raw_css = [sheet(self.look)]
         title = Markup('<h1>snapbeam <span class="faint">{}: {}</span></h1>').format(self.source.name, self.source.kind)
         left = pn.Column(
@@ -80,7 +79,6 @@ class ResultPage(Tab):
             self.view.show(self.source.run, "the run of the file")
         elif start_of(self.source.skeleton) is not None:
             self.ask(None)
-        self.later(self.view.complete, 700)
 
     def _facts(self) -> Markup:
         """The title and the parameters among the attributes, with their units."""
@@ -158,17 +156,15 @@ class ResultPage(Tab):
         if base is None or start is None:
             self.view.fail(self.shared.why_not)
             return
-        if self._token is not None:
-            self._token.cancel()
-        self._token = token = Token(RUN_SECONDS)
+        token = self.begin_run()
         self.view.wait("")
 
         def work(token: Token) -> tuple[Run, str, Any] | None:
             found = start(self.source.skeleton, place)
             if found is None:
                 return None
-            given = {**found.parameters, **found.state}
-            words = ", ".join(f"{name} {value:.5g}" for name, value in given.items())
+            state = [f"{name} {brief(value)}" for name, value in found.state.items()]
+            words = ", ".join(filter(None, [Point(found.parameters).words(), *state]))
             system = started(sections_of(base.replace(**found.parameters), how), found.state)
             integration = how.replace(cycles=found.cycles or how.cycles, engine="auto", threads=None)
             check_run(system, integration)
@@ -188,9 +184,3 @@ class ResultPage(Tab):
                 self.view.show(run, words)
 
         self.shared.jobs.run(work, done, token)
-
-    def close(self) -> None:
-        """The tab is closed: compute nothing for it any more."""
-        super().close()
-        if self._token is not None:
-            self._token.cancel()

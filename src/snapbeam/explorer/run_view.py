@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import panel as pn
 from bokeh import models
 from bokeh.core.properties import value as constant
+from bokeh.palettes import interp_palette
 from bokeh.transform import linear_cmap
 from markupsafe import Markup
 from numpy.typing import NDArray
@@ -78,6 +79,17 @@ class RunPanel:
             return 1.0, 1.0, 1.0
         length, first = 1e3 * run.system.scale.length, run.system.model.reference_frequency
         return length, length * run.system.scale.omega, first
+
+    def curves(self, plot: Any, sources: Iterable[Any], series: list[Any], run: Run, low: float, high: float) -> None:
+        """Draw some series from *low* to *high*, None for those that the run has not, and let the figure show all."""
+        x, plot.xaxis.axis_label = across(run)
+        shown = []
+        for source, item, values in zip(sources, plot.legend[0].items, series, strict=True):
+            item.visible = values is not None
+            own = [] if values is None else [envelope(x, values, low, high)]
+            source.data = _curve(own)
+            shown += [y for _, y in own]
+        style.fit(plot, *shown)
 
     @property
     def units(self) -> tuple[str, str, str]:
@@ -330,7 +342,7 @@ class BeamPanel(RunPanel):
         self.plot.y_range.update(start=-half, end=half)
         true = self.scale.value == "true proportions"
         drawn = "thickness to scale" if true else "the beam as a line, without its thickness"
-        self.plot.title.text = f"Displacements {true_half / half:.3g} times as large as lengths; {drawn}"
+        self.plot.title.text = f"Displacements {true_half / half:.3g} times as large as lengths;\n{drawn}"
         tall = 0.12 * half
         self.supports.data = {
             "left": [-0.02 * length, length], "right": [0.0, 1.02 * length], "low": [-tall] * 2, "top": [tall] * 2
@@ -405,22 +417,15 @@ class Energy(RunPanel):
                 "x", "y", source=self.sources[name], color=getattr(look, color), line_width=1.4, legend_label=label,
                 line_dash="dashed" if name in ("energy_contact", "energy_striker", "energy_circuit") else "solid",
             )  # fmt: skip
-        style.legend(self.plot, look)
+        style.legend(self.plot, look, ncols=2)
         self.words = style.Html("", sizing_mode="stretch_width")
         return [self.wrap(self.plot), self.words]
 
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
         dataset = run.dataset
-        x, label = across(run)
-        self.plot.xaxis.axis_label = label
-        shown = []
-        for (name, source), item in zip(self.sources.items(), self.plot.legend[0].items, strict=True):
-            own = [envelope(x, dataset[name].values, low, high)] if name in dataset else []
-            item.visible = bool(own)
-            source.data = _curve([(at, 1e6 * y) for at, y in own])
-            shown += [1e6 * y for _, y in own]
-        style.fit(self.plot, *shown)
+        series = [1e6 * dataset[name].values if name in dataset else None for name in _CURVES]
+        self.curves(self.plot, self.sources.values(), series, run, low, high)
         words = ""
         ends = {name: dataset[name].values[[0, -1]] for name in _CURVES if name in dataset}
         works = sum(float(each[1]) for name, each in ends.items() if name.endswith("_work"))
@@ -441,6 +446,7 @@ _MOST = 20_000
 _TABLE = """
 .slick-viewport, .grid-canvas, .slick-pane { background: var(--sb-card); }
 .slick-header-column, .slick-header-columns { background: var(--sb-card) !important; color: var(--sb-text); }
+.slick-header-column { font-size: 11px; padding: 4px 2px !important; }
 .slick-row, .slick-cell { background: var(--sb-card) !important; color: var(--sb-text); border-color: var(--sb-grid); }
 .slick-row.odd, .slick-row.odd .slick-cell { background: var(--sb-page) !important; }
 .slick-row .slick-cell.selected { background: var(--sb-grid) !important; }
@@ -557,7 +563,7 @@ class Modal(RunPanel):
         for at, source in enumerate(self.lines):
             color = _COLORS[at] or look.text
             plot.line("x", "y", source=source, color=color, line_width=1.2, legend_label=f"mode {at + 1}")
-        style.legend(plot, look)
+        style.legend(plot, look, ncols=3)
         self.bars = style.columns(mode=[], rms=[], top=[])
         self.bars.name = self.named("modal")
         low = style.figure(
@@ -573,20 +579,11 @@ class Modal(RunPanel):
         """Show a run between two cycles."""
         if "modal_amplitude" not in run.dataset:
             return
-        x, label = across(run)
-        self.plot.xaxis.axis_label = label
         well = float(np.abs(run.system.model.wells[..., 0]).max()) or 1.0
         alpha = run.dataset["modal_amplitude"].values / well
-        shown = []
-        for at, source in enumerate(self.lines):
-            if at < alpha.shape[1]:
-                inside = envelope(x, np.ascontiguousarray(alpha[:, at]), low, high, 700)
-                source.data = {"x": inside[0], "y": inside[1].astype(np.float32)}
-                shown.append(inside[1])
-            else:
-                source.data = {"x": [], "y": []}
-        style.fit(self.plot, *shown)
-        part = alpha[within(x, low, high)]
+        shown = [alpha[:, at] if at < alpha.shape[1] else None for at in range(_SHOWN)]
+        self.curves(self.plot, self.lines, shown, run, low, high)
+        part = alpha[within(across(run)[0], low, high)]
         rms = np.sqrt(np.mean((part - part.mean(axis=0)) ** 2, axis=0))
         self.bars.data = {"mode": np.arange(1, rms.size + 1), "rms": np.maximum(rms, 1e-16), "top": rms}
         most = float(rms.max(initial=1e-12)) or 1e-12
@@ -642,7 +639,7 @@ class Phase(RunPanel):
         ]  # fmt: skip
         plots[0].line("w", "v", source=self.line, color=look.center, line_width=0.8)
         plots[0].scatter("w", "v", source=dot, size=9, color=look.accent)
-        palette = style.blend(look.accent, look.striker)
+        palette = interp_palette((look.accent, look.striker), 64)
         colors = linear_cmap("t", palette, 0.0, 1.0)
         self.mapper = colors.transform
         plots[1].scatter("w", "v", source=self.dots, size=5, color=colors)
@@ -651,10 +648,10 @@ class Phase(RunPanel):
         self.cursor.follow(_FOLLOW, source=self.line, dot=dot)
         self.where.param.watch(lambda _: self.cursor.later(self._draw, 1), "value")
         self.phase.param.watch(lambda _: self.cursor.later(self._draw, 1), "value_throttled")
-        return [
-            pn.FlexBox(self.where, self.phase, margin=0),
-            pn.Row(*(self.wrap(plot) for plot in plots), sizing_mode="stretch_width"),
-        ]
+        parts = [self.wrap(plot) for plot in plots]
+        for part in parts:
+            part.styles = {"flex": "1 1 calc(50% - 2px)", "min-width": "min(240px, 100%)"}
+        return [pn.FlexBox(self.where, self.phase, margin=0), pn.FlexBox(*parts, margin=0, sizing_mode="stretch_width")]
 
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
@@ -743,7 +740,7 @@ class Spectrum(RunPanel):
         ratio = next((value for name, value in given.items() if name.endswith(".frequency_ratio")), None)
         length, _, shown = self.scales(run)
         self.drive.location, self.first.location = ratio and ratio * shown, shown
-        self.plot.title.text = f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the excitation, dotted: f₁"
+        self.plot.title.text = f"Cycles {low:.4g} to {high:.4g}, Hann window;\ndashed: the excitation, dotted: f₁"
         most = 1e-12
         for name, source in self.sources.items():
             frequency, amplitude = amplitude_spectrum(time, run.dataset[name].values[inside])
@@ -891,7 +888,8 @@ class WaveformPanel(RunPanel):
         own += self._pair()
         style.fit(self.top, *shown, *(y for _, y in own))
         item = data[self.below.value]
-        factor, unit = scale_of(item.values, str(item.attrs.get("units", "1")).removesuffix("1"))
+        unit = str(item.attrs.get("units", "1"))
+        factor, unit = (1.0, unit) if unit in ("", "1") else scale_of(item.values, unit)  # 1e-3 is no metre
         own = [envelope(x, each / factor, *self.span) for each in _columns_of(data, self.below.value).T]
         self.force.data, self.further[1].data = _curve(own), _curves(own[1:])
         self.low.yaxis.axis_label = unit or "1"  # the words, too long for its height, stand in the field below it
@@ -951,8 +949,6 @@ def _curves(curves: list[tuple[_Array, _Array]]) -> dict[str, Any]:
 # ----------------------------------------------------------------------------------------------------
 
 
-_PAUSE = 60
-"""Milliseconds between two views that are built while nobody looks at them."""
 _SETTLE = 60
 """Milliseconds that a range must rest before the samples in it are sent."""
 
@@ -1020,7 +1016,7 @@ class RunView:
     def wait(self, words: str, seconds: float = 0.0) -> None:
         """Say what is computed, over the run before, and for how long it has been."""
         self._write_notes()
-        self._head(style.BUSY.format(f"computing, {seconds:.0f} s" if seconds else "computing"), words)
+        self._head(style.BUSY.format(f"computing, {seconds:.0f} s" if seconds >= 0.5 else "computing"), words)
 
     def rename(self, words: str) -> None:
         """Write the point of the run that is shown with other digits."""
@@ -1090,13 +1086,6 @@ class RunView:
         self.active.activate()
         if self.run is not None:
             self.active.show(self.run, *self.window)
-
-    def complete(self) -> None:
-        """Build the views that are not seen, one after the other, so that what is asked for meanwhile need not wait."""
-        waiting = [part for part in self.parts if not part.built]
-        if waiting:
-            waiting[0].activate()
-            self.later(self.complete, _PAUSE)
 
     def _activated(self) -> None:
         self.turned()

@@ -36,11 +36,13 @@ class ScatterView:
         tools = {"tools": "box_select,lasso_select,pan,wheel_zoom,reset", "active_drag": "box_select"}
         self.plot = style.figure(look, name="scatter-plot", height=200, used=390, share=0.5, **tools)
         faint = {"nonselection_fill_alpha": 0.12, "nonselection_line_alpha": 0.0}
-        self.plot.scatter("a", "b", color="color", source=self.points, size=5, **faint)
-        self.words = style.Html("", sizing_mode="stretch_width", css_classes=["scatter-words"])
+        self.plot.scatter(
+            "a", "b", color="color", source=self.points, size=5, line_color=look.faint, line_width=0.5, **faint
+        )
+        self.words = style.Html("", css_classes=["scatter-words"])
         self.points.selected.on_change("indices", lambda attr, old, new: card.post(self._tell))
         self.layout = pn.Column(
-            pn.FlexBox(*self.choice, margin=0), self.words, style.framed_plot(self.plot, margin=0),
+            pn.FlexBox(*self.choice, self.words, margin=0, align_items="flex-end"), style.framed_plot(self.plot, margin=0),
             sizing_mode="stretch_width", margin=0,
         )  # fmt: skip
         style.styled(self.layout, look)
@@ -62,7 +64,7 @@ class ScatterView:
         kinds = plane.values("response_class")
         packed = style.colors_of("response_class", np.zeros(x.shape) if kinds is None else kinds, (0.0, 1.0))
         step = -(-x.size // _MOST)
-        colors = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b, _ in packed.reshape(-1, 1).view(np.uint8)[::step]]
+        colors = style.hexes(packed.reshape(-1, 1).view(np.uint8)[::step])
         a, b, x, y = (np.ravel(each)[::step].astype(np.float64) for each in (*values, x, y))
         self.points.selected.indices = []
         self.points.data = {

@@ -149,7 +149,7 @@ def fit(plot: Any, *curves: NDArray[Any]) -> None:
         plot.y_range.update(start=low - room, end=high + room)
 
 
-def legend(plot: Any, look: Look) -> None:
+def legend(plot: Any, look: Look, **options: Any) -> None:
     """Put the legend of a figure above it."""
     for item in list(plot.legend):
         plot.center.remove(item)
@@ -158,7 +158,7 @@ def legend(plot: Any, look: Look) -> None:
             location="top_left", orientation="horizontal", click_policy="hide", border_line_color=None,
             background_fill_color=look.card, background_fill_alpha=0.75, label_text_color=look.text,
             label_text_font_size=look.font(11), padding=3, spacing=5, margin=4, glyph_width=22,
-            glyph_height=round(14 * look.scale), label_height=round(14 * look.scale),
+            glyph_height=round(14 * look.scale), label_height=round(14 * look.scale), **options,
         )  # fmt: skip
 
 
@@ -170,11 +170,9 @@ def inner_size(plot: Any, otherwise: tuple[int, int]) -> tuple[int, int]:
         return otherwise
 
 
-def blend(first: str, last: str, steps: int = 64) -> list[str]:
-    """Colours from one to another."""
-    ends = [np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)]) for color in (first, last)]
-    mixed = np.round(np.linspace(ends[0], ends[1], steps)).astype(int)
-    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in mixed]
+def hexes(colors: NDArray[np.uint8]) -> list[str]:
+    """Colours of shape (n, 4) as text."""
+    return [f"#{r:02x}{g:02x}{b:02x}{a:02x}" for r, g, b, a in colors]
 
 
 def columns(**values: Any) -> ColumnDataSource:

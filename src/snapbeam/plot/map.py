@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import warnings
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import cmcrameri.cm as crameri
@@ -237,27 +238,38 @@ def draw_quasi_static_line(
     ax: Axes, dataset: xr.Dataset, across: str, upward: str, fixed: dict[str, float | None]
 ) -> Line2D:
     """Draw V_QS1 of one mode (Eq. 21) over two of the paper's coordinates, the third of them fixed."""
-    if (objection := quasi_static_objection(dataset.attrs)) is not None:
-        raise InputError(f"quasi_static_line with {objection}; leave quasi_static_line out")
     (across, wide), (upward, high) = (ratio_along(dataset, name) for name in (across, upward))
-    x = np.linspace(*ax.get_xlim(), 402)[1:-1] / wide
-    if {across, upward} - {"frequency_ratio", "location", "velocity_amplitude"}:
-        raise InputError(
-            f"quasi_static_line: is drawn over frequency ratio, location and velocity amplitude, not {across}, {upward}"
-        )
-    if (across, upward) == ("frequency_ratio", "location"):
-        height = np.linspace(*ax.get_ylim(), 402)[1:-1] / high
-        line = _given(fixed, "velocity_amplitude") / quasi_static_threshold(height, 1.0), height
-    elif across == "location":
-        line = x, quasi_static_threshold(x, _given(fixed, "frequency_ratio"))
-    else:
-        line = x, quasi_static_threshold(_given(fixed, "location"), x)
-    line = wide * line[0], high * line[1]
+    limits = [np.divide(each, unit) for each, unit in ((ax.get_xlim(), wide), (ax.get_ylim(), high))]
+    x, y = quasi_static_curve(dataset.attrs, (across, upward), limits, fixed)
+    line = wide * x, high * y
     ax.plot(*line, color="white", linewidth=1.8)
     inside = [(min(lim) < at) & (at < max(lim)) for at, lim in zip(line, (ax.get_xlim(), ax.get_ylim()), strict=True)]
     where = "" if np.logical_and(*inside).any() else ": outside the map"
     label = rf"quasi-static, $V_\mathrm{{QS1}}${where}"
     return ax.plot(*line, color="black", linewidth=0.9, dashes=(4, 2), label=label)[0]
+
+
+def quasi_static_curve(
+    attributes: Mapping[Any, Any], names: tuple[str, str], limits: Sequence[Any], fixed: Mapping[str, Any]
+) -> tuple[_Array, _Array]:
+    """Points of V_QS1 of one mode (Eq. 21) over two of the paper's coordinates, the third of them fixed.
+
+    The *names* are those of the coordinates across and upward, between the *limits* of each.
+    """
+    if (objection := quasi_static_objection(attributes)) is not None:
+        raise InputError(f"quasi_static_line with {objection}; leave quasi_static_line out")
+    if set(names) - {"frequency_ratio", "location", "velocity_amplitude"}:
+        raise InputError(
+            "quasi_static_line: is drawn over frequency ratio, location and velocity amplitude, "
+            f"not {names[0]}, {names[1]}"
+        )
+    at = {name: np.linspace(low, high, 402)[1:-1] for name, (low, high) in zip(names, limits, strict=True)}
+    if "velocity_amplitude" in names:
+        place, ratio = (at[name] if name in at else _given(fixed, name) for name in ("location", "frequency_ratio"))
+        at["velocity_amplitude"] = quasi_static_threshold(place, ratio)
+    else:
+        at["frequency_ratio"] = _given(fixed, "velocity_amplitude") / quasi_static_threshold(at["location"], 1.0)
+    return at[names[0]], at[names[1]]
 
 
 def quasi_static_along(dataset: xr.Dataset, along: str, x: _Array) -> _Array:
@@ -266,8 +278,8 @@ def quasi_static_along(dataset: xr.Dataset, along: str, x: _Array) -> _Array:
     return np.asarray(quasi_static_threshold(place, ratio))
 
 
-def _given(fixed: dict[str, float | None], name: str) -> float:
-    value = fixed[name]
+def _given(fixed: Mapping[str, Any], name: str) -> float:
+    value = fixed.get(name)
     if value is None:
         raise InputError(f"quasi_static_line: needs the map's {name}, which the dataset does not contain")
     return value

@@ -156,7 +156,7 @@ _MOTIONS = {
     "force": ("Force", "Force $F(t)$ (N)"),
 }
 """Title of the motion in the schematic, and label of its axis."""
-_LAWS = {
+LAWS = {
     "elastic_plastic": "elastic-plastic",
     "hertz": "Hertz",
     "hunt_crossley": "Hunt–Crossley",
@@ -369,7 +369,7 @@ def _draw_striker(ax: Axes, system: System, contact: Contact, number: int) -> No
 
 def _caption(ax: Axes, at: float, sign: float, contact: Contact, number: int) -> None:
     """Write name, contact law, gap and mass next to the striker, clear of the beam."""
-    striker, law = contact.striker, _LAWS.get(contact.law.name, contact.law.name)
+    striker, law = contact.striker, LAWS.get(contact.law.name, contact.law.name)
     name = contact.label or (f"striker {number}" if number else "contact")
     lines = [f"{name}: {law}"]
     if striker.gap:

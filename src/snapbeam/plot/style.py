@@ -62,7 +62,7 @@ SERIES_COLORS = ("#16245E", "#B03A27", "#70BBF0", "#858585", "#000000")
 
 _SCALE_OF_LABEL = re.compile(r"\(\$?b\$? = ")
 _SCALE_OF_TITLE = re.compile(r", \$b\$\s=\s[^,\n]*")
-_NO_BREAK = re.compile(r"(?<=\$) (?==)|(?<==) | (?=\()|(?<=from) |(?<=the) | (?=well)")
+_NO_BREAK = re.compile(r"(?<=\$) (?==)|(?<==) | (?=\()| (?=%)|(?<=from) |(?<=the) | (?=well)")
 """Spaces of a title that a line does not end at: about equals signs, before brackets and in the name of a well."""
 
 _RC: Any = {
