@@ -104,14 +104,15 @@ def changed(kind, frames, recording, rng):
             for c in rod:
                 frames[k, :, c] = np.interp(rows - swing[k] * share, rows, frames[k, :, c])
     elif kind == "tapered beam":
-        near, _ = _rows(recording, frames)
+        near, tip = _rows(recording, frames)
         rows, taper = np.arange(height), float(rng.choice([-1.0, 1.0])) * rng.uniform(0.01, 0.03)
-        for k in range(count):  # the near edge leans, the far one does not, nor the rod
+        for k in range(count):  # the near edge leans, the far one does not, nor the rod beyond half of its gap
             share = np.clip((rows - near[k] + 0.6 * stage.beam_thickness / recording.camera.pixel_size) / 4.0, 0, 1)
+            over_rod = np.minimum(share, np.clip(2.0 * (tip[k] - rows) / max(tip[k] - near[k], 1e-3), 0.0, 1.0))
             for c in range(width):
                 x = c - (width - 1) / 2.0
-                if abs(x) * recording.camera.pixel_size > 0.5 * stage.shaker_width:
-                    frames[k, :, c] = np.interp(rows - taper * x * share, rows, frames[k, :, c])
+                rod = abs(x) * recording.camera.pixel_size <= 0.5 * stage.shaker_width
+                frames[k, :, c] = np.interp(rows - taper * x * (over_rod if rod else share), rows, frames[k, :, c])
         frames = frames[:, :, : -int(rng.integers(8, 12))]
     elif kind == "dropped bits":
         step = 2.0 ** np.floor(np.log2(full * abs(stage.beam - stage.background) / rng.uniform(6.0, 12.0)))

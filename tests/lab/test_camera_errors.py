@@ -128,7 +128,21 @@ def test_light_shorter_than_the_exposure_is_told_by_the_blur_of_fast_frames():
     rng = np.random.default_rng(2)
     for share, stated, told in ((0.9, 0.9, 0.0), (0.1, 0.9, 0.45), (0.1, None, 0.0), (0.1, 0.1, 0.0)):
         width = np.sqrt(1.0 + np.gradient(beam) ** 2 * share**2 / 12.0) + 0.005 * rng.standard_normal(beam.size)
-        assert exposure_blur(beam, width, stated) == (0.0, told)
+        assert exposure_blur(beam, width, stated)[:2] == (0.0, told)
+
+
+def test_edges_too_noisy_to_show_a_pulse_leave_the_instant_open_and_raise_no_alarm():
+    beam = motion(noise=0.0)[0]
+    square = np.gradient(beam) ** 2 * 0.9**2 / 12.0
+    rng = np.random.default_rng(12)
+    scatters = rng.uniform(0.01, 0.05, 500)
+    good, pulsed = (
+        [exposure_blur(beam, np.sqrt(1.0 + share * square) + s * rng.standard_normal(240), 0.9) for s in scatters]
+        for share in (1.0, 0.0)
+    )
+    assert sum(one.pulse > 0.0 for one in good) <= 2 and np.mean([one.late < 0.1 for one in good]) > 0.95
+    assert np.mean([5.0 * one.late > 0.45 for one in pulsed]) > 0.9
+    assert 300 < sum(one.pulse > 0.0 for one in pulsed) < 500
 
 
 def test_a_bar_along_the_border_is_told_from_the_background():

@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import brentq
+from scipy.special import ndtr
 
 from snapbeam.lab.decay.poles import Line, Stabilisation, damped_waves
 from snapbeam.lab.least_squares import phasors, weighted_line
@@ -39,6 +41,7 @@ _LOWEST = 4.0  # least amplitude of a usable cycle, in standard deviations of it
 _CERTAIN = 30.0  # chi-square by which a second law must better the fit
 _MOST = 0.45  # of the viscous rate that laws which are not told may put in doubt; more is no damping
 _ODDS = 8.0  # chi-square at which an explanation is as likely as none: its parameter, and that it is rare
+_BEYOND = ((2.0, 0.0455), (5.0, 0.01))  # standard errors, and the probability beyond that may be left to no law
 _SHARE = 0.9  # of the probability of all forms, that one of the list must have
 _SMOOTH = 8  # degree of the polynomial that a residual of amplitudes is tested with
 _RARE, _RARER = (
@@ -410,8 +413,8 @@ def find_law(
 ) -> tuple[DampingLaw, float, float]:
     """The law of damping that the amplitude of each cycle shows, its doubt, and what it leaves over the noise.
 
-    The doubt is the standard deviation of the damping ratio at zero amplitude, over that ratio, over all forms, each with its probability, so that it holds how far
-    a curve may turn below the amplitudes of the record.  *start* [s] is where the decay begins, *decay_rate* [1/s] a guess
+    The doubt is half the reach about the damping ratio at zero amplitude, over that ratio, that holds all forms but 4.55 %
+    of their probability: how far a curve may turn below the amplitudes of the record.  *start* [s] is where the decay begins, *decay_rate* [1/s] a guess
     of the viscous rate, *bend* the change of ln a by softening at the start and its standard deviation.
     """
     t = cycles.time - start
@@ -443,6 +446,17 @@ def find_law(
         variance = float(weights @ ((zero - value) ** 2 + within**2) / weights.sum()) - own**2
         return math.sqrt(max(variance, 0.0)) / value
 
+    def probable(value: float, own: float) -> float:
+        def beyond(reach: float) -> float:
+            return float(weights @ (ndtr((value - reach - zero) / within) + ndtr((zero - value - reach) / within)))
+
+        most = float((np.abs(zero - value) + 6.0 * within).max())
+        reach = max(
+            brentq(lambda reach, rare=rare: beyond(reach) / weights.sum() - rare, 0.0, most, xtol=1e-6) / errors
+            for errors, rare in _BEYOND
+        )
+        return math.sqrt(max(reach**2 - own**2, 0.0)) / value
+
     certain = best.weight - plain.weight > 0.5 * _CERTAIN
     if certain and math.exp(usual.weight - best.weight) < _SHARE * weights.sum():
         mean = float(weights @ zero / weights.sum())
@@ -455,7 +469,7 @@ def find_law(
         return DampingLaw("free", float(curve[0] - 1.0), 0.0, curve), doubt(mean, 0.0), unit
     changed = abs(usual.found[2] / plain.found[2] - 1.0)
     if not certain or name == "viscous" or changed < _MATTERS:
-        return DampingLaw(), min(doubt(float(plain.found[2]), float(plain.spread[2])), _MOST), unit
+        return DampingLaw(), min(probable(float(plain.found[2]), float(plain.spread[2])), _MOST), unit
     strength = float(usual.found[3] / usual.found[2])
     error = float(usual.spread[3] / usual.found[2])
     return DampingLaw(name, strength, error), doubt(float(usual.found[2]), float(usual.spread[2])), unit

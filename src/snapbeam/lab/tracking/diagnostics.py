@@ -9,7 +9,7 @@ import numpy as np
 
 from snapbeam.lab.diagnostics import holding, table
 from snapbeam.lab.tracking.frame_order import FrameOrder
-from snapbeam.lab.tracking.measure import Rest, Touch, TrackedRows
+from snapbeam.lab.tracking.measure import ExposureBlur, Rest, Touch, TrackedRows
 from snapbeam.lab.tracking.rulers import Ruler, compare_rulers, option_name, seen_rulers
 from snapbeam.lab.tracking.settings import BeamView, EdgeShape, FrameFlag, Scene, TrackingSettings, VideoFields
 from snapbeam.lab.tracking.survey import CLIPPED
@@ -140,9 +140,8 @@ class SeenMotion:
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
     [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the
-    frames; ``trail``, the share of the frame before that a frame still shows; ``pulse``, the frames by which its
-    instant within the exposure is open; ``open_share``, the exposure over the time between frames, 0 if not known; ``moves`` [px] of
-    the background, 0 if it stands still.
+    frames; ``blur`` by the exposure; ``open_share``, the exposure over the time between frames, 0 if not known;
+    ``moves`` [px] of the background, 0 if it stands still.
     """
 
     rows: TrackedRows
@@ -153,8 +152,7 @@ class SeenMotion:
     drift: float
     fields: VideoFields
     order: FrameOrder
-    trail: float
-    pulse: float
+    blur: ExposureBlur
     open_share: float
     moves: float
 
@@ -171,8 +169,8 @@ def tracking_diagnostics(
     told += [*_of_the_motion(seen, settings, rate), *_of_the_order(seen.order, rate)]
     told += holding(
         KINDS,
-        ("lag", seen.trail > 0.0, {"share_percent": 100.0 * seen.trail}),
-        ("pulse", seen.pulse > 0.0, {"frames": seen.pulse}),
+        ("lag", seen.blur.trail > 0.0, {"share_percent": 100.0 * seen.blur.trail}),
+        ("pulse", seen.blur.pulse > 0.0, {"frames": seen.blur.pulse}),
         ("curved", seen.rows.hollow > 0.0, {"hollow_px": seen.rows.hollow}),
     )
     told += _of_the_edges(scene.shape, settings)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from snapbeam.lab.camera import Recording
+from snapbeam.lab.decay.model import likely
 from snapbeam.lab.signals import stretches
 from snapbeam.lab.tracking.edges import (
     Floats,
@@ -836,15 +837,30 @@ def _within_windows(windows: Floats, position: Floats, width: float, centre: Flo
 
 _SURE_LAG = 4.0  # standard errors
 _LAG = 0.04  # of the square of the speed by which the square of the blur must exceed what the exposure explains
+_PULSE_ODDS = 9.0  # chi-square by which no blur must be the better explanation for a pulse to be as likely as none
+_SELDOM = 0.005  # probability of a pulse that is left out
 
 
-def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> tuple[float, float]:
-    """Share of the frame before that a frame still shows, and frames by which its instant is open; 0 if unknown.
+class ExposureBlur(NamedTuple):
+    """Share of the frame before that a frame still shows, and frames by which its instant is open, by a lamp that pulses.
+
+    Both are 0 if they are not told.  ``late`` is the standard error [frames] of the instant.
+    """
+
+    trail: float
+    pulse: float
+    late: float
+
+
+def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> ExposureBlur:
+    """By how much motion blurs edges, beside what the exposure explains.
 
     Motion at a speed v a frame adds v^2 s^2/12 to the square of an edge's blur, s the *exposure* over the time between
-    frames (None if unknown); a share a of the frame before adds v^2 a (1 - a).  Less than that is added by light that
-    is shorter than the exposure, at an instant that is not known.
+    frames (None if unknown); a share a of the frame before adds v^2 a (1 - a).  A lamp that pulses adds nothing, at an
+    instant that is not known within the exposure: how probable it is follows from the slope and its standard error, so
+    that edges which do not show their blur leave it open.
     """
+    nothing = ExposureBlur(0.0, 0.0, 0.0)
     speed = np.full(row.size, np.nan)
     speed[1:-1] = 0.5 * (row[2:] - row[:-2])
     bend = np.full(row.size, np.nan)
@@ -852,17 +868,22 @@ def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> tuple[f
     with np.errstate(invalid="ignore"):
         used = np.isfinite(width) & (bend < 0.3 * np.abs(speed) + _MOVES)  # not where the beam is struck
     if np.count_nonzero(used & (np.abs(np.nan_to_num(speed)) > 3.0 * _MOVES)) < _LEAST:
-        return 0.0, 0.0
+        return nothing
     x, y = speed[used] ** 2, width[used] ** 2
     if np.ptp(x) == 0.0:  # no slope
-        return 0.0, 0.0
+        return nothing
     (slope, _), cover = polyfit(x, y, 1, cov=True)
     opened = 1.0 if exposure is None else min(exposure, 1.0)
     more = float(slope) - opened**2 / 12.0
-    certain = max(_LAG, _SURE_LAG * math.sqrt(float(cover[0, 0])))
-    if more > certain:
-        return 0.5 - math.sqrt(max(0.25 - more, 0.0)), 0.0
-    return 0.0, (0.5 * opened if exposure is not None and -more > certain else 0.0)
+    error = math.sqrt(float(cover[0, 0]))
+    if more > max(_LAG, _SURE_LAG * error):
+        trail = 0.5 - math.sqrt(max(0.25 - more, 0.0))
+        return ExposureBlur(trail, 0.0, trail)
+    if exposure is None or error == 0.0:
+        return nothing
+    pulse = likely((more**2 - float(slope) ** 2) / error**2, _PULSE_ODDS)
+    late = 0.5 * opened
+    return ExposureBlur(0.0, late if pulse > 0.5 else 0.0, late * math.sqrt(pulse) if pulse > _SELDOM else 0.0)
 
 
 def alternation(row: Floats) -> float:

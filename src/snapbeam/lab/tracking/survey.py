@@ -219,20 +219,21 @@ def edge_shape(
     ratio = float(np.median(dark / contrast))  # the dark side's grey level over the contrast
     if not ratio > 1e-3:
         return EdgeShape(misfit, math.nan, math.nan, 0.0, clipped)
-    gamma, error_of_gamma, shift = _symmetry(x, y, error, ratio, sign, _together(x, error, by_grain))
+    gamma, error_of_gamma, shift = _symmetry(x, y, error, ratio, sign, by_grain)
     return EdgeShape(misfit, gamma, error_of_gamma, shift, clipped)
 
 
 def _symmetry(
-    x: Floats, y: Floats, error: Floats, ratio: float, sign: float, together: float
+    x: Floats, y: Floats, error: Floats, ratio: float, sign: float, by_grain: Floats
 ) -> tuple[float, float, float]:
     """Gamma that makes the edge symmetric in light, its standard error, and where its centre then lies.
 
-    The centre is 0 where a linear camera will do.  *together* is the chi-square of one degree of freedom by texture.
+    The centre is 0 where a linear camera will do.  Texture, the parts of the edge *by_grain*, that bends it as a curve does is no curve.
     """
+    together = _together(x, error, by_grain)
     outer = np.abs(x) > 0.8 * np.abs(x).max()
     low, high = float(y[outer & (x < 0.0)].mean()), float(y[outer & (x > 0.0)].mean())
-    y, error = (y - low) / (high - low), error / (high - low)
+    y, error, by_grain = (y - low) / (high - low), error / (high - low), by_grain / (high - low)
     found = np.array([_asymmetry(x, *_light(y, error, gamma, ratio, sign)) for gamma in _GAMMAS])
     scatter, centres = found[:, 0], found[:, 1]
     best = int(np.argmin(scatter))
@@ -245,6 +246,14 @@ def _symmetry(
     least = scatter[other] <= scatter[[other - 1, other + 1]].min()
     if least and (scatter[other] - scatter[best]) / unit < _CERTAIN:
         best, unit = other, max(together, scatter[other] / freedom)
+    bent = _totals(x, _light(y, error, float(_GAMMAS[best]), ratio, sign)[0], float(centres[best])) - _totals(
+        x, y, float(np.interp(0.0, np.log(_GAMMAS), centres))
+    )
+    away = np.arange(0.5, 4.0 / _STEP) * _STEP
+    variance = sum(np.interp(side, x, error) ** 2 for side in (away, -away)) + _MIRRORED**2
+    grains = np.stack([_totals(x, one, 0.0) + 1.0 for one in by_grain.T])
+    along = float(((grains @ (bent / variance)) ** 2).sum() / (bent**2 / variance).sum())
+    unit = max(unit, along)
     worse = (float(np.interp(0.0, np.log(_GAMMAS), scatter)) - scatter[best]) / unit
     alike = np.abs(scatter - scatter[best]) / unit < 1.0
     spread = np.log(_GAMMAS[alike & (np.abs(np.log(_GAMMAS / _GAMMAS[best])) < _LIKELY)])
@@ -276,6 +285,12 @@ def _together(x: Floats, error: Floats, by_grain: Floats) -> float:
     spread = np.hypot(*(np.interp(side, x, error) for side in (away, -away)))
     chi = ((halves[0] + halves[1]) ** 2 / (spread**2 + _MIRRORED**2)).sum(1)
     return max(float(np.var(chi)) / (2.0 * away.size), 1.0)
+
+
+def _totals(x: Floats, light: Floats, centre: float) -> Floats:
+    """An edge and itself turned about its *centre*, less 1."""
+    away = np.arange(0.5, 4.0 / _STEP) * _STEP
+    return np.interp(centre + away, x, light) + np.interp(centre - away, x, light) - 1.0
 
 
 def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:

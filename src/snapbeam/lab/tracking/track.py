@@ -24,6 +24,7 @@ from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.frame_order import FrameOrder, find_order, without_repeats
 from snapbeam.lab.tracking.measure import (
     Drift,
+    ExposureBlur,
     Follower,
     Rest,
     TrackedRows,
@@ -70,11 +71,11 @@ def tracked_dataset(
     *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video, *moves*
     [px] by how much the background does in each frame.
     """
-    trail = pulse = 0.0
+    motion_blur = ExposureBlur(0.0, 0.0, 0.0)
     opened = None if recording.exposure is None else recording.exposure * recording.frame_rate
     if not (fields.shift or fields.apart or scene.noise.lag):
-        trail, pulse = exposure_blur(rows.row, rows.width, opened)
-    rows = _as_filtered(rows, scene, fields, trail + pulse)
+        motion_blur = exposure_blur(rows.row, rows.width, opened)
+    rows = _as_filtered(rows, scene, fields, motion_blur.late)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         located = int(np.isfinite(rows.row).sum())
@@ -112,7 +113,7 @@ def tracked_dataset(
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
     seen = SeenMotion(
-        rows, rest, penetration, touch, scale, drift, fields, order, trail, pulse, opened or 0.0, float(moves.max())
+        rows, rest, penetration, touch, scale, drift, fields, order, motion_blur, opened or 0.0, float(moves.max())
     )
     diagnostics = (
         *recording.diagnostics,
