@@ -132,11 +132,19 @@ def test_a_statistic_that_is_registered_after_a_run() -> None:
         np.testing.assert_equal((with_row[name], after[name]), (value, value), err_msg=name)
 
 
+def summit(values: np.ndarray) -> float:
+    """Maximum of samples, by the parabola through the highest and its neighbours."""
+    k = int(values.argmax())
+    a, b, c = values[k - 1 : k + 2] if 0 < k < values.size - 1 else 3 * [values[k]]
+    return float(b - (a - c) ** 2 / (8.0 * (a - 2.0 * b + c)) if a < b > c else b)
+
+
 @pytest.mark.parametrize("modes", [1, 8, pytest.param(32, marks=pytest.mark.slow)])
-def test_peaks_are_low_by_at_most_what_they_state(modes: int) -> None:
-    """Maxima over the ends of steps, against fine output at level reference; the comment has the bound of each level."""
+def test_peaks_err_by_at_most_what_they_state(modes: int) -> None:
+    """Maxima inside steps, against fine output at level reference; the comment has the bound of each level."""
     rng = np.random.default_rng(40 + modes)
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.005)
+    compared = 0
     layers = sb.PiezoelectricHarvester(moment_per_volt=1e-4, capacitance=3e-7, resistance=1e4)
     for _ in range(4):
         ratio = rng.uniform(0.4, 3.0)
@@ -147,14 +155,18 @@ def test_peaks_are_low_by_at_most_what_they_state(modes: int) -> None:
             ({"peak_voltage": "voltage"}, [layers]),
         ):
             system = sb.System(model, contacts=[contact], harvesters=around)
-            end = 4 / (ratio * model.reference_frequency) * (1.0 - 1e-13)
-            fine = sb.simulate(
-                system, sb.Integration(cycles=4, accuracy="reference"), sample_times=np.linspace(0.0, end, 40_001)
-            )
+            end = 2 / (ratio * model.reference_frequency) * (1.0 - 1e-13)
+            times = np.linspace(0.0, end, 40_001)
+            fine = sb.simulate(system, sb.Integration(cycles=2, accuracy="reference"), sample_times=times)
             for name, variable in peaks.items():
-                exact = float(np.abs(fine.dataset[variable].values).max())
+                exact = summit(np.abs(fine.dataset[variable].values))
                 comment = variable_attributes(name)["comment"]
                 for accuracy in ("standard", "reference"):
-                    bound = 0.01 * float(re.search(rf"([\d.]+) % (low )?\({accuracy}\)", comment)[1])
-                    found = sb.simulate(system, sb.Integration(cycles=4, accuracy=accuracy)).summary[name]
-                    assert (1.0 - bound) * exact <= found <= (1.0 + 1e-3) * exact, (name, accuracy, ratio)
+                    bound = float(re.search(rf"([\de.-]+) \({accuracy}\)", comment)[1])
+                    run = sb.simulate(system, sb.Integration(cycles=2, accuracy=accuracy), sample_times=times[::2000])
+                    moved = [each.dataset["modal_amplitude"].values for each in (run, fine)]
+                    strayed = np.abs(moved[0][:21] - moved[1][::2000][:21]).max() / np.abs(moved[1]).max()
+                    if strayed < 1e-6:  # the error of the run itself is beside
+                        compared += 1
+                        assert run.summary[name] == pytest.approx(exact, rel=bound), (name, accuracy, ratio)
+    assert compared >= 14
