@@ -42,6 +42,7 @@ _CERTAIN = 30.0  # chi-square by which a second law must better the fit
 _MOST = 0.45  # of the viscous rate that laws which are not told may put in doubt; more is no damping
 _ODDS = 8.0  # chi-square at which an explanation is as likely as none: its parameter, and that it is rare
 _BEYOND = ((2.0, 0.0455), (5.0, 0.01))  # standard errors, and the probability beyond that may be left to no law
+_FEW = 4  # amplitudes below which a record tells nothing of its law
 _SHARE = 0.9  # of the probability of all forms, that one of the list must have
 _SMOOTH = 8  # degree of the polynomial that a residual of amplitudes is tested with
 _RARE, _RARER = (
@@ -418,21 +419,27 @@ def find_law(
     of the viscous rate, *bend* the change of ln a by softening at the start and its standard deviation.
     """
     t = cycles.time - start
-    if t.size < 10:
-        return DampingLaw(), 0.0, 1.0
+    if t.size < _FEW:
+        return DampingLaw(), _MOST, 1.0
     rate = max(decay_rate, 1e-6)
-    first = float(cycles.amplitude[0]) * math.exp(rate * float(t[0]))
-    noise = max(cycles.noise / first, 1e-6)
-    aim = np.log(cycles.amplitude / first)
-    clock = rate * t
-    smooth = np.polyval(polyfit(clock, aim, 3, w=np.exp(aim)), clock)
-    for _ in range(3):
+    clock, level = rate * t, np.log(cycles.amplitude)
+    first = float(level[0] + clock[0])
+    smooth = np.polyval(polyfit(clock, level - first, 3, w=cycles.amplitude), clock)
+    for _ in range(4):
         x = np.exp(np.minimum(smooth, 0.3))
         slopes = cumulative_trapezoid(_terms(x), clock, axis=0, initial=0.0)
         design = np.column_stack([np.ones_like(t), x**2, -clock, -slopes])
-        forms, unit = _regressions(design, aim, x / noise, bend)
+        weight = x * math.exp(first) / max(cycles.noise, 1e-6 * math.exp(first))
+        forms, unit = _regressions(design, level - first, weight, bend)
         best = max(forms, key=lambda one: one.weight)
         smooth = design[:, [0, 1, 2, *(3 + k for k in best.terms)]] @ best.found
+        # from the first cycle back to the start, over whose amplitude all amplitudes are
+        back = 0.0
+        for _ in range(2):
+            middle = np.exp(smooth[:1] + 0.5 * back)
+            back = float(clock[0] * (best.found[2] + _terms(middle)[0, list(best.terms)] @ best.found[3:]))
+        first += float(smooth[0]) + back
+        smooth = smooth - (smooth[0] + back)
     plain = forms[0]
     named = {"viscous": plain, "dry": forms[1], "quadratic": forms[2]}
     free = forms[3:]
