@@ -121,12 +121,15 @@ def identify_decay(
     settings = FitSettings(units, soften, _known_softening(buckling_level, units, centres.wanted[0]))
     diagram = centres.diagram
     if method == "fit":
-        samples, result, cycles, more, diagram = fit_modes(decay, centres, settings)
+        made = fit_modes(decay, centres, settings)
+        if made[4] is None and unexplained(made[1].residual, made[0].sampling_frequency):
+            # other modes may be in the record: once more with them known, unless what bends a decay was taken for modes
+            known = find_centres(decay, 1, [made[1].modes[0].natural_frequency])
+            again = fit_modes(decay, known, settings)
+            if again[1].noise_rms < made[1].noise_rms:
+                made, centres, told = again, known, []
+        samples, result, cycles, more, diagram = made
         told += more
-        if diagram is None and unexplained(result.residual, samples.sampling_frequency):
-            # other modes are in the record: once more with them known
-            centres = find_centres(decay, 1, [result.modes[0].natural_frequency])
-            samples, result, cycles, told, diagram = fit_modes(decay, centres, settings)
     else:
         samples = without_poles(decay.samples, centres.far, centres.own)
         result, cycles = _by_cycles(samples, centres.wanted, units, soften, method)
