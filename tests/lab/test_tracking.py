@@ -46,7 +46,9 @@ def test_displacements_within_the_promised_error(tmp_path, name, snr, error, bia
         assert rms(miss) <= error
         assert bias is None or abs(np.nanmean(miss)) <= bias
     beam = errors_px(tracked, recording.truth, "displacement_mm")
-    assert np.nanmedian(tracked["displacement_stderr_mm"]) / (PIXEL * 1e3) == pytest.approx(np.nanstd(beam), rel=0.25)
+    slow = np.abs(np.gradient(tracked["beam_row"])) < 0.03  # where the instant, left open by lamps, does not matter
+    stated = np.nanmedian(tracked["displacement_stderr_mm"][slow]) / (PIXEL * 1e3)
+    assert stated == pytest.approx(np.nanstd(beam), rel=0.25)
 
 
 def test_a_sticker_that_is_not_looked_for_does_not_mislead(tmp_path):

@@ -173,7 +173,7 @@ def tracking_diagnostics(
         ("pulse", seen.blur.pulse > 0.0, {"frames": seen.blur.pulse}),
         ("curved", seen.rows.hollow > 0.0, {"hollow_px": seen.rows.hollow}),
     )
-    told += _of_the_edges(scene.shape, settings)
+    told += of_the_edges(scene.shape, settings)
     noise, shift = scene.noise, rounding_shift(scene.beam)
     alike = {"correlation": max(noise.along, noise.across), "factor": noise.factor, "made_px": noise.made_up}
     told += holding(
@@ -291,7 +291,8 @@ def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float)
     return [KINDS["no_rest"].found(quiet=2 * seen.rest.indices.size, shift_mm=offset_mm)]
 
 
-def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Diagnostic]:
+def of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Diagnostic]:
+    """Return what the shape of edges says of a curve of the camera, of overexposure, or of the lens."""
     if shape.clipped > CLIPPED:
         return [KINDS["overexposed"].found(share_percent=100.0 * shape.clipped, shift_px=2.0 * abs(shape.shift))]
     if abs(shape.shift) > 0.02:
