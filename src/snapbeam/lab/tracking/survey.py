@@ -252,7 +252,7 @@ def _symmetry(
     away = np.arange(0.5, 4.0 / _STEP) * _STEP
     variance = sum(np.interp(side, x, error) ** 2 for side in (away, -away)) + _MIRRORED**2
     grains = np.stack([_totals(x, one, 0.0) + 1.0 for one in by_grain.T])
-    along = float(((grains @ (bent / variance)) ** 2).sum() / (bent**2 / variance).sum())
+    along = float(((grains @ (bent / variance)) ** 2).sum() / max(float((bent**2 / variance).sum()), 1e-300))
     unit = max(unit, along)
     worse = (float(np.interp(0.0, np.log(_GAMMAS), scatter)) - scatter[best]) / unit
     alike = np.abs(scatter - scatter[best]) / unit < 1.0
