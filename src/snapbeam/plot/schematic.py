@@ -224,7 +224,7 @@ def plot_system(system: System, title: str = "") -> Figure:
     tips = [(numbered(name)[1], drive) for name, drive in system.moving if numbered(name)[0] == "drive"]
     others = [each for each in system.moving if numbered(each[0])[0] != "drive"]
     rows = min(len(others) + bool(tips), _PANELS)
-    figure = new_figure("double", max(72.0 if both else 52.0, 34.0 * rows))
+    figure = new_figure("double", max(72.0 if both else 52.0, 40.0 * rows))
     with figure_style():
         # each part is laid out alone, so that the labels of the motion leave the beam its height
         parts = figure.subfigures(1, 2 if rows else 1, squeeze=False, width_ratios=[2.6, 1.0] if rows else [1.0])[0]
