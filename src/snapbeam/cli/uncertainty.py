@@ -355,7 +355,11 @@ def _intervals(one: xr.Dataset, name: str = "probability") -> list[str]:
         where = ", ".join(coordinate_text(one, str(dim), value) for dim, value in values.items())
         ends = [float(point[f"{name}{end}"]) for end in ("", "_low", "_high")]
         middle, low, high = (value_text(one, name, each) if np.isfinite(each) else "unbounded" for each in ends)
-        lines.append(f"  {where or name}: {middle} ({low} to {high})")
+        whole = int(point["runs"]) > 1 and not int(point["runs_failed"]) and "unbounded" not in middle
+        same = whole and high == "unbounded" and not name.endswith("quantile")
+        lines.append(
+            f"  {where or name}: {middle} ({'no interval: all runs give this' if same else f'{low} to {high}'})"
+        )
     return lines
 
 
