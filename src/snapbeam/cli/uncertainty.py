@@ -114,6 +114,7 @@ def _compute(
     from snapbeam.uncertainty.cost import estimate_cost as cost_of
 
     how = settings.integration.replace(threads=threads)
+    notes().print(f"trial runs of the {words[0]}, to estimate its cost", markup=False)
     cost = cost_of(question, *arguments, integration=how, trial=10.0 if estimate_cost else 2.0, **options)
     if not agreed(cost, yes, estimate_cost):
         return None
