@@ -181,6 +181,11 @@ def shorten(app: Any, what: str, name: str, found: Any, options: Any, lines: lis
     lines[:] = kept
 
 
+def join_names(app: Any, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+    """Write attributes that share a description without spaces: Sphinx takes what is before a space for a type."""
+    lines[:] = [re.sub(r"^:(?:ivar|vartype) [^:]+:", lambda names: names[0].replace(", ", ","), line) for line in lines]
+
+
 def with_dashes(app: Any, doctree: Any) -> None:
     """Write a dash between an error and its description."""
     for text in list(doctree.findall(nodes.Text)):
@@ -271,3 +276,4 @@ def setup(app: Any) -> None:
     app.connect("source-read", link_gallery)
     app.connect("doctree-read", with_dashes)
     app.connect("autodoc-process-docstring", shorten, priority=400)  # before Napoleon
+    app.connect("autodoc-process-docstring", join_names, priority=600)  # after Napoleon

@@ -307,12 +307,7 @@ class System:
 
         Without a striker it is the well of the start. With local forces it is the well that a beam without inertia
         reaches from that well of the structure; from a saddle, on the side of the striker. An external force begins
-        with the run.
-
-        Raises
-        ------
-        InputError
-            If the local forces leave no well there.
+        with the run. If the local forces leave no well there, an InputError is raised.
         """
         state, local = rest_state(self.model, self.striker), self.unloaded_potential
         if local.is_of_the_structure_alone:

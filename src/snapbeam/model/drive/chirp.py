@@ -90,7 +90,7 @@ class Chirp(SweptSine):
     start_ratio, stop_ratio : float
         Omega at the beginning and at the end, either may be the greater.
     velocity_amplitude : float
-        V.
+        V over the sweep, as of a :class:`Sine`.
     sweep_cycles : float
         Duration over the first period 2 pi/(start_ratio omega_1), which is a cycle.
     sweep_type : {"linear", "log"}

@@ -114,7 +114,7 @@ class ConstantForce(ForceHistory, Timed):
     Parameters
     ----------
     force : float
-        N.
+        Force F, N.
 
     See Also
     --------
