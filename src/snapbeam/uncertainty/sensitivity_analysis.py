@@ -458,10 +458,8 @@ def sensitivity(
         Confidence level of the intervals, in (0, 1).
     integration : Integration, optional
         Settings of the runs.
-    checkpoint : path or CheckpointOptions, optional
-        Checkpoint folder, not for lifetimes; an existing one is resumed.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with runs of each round, not for lifetimes; True prints it.
+    checkpoint, progress : optional
+        Folder and report of runs of each round, as in :func:`snapbeam.sweep`; not for lifetimes.
 
     Returns
     -------
