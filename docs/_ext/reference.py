@@ -216,7 +216,7 @@ def command_line() -> str:
     return "\n".join([*parts, *(part for each in commands for part in _command(*each, common))])
 
 
-_COMMON = 3
+_COMMON = 4
 """Number of commands that share a common option, at least."""
 
 
