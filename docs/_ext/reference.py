@@ -207,8 +207,9 @@ def command_line() -> str:
     commands = [each for name, command in group.commands.items() for each in _commands(f"snapbeam {name}", command, 2)]
     counts = Counter(row for _, command, _ in commands for row in _options(command))
     common: dict[str, list[tuple[str, str, str]]] = {}
+    fewest = {panel: min(count for row, count in counts.items() if row[0] == panel) for panel, _, _ in counts}
     for row, count in counts.items():
-        if count >= _COMMON:
+        if count >= _COMMON or fewest[row[0]] >= _COMMON - 1:  # or of a panel that goes as a whole
             common.setdefault(row[0], []).append(row)
     parts = ["## Common options\n\nBelow each command, a line names the groups of these options that it has.\n"]
     for panel, rows in common.items():

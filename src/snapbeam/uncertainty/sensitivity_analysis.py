@@ -450,8 +450,8 @@ def sensitivity(
     method : {"local", "sobol", "given_data"}
         ``"local"``: half the difference of the quantities with a parameter one standard normal score up and down, over
         *samples* common random numbers. ``"sobol"``: first and total indices over four scrambled sequences of *samples*
-        points, all from one start. ``"given_data"``: first indices from *samples* plain samples, which may be
-        correlated.
+        points, whose scatter gives the intervals, all from one start. ``"given_data"``: first indices from *samples*
+        plain samples, which may be correlated.
     samples : int, optional
         Number of samples; 16, 128 and 1000 for the three methods.
     confidence : float
