@@ -408,17 +408,6 @@ class System:
         -------
         open, short : arrays of shape (N,)
             Hz, ascending; 0 in an unstable direction.
-
-        Examples
-        --------
-        >>> import snapbeam as sb
-        >>> model = sb.ReducedModel.from_matrices(
-        ...     [[1.0]], [1.0], contact_shape=[1.0], patch_shape=[1.0], reference_frequency=1.0
-        ... )
-        >>> layer = sb.PiezoelectricHarvester(moment_per_volt=0.5, capacitance=1.0, resistance=1.0)
-        >>> opened, short = sb.System(model, harvesters=[layer]).circuit_frequencies()
-        >>> print((opened / short).round(6))
-        [1.118034]
         """
         stiffness = self.potential.in_modes(self.potential.tangent(self._amplitude_at(equilibrium)))
         found = [np.array(stiffness), np.array(stiffness)]
