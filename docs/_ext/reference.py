@@ -45,7 +45,7 @@ _SECTIONS = {
     "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples or a spectrum can have "
     "`file` and its [keys](base_and_load.md#records-from-files) instead of them.",
     "axial_load": "The change of the axial load in time, selected by `type`; without this section the load is constant.",
-    "force": "A force on the structure, selected by `type`: as a function of time those of [`[axial_load]`](#axial-load), with "
+    "force": "A force on the structure, selected by `type`: as a function of time those of [`[axial_load]`](#axial_load), with "
     "the same keys, and `location` and `shape`; of the displacement or velocity of one point those of the table. A law of your own has its own type; see [Your own parts](extending.md#local-force). Several "
     "forces are an array `[[force]]`, each with a `label` if you like. `recorded_force` can have `file` and its "
     "[keys](base_and_load.md#records-from-files) instead of samples.",
