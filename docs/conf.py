@@ -52,6 +52,7 @@ myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
+autodoc_preserve_defaults = True  # a default by its name
 autodoc_mock_imports = ["bokeh", "panel", "param", "tornado"]  # of the explorer, which a build does not need
 napoleon_google_docstring = False
 napoleon_use_ivar = True  # one list of attributes, not an entry for each
@@ -181,6 +182,18 @@ def shorten(app: Any, what: str, name: str, found: Any, options: Any, lines: lis
     lines[:] = kept
 
 
+def hide_signature(app: Any, what: str, name: str, found: Any, options: Any, *signature: Any) -> tuple[str, str] | None:
+    """Leave out the arguments of a class that functions make: its docstring has none, and no call of it."""
+    words = found.__doc__ or ""
+    made = what == "class" and "Parameters\n" not in words and f"{name.rpartition('.')[2]}(" not in words
+    return ("", "") if made else None
+
+
+def join_names(app: Any, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+    """Write attributes that share a description without spaces: Sphinx takes what is before a space for a type."""
+    lines[:] = [re.sub(r"^:(?:ivar|vartype) [^:]+:", lambda names: names[0].replace(", ", ","), line) for line in lines]
+
+
 def with_dashes(app: Any, doctree: Any) -> None:
     """Write a dash between an error and its description."""
     for text in list(doctree.findall(nodes.Text)):
@@ -270,4 +283,6 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", summarise_validation)
     app.connect("source-read", link_gallery)
     app.connect("doctree-read", with_dashes)
+    app.connect("autodoc-process-signature", hide_signature)
     app.connect("autodoc-process-docstring", shorten, priority=400)  # before Napoleon
+    app.connect("autodoc-process-docstring", join_names, priority=600)  # after Napoleon

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pytest
 
-DEAR = {"ex24_dynamics", "ex25_design", "ex27_bifurcation_curves", "ex30_experiment"}
+DEAR = {"ex24_dynamics", "ex25_design", "ex27_bifurcation_curves"}
 """Examples that take seconds."""
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("ex*.py"))
 

@@ -32,27 +32,30 @@ _SECTIONS = {
     "boundary": "Stiffness of the supports; without this section both ends are clamped.",
     "imperfection": "Initial deflection and constant transverse loads, which make the wells unequal; without this section the "
     "beam is perfect.",
-    "contact": "A striker and the law of its contact with the beam. The law is selected by `type`: {laws}. You can give "
+    "contact": "A striker and the law of its contact with the beam. The law is selected by `type`. You can give "
     "materials instead of `stiffness`: `radius` of the sphere (m), `young_modulus` (Pa) and `poisson_ratio`, the last two as "
     "lists of two numbers, of sphere and beam. You can give `restitution` and `speed` (m/s) instead of `damping_factor`. Keys "
     "without a type are those of the striker; `location_m` (m) can replace `location`. Several contacts are an array "
     "`[[contact]]`, the drive of each below it as `[contact.drive]`. A `label` replaces the number in the names of their "
     "parameters; see [systems](systems.md#names-of-parameters).",
-    "drive": "The motion of the striker, selected by `type`: {drives}. "
+    "drive": "The motion of the striker, selected by `type`. "
     "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples can have `file` and its [keys](base_and_load.md#records-from-files) instead of them.",
-    "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest. "
-    "Keys that are not in the second table are those of [`[drive]`](#drive), with the same unit, limits, default and level. "
+    "base_excitation": "The motion of the base, selected by `type`: {bases}; without this section the base is at rest. "
+    "Keys that are not in the table are those of [`[drive]`](#drive), with the same unit, limits, default and level. "
     "[Names in physical units](#names-in-physical-units) can replace the ratios. A type with samples or a spectrum can have "
     "`file` and its [keys](base_and_load.md#records-from-files) instead of them.",
-    "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
-    "constant.",
-    "force": "A force on the structure, selected by `type`: as a function of time {forces}; of the displacement or velocity of "
-    "one point {local_forces}. A law of your own has its own type; see [Your own parts](extending.md#local-force). Several "
+    "axial_load": "The change of the axial load in time, selected by `type`; without this section the load is constant.",
+    "force": "A force on the structure, selected by `type`: as a function of time those of [`[axial_load]`](#axial_load), with "
+    "the same keys, and `location` and `shape`; of the displacement or velocity of one point those of the table. A law of your own has its own type; see [Your own parts](extending.md#local-force). Several "
     "forces are an array `[[force]]`, each with a `label` if you like. `recorded_force` can have `file` and its "
     "[keys](base_and_load.md#records-from-files) instead of samples.",
-    "harvester": "The circuit of an energy harvester, selected by `type`: {harvesters}.",
+    "harvester": "The circuit of an energy harvester, selected by `type`.",
     "integration": "Solver settings.",
 }
+
+
+_SAME_KEYS = {"base_excitation": "drive", "force": "axial_load"}
+"""Sections whose table leaves out the keys of another: a base moves as a tip, a force changes as a load."""
 
 
 def _cell(text: object) -> str:
@@ -79,17 +82,13 @@ def parameter_tables() -> str:
     types = {
         "contact": LAWS,
         "drive": {name: kind for name, kind in DRIVES.items() if name != "sum"},
-        "base_excitation": {name: kind for name, kind in DRIVES.items() if name != "sum" and kind.can_excite_base()},
         "axial_load": FORCES,
-        "force": {**FORCES, **LOCAL_FORCES},
+        "force": LOCAL_FORCES,
         "harvester": HARVESTERS,
     }
-    listed = {
-        "laws": _listed(LAWS), "drives": _listed(types["drive"]), "loads": _listed(FORCES),
-        "harvesters": _listed(HARVESTERS), "forces": _listed(FORCES), "local_forces": _listed(LOCAL_FORCES),
-    }  # fmt: skip
+    bases = _listed(name for name, kind in types["drive"].items() if kind.can_excite_base())
     parts = []
-    of_drives: dict[str, tuple[str, ...]] = {}
+    above: dict[str, dict[str, tuple[str, ...]]] = {}
     for section, words in _SECTIONS.items():
         rows = []
         own = {name: row for name, row in parameters().items() if row.section == section}
@@ -107,12 +106,11 @@ def parameter_tables() -> str:
             level = "run" if row.is_run else "model"
             rows.append((f"`{key}`", meaning, unit, limits, shown or "–", level))
         keys = [row[0] for row in rows]
-        if section == "drive":
-            of_drives = {row[0]: row[2:6] for row in rows}
-        elif section == "base_excitation":  # a motion of the base has the keys of that of a tip
-            rows = [row for row in rows if of_drives.get(row[0]) != row[2:6]]
+        above[section] = {row[0]: row[2:6] for row in rows}
+        if section in _SAME_KEYS:
+            rows = [row for row in rows if above[_SAME_KEYS[section]].get(row[0]) != row[2:6]]
         note = f" In datasets their names begin with `{section}_`." if prefixed else ""
-        text = f"## [{section}]\n\n{words.format(**listed)}{note}\n\n"
+        text = f"## [{section}]\n\n{words.format(bases=bases)}{note}\n\n"
         if section in types:
             text += _keys_by_type(types[section], keys) + "\n"
         parts.append(text + _table(("key", "meaning", "unit", "allowed", "default", "level"), rows))
@@ -141,25 +139,13 @@ def _physical() -> str:
 
 def _keys_by_type(types: Mapping[str, Any], keys: Sequence[str]) -> str:
     """Return a table of the keys that each type has."""
-    rows = [
-        (f"`{name}`", ", ".join(key for key in keys if key.strip("`") in _keys(kind)) or "–")
-        for name, kind in types.items()
-    ]
+    fields = {name: {f"`{each.name}`" for each in dataclasses.fields(kind)} for name, kind in types.items()}
+    rows = [(f"`{name}`", ", ".join(key for key in keys if key in own) or "–") for name, own in fields.items()]
     return _table(("type", "its keys"), rows)
 
 
 def _listed(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
-
-
-def _keys(kind: Any) -> set[str]:
-    """Keys of a contact law, drive, load, force or harvester; a force in time has a location of its own."""
-    from snapbeam.model.drive.force import FORCES
-    from snapbeam.model.external_force import ExternalForce
-    from snapbeam.model.quantity import quantities
-
-    own = {each.name for each in dataclasses.fields(kind)}
-    return own | set(quantities(ExternalForce)) if kind in FORCES.values() else own
 
 
 def _number(value: Any) -> str:
@@ -207,8 +193,9 @@ def command_line() -> str:
     commands = [each for name, command in group.commands.items() for each in _commands(f"snapbeam {name}", command, 2)]
     counts = Counter(row for _, command, _ in commands for row in _options(command))
     common: dict[str, list[tuple[str, str, str]]] = {}
+    fewest = {panel: min(count for row, count in counts.items() if row[0] == panel) for panel, _, _ in counts}
     for row, count in counts.items():
-        if count >= _COMMON:
+        if count >= _COMMON or fewest[row[0]] >= _COMMON - 1:  # or of a panel that goes as a whole
             common.setdefault(row[0], []).append(row)
     parts = ["## Common options\n\nBelow each command, a line names the groups of these options that it has.\n"]
     for panel, rows in common.items():

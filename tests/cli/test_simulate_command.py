@@ -99,3 +99,14 @@ def test_a_recorded_drive_leaves_the_gap_of_the_striker(folder):
 def test_bounds_that_are_not_a_range_are_refused_by_their_name(folder, command, option, text):
     said = refused("dynamics", command, "--modes", "1", f"--{option}", text)
     assert f"{option.replace('-', '_')} (--{option}) = '{text}'" in said
+
+
+def test_a_long_run_says_once_how_long_it_takes(monkeypatch) -> None:
+    """One line where standard error is no terminal, none if asked for errors only."""
+    from snapbeam.cli.simulate import _share_done
+
+    monkeypatch.setattr(_share_done, "_MOMENT", -1.0)
+    words = ["simulate", "--modes", "2", "--cycles", "400"]
+    said = CliRunner().invoke(app, words).stderr
+    assert said.count("% of the run in") == 1 and "left" in said
+    assert "% of the run" not in CliRunner().invoke(app, [*words, "--quiet"]).stderr

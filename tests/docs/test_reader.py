@@ -153,7 +153,20 @@ def test_pages_of_the_change_log_exist() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "page", ["systems", "runs", "base_and_load", "basins", "beams", "design", "exponents", "sweeps"]
+    "page",
+    [
+        "systems",
+        "runs",
+        "base_and_load",
+        "basins",
+        "beams",
+        "design",
+        "exponents",
+        "sweeps",
+        "finite_elements",
+        "strikers",
+        "extended_models",
+    ],
 )
 def test_page_as_a_reader(page, tmp_path, monkeypatch, capsys) -> None:
     """Files, commands and scripts in their order, in an empty folder; the tutorials run in ``test_tutorials.py``."""

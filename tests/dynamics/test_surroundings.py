@@ -75,7 +75,7 @@ def test_periods_one_by_one_are_periods_at_once():
         (sb.System(MODEL, base_excitation=BASE, axial_load=sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=1.7317, amplitude=1.0))),
          "axial_load: no common period with base_excitation; the ratio of its frequency .* is 1.44308333333"),
         (sb.System(MODEL, axial_load=sb.AxialLoadModulation(motion=sb.RampForce(change=1.0, duration=3.0))),
-         "axial_load: a motion of type 'ramp' does not repeat"),
+         "axial_load: a motion of type 'ramp_force' does not repeat"),
         (sb.System(MODEL, base_excitation=sb.BaseExcitation(motion=sb.Chirp(start_ratio=0.8, stop_ratio=1.2, velocity_amplitude=0.1, sweep_cycles=9.0))),
          "base_excitation: a motion of type 'chirp' does not repeat"),
     ],

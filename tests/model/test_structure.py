@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import snapbeam as sb
 from snapbeam.model.default_values import BEAM, LOCATION
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.util.validation import InputError
@@ -125,3 +126,26 @@ def test_refuses_what_is_no_lower_well(equilibrium: list[float], message: str) -
 def test_one_well_has_no_barrier() -> None:
     with pytest.raises(InputError, match="the map needs a bistable structure: give a well_amplitude other than"):
         ReducedModel.from_matrices(**TWO).require_bistable("the map")
+
+
+def test_a_contact_of_matrices_needs_no_location(tmp_path) -> None:
+    """In a file, of any contact; figures and datasets state none."""
+    model = ReducedModel.from_matrices(np.eye(2), [100.0, 900.0], contact_shape=[1.0, 1.0], length_scale=1e-3,
+        nonlinear_stiffness=1e8, elongation_matrix=np.eye(2))  # fmt: skip
+    stops = [
+        sb.Contact(sb.HertzContact(1e6), sb.Striker(drive=sb.FixedStop(), side=side, gap=1e-4))
+        for side in ("above", "below")
+    ]
+    force = sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.5))
+    system = sb.System(model, contacts=stops, forces=[force])
+    system.save(tmp_path / "own.toml")
+    lines = (tmp_path / "own.toml").read_text().splitlines()
+    left = [line for line in lines if not line.startswith("location")]
+    assert len(left) < len(lines)
+    (tmp_path / "own.toml").write_text("\n".join(left))
+    read = sb.System.load(tmp_path / "own.toml")
+    how = sb.Integration(cycles=5)
+    assert sb.simulate(read, how).summary.peak_force == sb.simulate(system, how).summary.peak_force > 0.0
+    curve = sb.force_displacement(model, 0.5)
+    assert "location" not in curve.attrs
+    assert "x_" not in sb.plot.plot_force_displacement(curve).get_title()

@@ -72,7 +72,36 @@ def test_what_surrounds_the_beam_is_drawn_and_named(model) -> None:
         assert shapes > plain, around
         assert len(more) > len(said), around
     # the arrow of the load is there anyway
-    assert drawn(axial_load=load) == (plain, said.replace("$P$", "$P(t)$")) and "$P$" in said
+    assert drawn(axial_load=load)[1] == said.replace("$P$", "$P(t)$") and "$P$" in said
+
+
+def test_every_force_and_every_motion_is_drawn(model) -> None:
+    """Arrows and signs where the forces act, and a panel of each motion, of a sum with both of its names."""
+    figure = plot_system(
+        sb.System(
+            model,
+            contacts=[sb.Contact(default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))],
+            forces=[
+                sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.1), location=0.3),
+                sb.LocalSpring(stiffness=100.0, location=0.75),
+                sb.QuadraticDamping(coefficient=1.0, location=0.15, label="oil"),
+                sb.ExternalForce(history=sb.model.HalfSineForce(peak=1.0, duration=0.2), location=0.6),
+            ],
+            axial_load=sb.AxialLoadModulation(
+                motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=1.0) + sb.RampForce(change=1.0, duration=3.0)
+            ),
+        )
+    )
+    beam, *panels = figure.axes
+    placed = {text.get_text(): text.get_position()[0] / 7.0 for text in beam.texts}
+    assert placed["$F_1(t)$"] == pytest.approx(0.32) and placed["$F_4(t)$"] == pytest.approx(0.58)
+    assert placed["spring"] == pytest.approx(0.73) and placed["oil"] == pytest.approx(0.17)
+    titles = [panel.get_title("left") or panel.get_title("right") for panel in panels]
+    assert titles == ["Drive: sine", "Axial load: harmonic + ramp", "Force: harmonic", "Force 4: half sine"]
+    assert np.ptp(panels[2].lines[0].get_ydata()) == pytest.approx(0.2, rel=1e-3)
+    figure.canvas.draw()
+    for panel in panels:
+        assert panel.get_tightbbox().xmax <= figure.bbox.xmax + 1.0
 
 
 def test_free_beam(model) -> None:

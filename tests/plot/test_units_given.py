@@ -323,3 +323,32 @@ def test_no_kind_of_figure_is_left_out(systems) -> None:
 ])  # fmt: skip
 def test_long_names_are_drawn_with_symbols(words: str, drawn: str) -> None:
     assert in_symbols(words) == drawn
+
+
+def test_fixed_values_are_told_in_the_units_that_were_given(tmp_path) -> None:
+    """In the heading and the summary of a map and of a run; ratios that were given stay ratios."""
+    from snapbeam.cli.summary import coordinate_text, lowest_interwell
+    from snapbeam.plot.units import in_units
+
+    axes = {"drive.velocity_amplitude": [0.05, 0.3], "model.damping_ratio": [0.01, 0.02]}
+    how = sb.Integration(cycles=20)
+    drive = "[drive]\n{} = {}\n[contact]\n{} = {}\n[model]\nmodes = 2\n"
+    for given, told, title in (
+        (("frequency_hz", '"0.1 kHz"', "location_m", '"70 mm"'), {"excitation frequency = 100 Hz"}, "100 Hz"),
+        (("frequency_ratio", "1.2", "location", "0.4"), {"Omega = 1.2", "x_s = 0.4"}, r"$\Omega$ = 1.2"),
+    ):
+        (tmp_path / "own.toml").write_text('extends = "paper"\n' + drive.format(*given))
+        system = sb.System.load(tmp_path / "own.toml")
+        found = sb.sweep(system, axes, how)
+        low = lowest_interwell(in_units(found))
+        assert low is not None
+        words = {coordinate_text(in_units(found), name, value) for name, value in low.items()}
+        assert told <= words
+        assert any("70 mm" in each for each in words) == (given[2] == "location_m")
+        heading = sb.plot.plot_dataset(found).get_title().replace("\xa0", " ")
+        assert title in heading and ("70 mm" in heading) == (given[2] == "location_m")
+        assert heading.count("Omega") == (given[0] == "frequency_ratio")
+        of_run = sb.simulate(system, how).plot().get_figure().axes[0].get_title()
+        assert title in of_run.replace("\xa0", " ")
+        other = sb.sweep(system.replace(frequency_ratio=1.3), axes, how)  # what was given in Hz holds no more
+        assert r"$\Omega$ = 1.3" in sb.plot.plot_dataset(other).get_title().replace("\xa0", " ")

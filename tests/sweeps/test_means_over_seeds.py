@@ -45,6 +45,15 @@ def test_a_mean_with_a_missing_value_has_no_limits() -> None:
     assert mean_interval([4.0])[1] == -np.inf and mean_interval([4.0], positive=True)[1] == 0.0
 
 
+def test_values_without_spread_have_no_interval() -> None:
+    """Twelve runs with 0 N, or with one number that is no binary fraction, do not make the mean certain."""
+    for values in ([0.0] * 12, [0.1] * 12, [-0.1] * 7):
+        assert mean_interval(values)[1:] == (-np.inf, np.inf)
+        assert mean_interval(values, positive=True)[1:] == (0.0, np.inf)
+    mean, low, high = mean_interval([[0.1] * 3, [0.1, 0.1, 0.2]])
+    assert np.isinf(high[0]) and low[1] < mean[1] < high[1] < np.inf
+
+
 @pytest.mark.parametrize("runs", [4, 8, 16])
 @pytest.mark.parametrize("kind", ["uniform", "exponential", "impacts in half of the runs"])
 def test_the_interval_of_a_positive_mean_covers_it(kind: str, runs: int) -> None:

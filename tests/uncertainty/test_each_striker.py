@@ -69,6 +69,35 @@ def test_who_is_not_there_is_refused() -> None:
         sb.uncertainty.sensitivity(between_two(), "peak_force_contact_0", SPREAD, integration=HOW)
 
 
+def test_the_only_striker_is_the_first() -> None:
+    """Its statistics are those of the whole, by either name, in every place that takes a statistic."""
+    system = small_system()
+    run = sb.simulate(system, HOW).summary
+    assert run.peak_force_contact_1 == run["peak_force_contact_1"] == run.peak_force > 0.0
+    assert "peak_force_contact_1" not in list(run)
+    effects = [
+        sb.uncertainty.sensitivity(system, name, SPREAD, samples=2, integration=HOW)["effect"].values
+        for name in ("impulse", "impulse_contact_1")
+    ]
+    np.testing.assert_array_equal(*effects)
+    chance = [
+        sb.uncertainty.probability_map(
+            system, {"velocity_amplitude": [0.2]}, SPREAD, 4, outcomes=f"{name} > {run.peak_force} N", integration=HOW
+        )["probability"].values
+        for name in ("peak_force", "peak_force_contact_1")
+    ]
+    np.testing.assert_array_equal(*chance)
+    one, other = (sb.uncertainty.gradient(system, name, "damping_ratio", integration=HOW)
+                  for name in ("impulse", "impulse_contact_1"))  # fmt: skip
+    assert one.equals(other)
+    found = sb.sweep(system, {"velocity_amplitude": [0.1, 0.2], "frequency_ratio": [0.7, 0.9]}, HOW)
+    label = sb.plot.plot_statistic(found, "peak_force").get_figure().axes[-1].get_ylabel()
+    assert sb.plot.plot_statistic(found, "peak_force_contact_1").get_figure().axes[-1].get_ylabel() == label
+    alone = sb.System(system.model, base_excitation=sb.BaseExcitation(motion=sb.Shock(acceleration_g=5, duration_ms=1)))
+    with pytest.raises(InputError, match="0 strikers"):
+        sb.uncertainty.sensitivity(alone, "peak_force_contact_1", SPREAD, integration=HOW)
+
+
 @pytest.mark.slow
 def test_they_are_told_in_words() -> None:
     """Wherever a statistic is shown, the second striker's has its unit and its words."""

@@ -51,7 +51,7 @@ def compute_map(
     stored = opt.kept_config(settings, keeping)
     set_request([settings.system.hash, settings.integration, axes, stored["options"]])
     check_outputs(output, plot)
-    _check_variable(variable, plot, overlaid=measurements is not None or quasi_static_line)
+    variable = _checked_variable(variable, settings, plot, overlaid=measurements is not None or quasi_static_line)
     _check_over(over, variable, settings, axes)
     if plot is not None:
         _check_axes(plot, axes, variable)
@@ -135,14 +135,15 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
     return axes
 
 
-def _check_variable(variable: str | None, plot: Path | None, *, overlaid: bool) -> None:
-    """Refuse, before any run, a variable that the map will not have or that --plot cannot draw."""
-    from snapbeam.solver.statistics import STATISTICS
+def _checked_variable(variable: str | None, settings: Any, plot: Path | None, *, overlaid: bool) -> str | None:
+    """Return the name in the map; refused, before any run, if the map will not have it or --plot cannot draw it."""
+    from snapbeam.solver.statistics import name_in, rows_for
     from snapbeam.util.validation import InputError, choice
 
     if variable is None:
-        return
-    choice("variable", variable, tuple(STATISTICS))
+        return None
+    rows = rows_for(len(settings.system.contacts))
+    choice("variable", variable := name_in(rows, variable), tuple(rows))
     if plot is None:
         raise InputError(f"variable = {variable!r}: names what --plot draws; give --plot FILE")
     if overlaid and variable != "response_class":
@@ -150,6 +151,7 @@ def _check_variable(variable: str | None, plot: Path | None, *, overlaid: bool) 
             f"variable = {variable!r}: measured responses and the quasi-static line are drawn over response classes; "
             "leave them out"
         )
+    return variable
 
 
 def _check_over(over: str | None, variable: str | None, settings: Any, axes: dict[str, Any]) -> None:

@@ -196,6 +196,7 @@ class _share_done:
     def __init__(self) -> None:
         self._start = time.monotonic()
         self._bar: Any = None
+        self._told = False
 
     def __enter__(self) -> Any:
         return self._report
@@ -205,7 +206,13 @@ class _share_done:
             self._bar.stop()
 
     def _report(self, share: float) -> None:
-        if time.monotonic() - self._start < self._MOMENT or not errors().is_terminal:
+        taken = time.monotonic() - self._start
+        if taken < self._MOMENT or self._told:
+            return
+        if not errors().is_terminal:
+            self._told = True
+            notes().print(f"{100.0 * share:.2g} % of the run in {duration(taken)}", markup=False, end="")
+            notes().print(f"; about {duration(taken * (1.0 / share - 1.0))} left" if share > 0.0 else "", markup=False)
             return
         if self._bar is None:
             from rich.progress import Progress

@@ -113,7 +113,8 @@ def _highest(dataset: xr.Dataset, variable: str | None) -> tuple[dict[str, Any],
     line = f"Highest {statistic_text(means, name, values.values[at])}"
     if seeds:
         ends = [float(means[f"{name}{end}"].values[at]) for end in ("_low", "_high")]
-        line += f" ({' to '.join(value_text(means, name, each) for each in ends)}, 95 % interval of the mean)"
+        words = f"{' to '.join(value_text(means, name, each) for each in ends)}, 95 % interval of the mean"
+        line += f" ({words if np.isfinite(ends[1]) else 'no interval: all seeds give this, or one gives none'})"
         facts["interval"] = ends
         near = int((means[f"{name}_high"] >= ends[0]).sum()) - 1
         where += f"; {near} of {values.size - 1} other points may have as much" if values.size > 1 else ""
@@ -289,10 +290,12 @@ def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
 
 
 def _point(values: xr.DataArray, index: dict[Any, Any], attrs: Any) -> dict[str, Any]:
-    """Return the coordinates of a point of a map: those of its axes, and the paper's."""
+    """Return the coordinates of a point of a map: those of its axes, and the paper's, each in the unit that was given."""
     point = values.isel(index)
-    in_unit = {ratio_name(str(name)) for name in values.dims} | ({"location"} if is_of_matrices(attrs) else set())
-    names = [str(name) for name in values.coords if name in values.dims or name in {*_PAPER} - in_unit]
+    fixed = [str(name) for name, each in values.coords.items() if each.ndim == 0 and ratio_name(str(name)) in _PAPER]
+    in_unit = {ratio_name(name) for name in map(str, (*values.dims, *fixed)) if ratio_name(name) != name}
+    in_unit |= {"location"} if is_of_matrices(attrs) else set()
+    names = [str(name) for name in values.coords if name in values.dims or name in {*_PAPER, *fixed} - in_unit]
     return {name: point[name].item() for name in names}
 
 
@@ -328,7 +331,7 @@ def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
         return None
     at = dips[np.argmax(shape["prominences"])]
     place = {across: float(dataset[across][known][at]), raised: float(threshold[at])}
-    return place | {"location": float(dataset["location"].squeeze())}
+    return _point(response, {name: 0 for name in response.dims}, dataset.attrs) | place
 
 
 def coordinate_text(dataset: xr.Dataset, name: str, value: Any) -> str:

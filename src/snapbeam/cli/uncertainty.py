@@ -114,6 +114,7 @@ def _compute(
     from snapbeam.uncertainty.cost import estimate_cost as cost_of
 
     how = settings.integration.replace(threads=threads)
+    notes().print(f"trial runs of the {words[0]}, to estimate its cost", markup=False)
     cost = cost_of(question, *arguments, integration=how, trial=10.0 if estimate_cost else 2.0, **options)
     if not agreed(cost, yes, estimate_cost):
         return None
@@ -355,7 +356,11 @@ def _intervals(one: xr.Dataset, name: str = "probability") -> list[str]:
         where = ", ".join(coordinate_text(one, str(dim), value) for dim, value in values.items())
         ends = [float(point[f"{name}{end}"]) for end in ("", "_low", "_high")]
         middle, low, high = (value_text(one, name, each) if np.isfinite(each) else "unbounded" for each in ends)
-        lines.append(f"  {where or name}: {middle} ({low} to {high})")
+        whole = int(point["runs"]) > 1 and not int(point["runs_failed"]) and "unbounded" not in middle
+        same = whole and high == "unbounded" and not name.endswith("quantile")
+        lines.append(
+            f"  {where or name}: {middle} ({'no interval: all runs give this' if same else f'{low} to {high}'})"
+        )
     return lines
 
 

@@ -325,8 +325,8 @@ def find_attractors(
         Tolerance of the orbits, as in :func:`periodic_orbit`.
     integration : Integration, optional
         Solver settings.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with parts of the work; True prints it.
+    progress : callable or bool, optional
+        Report of parts of the work, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

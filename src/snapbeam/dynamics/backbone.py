@@ -91,7 +91,7 @@ def backbone_curve(
         Maximum arc length between two points, in length scales and in half periods over pi/omega_1. A short step
         follows the tongue of an internal resonance, a long one passes it.
     progress : callable or bool, optional
-        Called as ``progress(done, total)`` with points; True prints it.
+        Report of points, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

@@ -72,8 +72,8 @@ def basins_of_attraction(
         that of the slowest mode, min(zeta_j omega_j), or of a slower perturbation of a periodic attractor.
     every : int
         Periods between two checks.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with periods; True prints it.
+    progress : callable or bool, optional
+        Report of periods, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

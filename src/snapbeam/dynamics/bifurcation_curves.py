@@ -347,8 +347,8 @@ def bifurcation_curve(
     tolerance : float
         Tolerance of the orbit and of the condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light
         impacts make the multipliers rough.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with points; True prints it.
+    progress : callable or bool, optional
+        Report of points, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

@@ -434,8 +434,8 @@ def continuation(
         for the parameter; between 1e-8 and 1.
     tolerance : float
         Tolerance of the orbits, as in :func:`periodic_orbit`.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with orbits; True prints it.
+    progress : callable or bool, optional
+        Report of orbits, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

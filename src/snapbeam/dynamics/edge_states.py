@@ -130,8 +130,8 @@ def edge_tracking(
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
     integration : Integration, optional
         Solver settings.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with periods; True prints it.
+    progress : callable or bool, optional
+        Report of periods, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

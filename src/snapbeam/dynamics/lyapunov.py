@@ -67,8 +67,8 @@ def lyapunov_spectrum(
         Parameters that may differ between runs, each with its values: a map of exponents, all from the first state.
     integration : Integration, optional
         Solver settings.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with periods; True prints it.
+    progress : callable or bool, optional
+        Report of periods, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.parameters import lookup, ratio_of
+from snapbeam.simulation.simulate import given_attribute
 from snapbeam.util.provenance import canonical_json
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def fixed_parameters(flow: Flow, *varied: str) -> dict[str, Any]:
         "reference_frequency": model.reference_frequency,
         "system": canonical_json(system.to_mapping()),
     }
-    attrs |= beam_attributes(model)
+    attrs |= beam_attributes(model) | given_attribute(system)
     if system.primary_excitation is not None:
         section, drive = system.primary_excitation
         attrs |= {lookup(f"{section}.{name}").short: float(value) for name, value in drive.values().items()}

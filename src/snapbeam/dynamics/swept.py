@@ -97,8 +97,8 @@ def bifurcation_diagram(
         20,000].
     grazing : bool
         Sample every approach in four of the recorded periods densely: ``clearance``, ``min_penetration``.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with values; True prints it.
+    progress : callable or bool, optional
+        Report of values, as in :func:`snapbeam.sweep`.
 
     Returns
     -------
@@ -264,8 +264,8 @@ def hysteresis(
         Solver settings; ``cycles`` at each value.
     sweeps : sequence of {"up", "down"}
         Directions in their order.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with values; True prints it.
+    progress : callable or bool, optional
+        Report of values, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

@@ -200,7 +200,7 @@ def force_displacement(
         coords={"branch_number": np.arange(len(branches)), "mode": np.arange(1, model.modes + 1)},
         attrs={
             "description": "static force-displacement curve of a point force",
-            "location": location,
+            **({"location": location} if model.beam is not None else {}),
             "well": side,
             "well_chosen_as": chosen,
             "wells": len(potential.wells),

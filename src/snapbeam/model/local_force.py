@@ -330,7 +330,7 @@ class ElectrostaticForce(_TowardsGap):
     Parameters
     ----------
     voltage : float
-        V.
+        Voltage V between the plates, V.
     area : float
         A, m^2, of the electrode.
     gap : float

@@ -611,7 +611,7 @@ class Config:
             and not {"stiffness", *MATERIALS} & of_contact.keys()
         ):
             contact = {"stiffness": CONTACT.stiffness}
-        if "location_m" not in of_contact:
+        if "location_m" not in of_contact and not self.is_of_matrices:
             contact["location"] = LOCATION
         drive = dict(DEFAULT_DRIVE)
         given = self.section("drive")
@@ -884,25 +884,31 @@ def _as_given(found: Sections, flat: Mapping[str, Any]) -> dict[str, Any]:
     return given
 
 
+def numbers_as_given(system: System) -> dict[str, float]:
+    """Numbers of a system in the units in which they were given, by dotted name, where they still are its values."""
+    found, sections = {}, system.to_mapping()
+    for full, raw in system.as_given.items():
+        # a material, from which another parameter was computed, is no parameter
+        own = sections.get(split_name(full)[0], {}).get(split_name(ratio_of(full))[1])
+        unit = PHYSICAL[full].unit if full in PHYSICAL else lookup(full).quantity.unit
+        number = number_in_unit(raw, unit) if isinstance(raw, str) else raw
+        if own is not None and number is not None:
+            value = number / unit_of(system, full) if full in PHYSICAL else number
+            if value == own:
+                found[full] = number
+    return found
+
+
 def sections_as_given(system: System) -> dict[str, dict[str, Any]]:
     """The sections of a system with the units in which its values were given, as far as they make the same system."""
     plain = system.to_mapping()
     if not system.as_given:
         return plain
     sections = {name: dict(values) for name, values in plain.items()}
-    for full, raw in system.as_given.items():
-        section, name = split_name(full)
-        key = split_name(ratio_of(full))[1]
-        own = sections.get(section, {})
-        if key not in own:  # of a material, from which another parameter was computed
-            continue
-        unit = PHYSICAL[full].unit if full in PHYSICAL else lookup(full).quantity.unit
-        number = number_in_unit(raw, unit) if isinstance(raw, str) else raw
-        if number is None:
-            continue
-        value = number / unit_of(system, full) if full in PHYSICAL else number
-        if value == own[key]:
-            sections[section] = {name if each == key else each: raw if each == key else own[each] for each in own}
+    for full in numbers_as_given(system):
+        (section, name), raw, key = split_name(full), system.as_given[full], split_name(ratio_of(full))[1]
+        own = sections[section]
+        sections[section] = {name if each == key else each: raw if each == key else own[each] for each in own}
     try:
         written = {name: {k: v for k, v in own.items() if v is not None} for name, own in sections.items()}
         return sections if config_from_mapping(written).system == system else plain

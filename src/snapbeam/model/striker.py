@@ -125,10 +125,8 @@ class Shaker:
         Excitation frequency over the first natural frequency, Omega, greater than 0.
     velocity_amplitude : float
         Velocity amplitude over b omega_1, V; 0 is a shaker at rest.
-    location : float
-        Position of the tip over the length of the beam, x_s, in (0, 1).
-    side : {"below", "above"}
-        Side of the beam, as of a :class:`Striker`.
+    location, side
+        Location of the tip and its side of the beam, as of a :class:`Striker`.
 
     See Also
     --------

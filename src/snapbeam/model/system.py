@@ -307,12 +307,7 @@ class System:
 
         Without a striker it is the well of the start. With local forces it is the well that a beam without inertia
         reaches from that well of the structure; from a saddle, on the side of the striker. An external force begins
-        with the run.
-
-        Raises
-        ------
-        InputError
-            If the local forces leave no well there.
+        with the run. If the local forces leave no well there, an InputError is raised.
         """
         state, local = rest_state(self.model, self.striker), self.unloaded_potential
         if local.is_of_the_structure_alone:
@@ -413,17 +408,6 @@ class System:
         -------
         open, short : arrays of shape (N,)
             Hz, ascending; 0 in an unstable direction.
-
-        Examples
-        --------
-        >>> import snapbeam as sb
-        >>> model = sb.ReducedModel.from_matrices(
-        ...     [[1.0]], [1.0], contact_shape=[1.0], patch_shape=[1.0], reference_frequency=1.0
-        ... )
-        >>> layer = sb.PiezoelectricHarvester(moment_per_volt=0.5, capacitance=1.0, resistance=1.0)
-        >>> opened, short = sb.System(model, harvesters=[layer]).circuit_frequencies()
-        >>> print((opened / short).round(6))
-        [1.118034]
         """
         stiffness = self.potential.in_modes(self.potential.tangent(self._amplitude_at(equilibrium)))
         found = [np.array(stiffness), np.array(stiffness)]

@@ -12,6 +12,7 @@ from snapbeam.model.parameters import lookup
 from snapbeam.plot import dynamics, force_displacement, run, uncertainty
 from snapbeam.plot.map import plot_response_map, plot_statistic
 from snapbeam.plot.threshold import plot_threshold
+from snapbeam.solver.statistics import name_in
 from snapbeam.util.validation import InputError, checked, instance, shown
 
 if TYPE_CHECKING:
@@ -306,7 +307,7 @@ def plot_dataset(dataset: xr.Dataset, variable: str | None = None, ax: Axes | No
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     words, figures = figures_of(dataset)
-    name = next(iter(figures), "") if variable is None else variable
+    name = next(iter(figures), "") if variable is None else name_in(figures, variable)
     if name not in figures:
         raise InputError(
             f"variable = {shown(name)}: is no figure of this file ({words}); choose one of {', '.join(figures) or 'none'}"

@@ -37,7 +37,7 @@ from snapbeam.plot.style import (
     set_title,
 )
 from snapbeam.plot.units import in_symbols, in_units, ratio_along, scale_text
-from snapbeam.solver.statistics import STATISTICS
+from snapbeam.solver.statistics import STATISTICS, name_in
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.sweeps.seeds import mean_over_seeds, seed_axes
 from snapbeam.util.si_prefixes import scale_of
@@ -360,6 +360,7 @@ def plot_statistic(
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_statistic(dataset, "peak_force")
     """
+    name = name_in(dataset, name)
     if name not in dataset:
         raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     if dataset[name].dims == ("point",):

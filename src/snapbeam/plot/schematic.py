@@ -15,8 +15,10 @@ from snapbeam.model.drive.base import Drive
 from snapbeam.model.drive.constant_velocity import ConstantVelocity
 from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.drive.shock import GRAVITY
+from snapbeam.model.external_force import ExternalForce
 from snapbeam.model.harvester import ElectromagneticHarvester, PiezoelectricHarvester, PiezoelectricPatches
 from snapbeam.model.imperfection import Imperfection
+from snapbeam.model.local_force import LocalSpring
 from snapbeam.model.quantity import numbered
 from snapbeam.model.striker import Contact, Striker
 from snapbeam.model.system import System
@@ -72,10 +74,33 @@ def draw_surroundings(ax: Axes, system: System, x: _Array, w: _Array, sign: floa
     """Draw what surrounds the beam; *x* and *w* are its shape at rest, *sign* the striker's side."""
     if system.base_excitation is not None:
         _base(ax, system, sign, wide)
-    if isinstance(system.harvester, PiezoelectricHarvester | PiezoelectricPatches):
-        _layers(ax, system.harvester, x, w, sign, wide)
-    if isinstance(system.harvester, ElectromagneticHarvester):
-        _coil(ax, system.harvester, x, w, sign, wide)
+    for harvester in system.harvesters:
+        if isinstance(harvester, PiezoelectricHarvester | PiezoelectricPatches):
+            _layers(ax, harvester, x, w, sign, wide)
+        if isinstance(harvester, ElectromagneticHarvester):
+            _coil(ax, harvester, x, w, sign, wide)
+    for number, force in enumerate(system.forces, 1 if system.forces[1:] else 0):
+        at = wide * (0.5 if force.location is None else force.location)
+        _force(ax, force, number, at, float(np.interp(at, x, w)), sign)
+
+
+def _force(ax: Axes, force: Any, number: int, at: float, there: float, sign: float) -> None:
+    """An arrow of an external force; a spring, a damper or a body of a local one, all away from the striker."""
+    far, reach = there + 0.75 * sign, there + 0.04 * sign
+    if isinstance(force, ExternalForce):
+        low, high = min(reach, far), max(reach, far)  # upwards, as a force counts positive
+        ax.annotate("", (at, high), (at, low), arrowprops={"arrowstyle": "-|>", "lw": 1.0, "color": _COLOR})
+        words = force.label or (f"$F_{number}(t)$" if number else "$F(t)$")
+    else:
+        words = force.label or force.name.removeprefix("local_").replace("_", " ")
+        if isinstance(force, LocalSpring) and force.coordinate == "displacement":
+            _spring(ax, (at, reach), (at, far))
+        elif force.dissipative:
+            _damper(ax, at, reach, far)
+        body: Any = {"facecolor": "0.85", "edgecolor": BEAM_COLOR, "linewidth": 0.6}
+        ax.add_patch(Rectangle((at - 0.22, min(far, far + 0.12 * sign)), 0.44, 0.12, **body))
+    beside, side = (0.14, "left") if at < 0.6 * _WIDE else (-0.14, "right")
+    ax.text(at + beside, there + 0.5 * sign, words, ha=side, va="center", color=_COLOR)
 
 
 def _base(ax: Axes, system: System, sign: float, wide: float) -> None:
@@ -166,6 +191,10 @@ LAWS = {
     "restitution": "restitution",
 }
 _CYCLES = 8.0
+_LONG = 22
+"""Letters of a title that has room to the right of its axis."""
+_PANELS = 4
+"""Motions that are drawn, at most."""
 _LOAD_COLOR = _COLOR
 
 
@@ -192,27 +221,29 @@ def plot_system(system: System, title: str = "") -> Figure:
     instance("system", system, System, "a System")
     instance("title", title, str, "text")
     both = len({each.striker.side for each in system.contacts}) > 1
-    figure = new_figure("double", 72.0 if both else 52.0)
+    tips = [(numbered(name)[1], drive) for name, drive in system.moving if numbered(name)[0] == "drive"]
+    others = [each for each in system.moving if numbered(each[0])[0] != "drive"]
+    rows = min(len(others) + bool(tips), _PANELS)
+    figure = new_figure("double", max(72.0 if both else 52.0, 40.0 * rows))
     with figure_style():
-        striker = system.striker
-        widths = [2.6, 1.0] if striker is not None or system.primary_excitation is not None else [1.0]
         # each part is laid out alone, so that the labels of the motion leave the beam its height
-        axes = [part.subplots() for part in figure.subfigures(1, len(widths), squeeze=False, width_ratios=widths)[0]]
-        _draw_beam(axes[0], system)
+        parts = figure.subfigures(1, 2 if rows else 1, squeeze=False, width_ratios=[2.6, 1.0] if rows else [1.0])[0]
+        ax, striker = parts[0].subplots(), system.striker
+        _draw_beam(ax, system)
         for number, each in enumerate(system.contacts, 1 if system.contacts[1:] else 0):
-            _draw_striker(axes[0], system, each, number)
-        tips = [(numbered(name)[1], drive) for name, drive in system.moving if numbered(name)[0] == "drive"]
-        if len(tips) > 1:
-            draw_tips(axes[1], system, tips)
-        elif system.primary_excitation is not None:
-            _draw_drive(axes[1], system, *system.primary_excitation)
+            _draw_striker(ax, system, each, number)
+        panels = iter(parts[1].subplots(rows, squeeze=False)[:, 0] if rows else ())
+        if tips[1:]:
+            draw_tips(next(panels), system, tips)
+        for panel, (section, drive) in zip(panels, others if tips[1:] else system.moving, strict=False):
+            _draw_drive(panel, system, section, drive)
         if title:
-            axes[0].set_title(title, loc="left")
+            ax.set_title(title, loc="left")
         outward, inward = 2.55, 2.55 if both else 1.25
-        axes[0].set_xlim(-0.85, _WIDE + 0.85)
-        axes[0].set_ylim(*((-outward, inward) if _sign(striker) > 0.0 else (-inward, outward)))
-        axes[0].set_aspect("equal")
-        axes[0].set_axis_off()
+        ax.set_xlim(-0.85, _WIDE + 0.85)
+        ax.set_ylim(*((-outward, inward) if _sign(striker) > 0.0 else (-inward, outward)))
+        ax.set_aspect("equal")
+        ax.set_axis_off()
     return figure
 
 
@@ -426,8 +457,9 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     """Draw the motion of the tip without contact, the base motion, or the change of the axial load."""
     scale = system.scale
     period = float(drive.cycle(drive.columns(), scale)[0])
-    section = numbered(section)[0]
+    section, number = numbered(section)
     words, label = _MOTIONS[section]
+    of = f" {number}" if number > 1 else ""
     base = system.base_excitation if section == "base_excitation" else None
     side = -1.0 if base is not None and base.direction == "down" else 1.0
     color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
@@ -443,4 +475,6 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
         per = 1.0 if section in ("axial_load", "force") else scale.length
         ax.plot(cycles, side * _moved(drive, system, cycles * period) / per, color=color)
         ax.set(xlabel="Cycles", ylabel=label, xlim=(0.0, cycles[-1]))
-    ax.set_title(f"{words}: {drive.name.replace('_', ' ')}", loc="left")
+    kind = " + ".join(each.removesuffix("_force").replace("_", " ") for each in drive.name.split("+"))
+    text = f"{words}{of}: {kind}"
+    ax.set_title(text, loc="left" if len(text) < _LONG else "right")

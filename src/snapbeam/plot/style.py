@@ -26,7 +26,7 @@ from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullFormatte
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.parameters import PHYSICAL, lookup
-from snapbeam.plot.units import ratio_name
+from snapbeam.plot.units import given_in_units, ratio_name
 from snapbeam.util.diagnostics import Diagnostic, Severity
 from snapbeam.util.files import MADE_BY, atomic_path, check_writable
 from snapbeam.util.si_prefixes import prefixed
@@ -361,24 +361,18 @@ def caption(dataset: xr.Dataset, lines: int = 1, axes: Collection[str] = ()) -> 
         if {"response_class", "lower_threshold"} & set(dataset.variables) and "cycles" in attrs
         else []
     )
+    given = _fixed_in_units(dataset, axes)
     for name, symbol, scale, unit in (
         ("frequency_ratio", r"\Omega", frequency, "Hz"),
         ("velocity_amplitude", "V", 2.0 * np.pi * frequency * length, "m/s"),
         ("location", r"x_\mathrm{s}", np.nan, ""),
     ):
-        if name == "location" and is_of_matrices(attrs):
+        if name in given or (name == "location" and is_of_matrices(attrs)):
             continue
         if (value := fixed_value(dataset, name, axes)) is not None:
             physical = f" ({prefixed(value * scale, unit)})" if np.isfinite(scale) else ""
             how.append(f"${symbol}$ = {value:.4g}{physical}")
-    for name, each in PHYSICAL.items():
-        row, ratio = lookup(name), lookup(each.parameter).short
-        named = ratio in ("frequency_ratio", "velocity_amplitude") or name.startswith("base_excitation")
-        if row.short in dataset.coords and not named and (value := fixed_value(dataset, row.short, axes)) is not None:
-            unit = row.quantity.unit
-            how.append(
-                f"{value:.4g} {'µm' if unit == 'um' else unit}" if unit in ("um", "g") else prefixed(value, unit, 4)
-            )
+    how += given.values()
     how += base_and_load(dataset, axes)
     if "initial_well" in attrs and attrs["initial_well"] != "only":
         well = str(attrs["initial_well"])
@@ -387,6 +381,21 @@ def caption(dataset: xr.Dataset, lines: int = 1, axes: Collection[str] = ()) -> 
     text = ("\n" if lines > 1 else ", ").join(part for part in parts if part)
     kind = attrs.get("response_class")
     return f"{text}: {kind}" if isinstance(kind, str) and text else text
+
+
+def _fixed_in_units(dataset: xr.Dataset, axes: Collection[str]) -> dict[str, str]:
+    """Texts of fixed values that were given in physical units, by their ratio; those of the base are told elsewhere."""
+    found, given = {}, given_in_units(dataset.attrs)
+    for name, each in PHYSICAL.items():
+        short, ratio = lookup(name).short, lookup(each.parameter).short
+        value = fixed_value(dataset, short, axes) if short in dataset.coords else None
+        if value is None and name in given and fixed_value(dataset, ratio, axes) is not None:
+            value = given[name]
+        if value is not None and not name.startswith("base_excitation"):
+            plain = {"um": "µm", "g": "$g$"}.get(each.unit)
+            text = f"{value:.4g} {plain}" if plain else prefixed(value, each.unit, 4)
+            found[ratio] = rf"$x_\mathrm{{s}}$ = {text}" if ratio == "location" else text
+    return found
 
 
 def fixed_value(dataset: xr.Dataset, name: str, axes: Collection[str] = ()) -> float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 from functools import cache
@@ -26,9 +27,14 @@ def in_units(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with its axes and thresholds in the units in which they were given, those of a base's motion always.
 
     Axes of ratios that were given in physical units get these as their coordinate; the ratios remain beside them.  The
-    paper's own plane keeps its ratios unless it was given in physical units.
+    paper's own plane keeps its ratios unless it was given in physical units.  A fixed ratio that was given in a physical
+    unit has a coordinate in this unit beside it.
     """
     dataset = _with_motion_of_base(dataset)
+    for full, value in given_in_units(dataset.attrs).items():
+        ratio = lookup(PHYSICAL[full].parameter).short
+        if ratio in dataset.coords and dataset[ratio].ndim == 0:
+            dataset = dataset.assign_coords({lookup(full).short: ((), value, _labels(full))})
     names, known = {}, _by_short()
     for name, item in dataset.coords.items():
         parameter = known.get(str(name))
@@ -41,6 +47,12 @@ def in_units(dataset: xr.Dataset) -> xr.Dataset:
     if raised in names and dataset[raised].dims == (raised,):
         dataset = _amounts_in_unit(dataset, raised, names[raised])
     return dataset.swap_dims({ratio: name for ratio, name in names.items() if ratio in dataset.dims})
+
+
+def given_in_units(attrs: Mapping[Any, Any]) -> dict[str, float]:
+    """Values of a whole result that were given in the physical units of ratios, by dotted name."""
+    found = json.loads(attrs.get("as_given", "{}"))
+    return {name: value for name, value in found.items() if name in PHYSICAL}
 
 
 def _with_motion_of_base(dataset: xr.Dataset) -> xr.Dataset:

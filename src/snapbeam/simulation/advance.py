@@ -68,8 +68,8 @@ def advance(
     save_every_period : bool
         Return the state after each period, along a new first dimension. The ``statistics`` are those of all periods,
         except the status.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with states; True prints it.
+    progress : callable or bool, optional
+        Report of states, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

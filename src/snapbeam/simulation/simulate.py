@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.model.drive.recorded_motion import RecordedMotion
 from snapbeam.model.integration import Integration
+from snapbeam.model.parameter_file import numbers_as_given
 from snapbeam.model.parameters import lookup
 from snapbeam.model.quantity import numbered, quantities
 from snapbeam.model.state import State
@@ -120,9 +121,16 @@ def attributes_of(
     own = {name: getattr(integration, name) for name in quantities(Integration) if name != "threads"}
     attrs["system_hash"] = system.hash
     attrs["system"] = json.dumps(_short_arrays(system.to_mapping()), sort_keys=True)
+    attrs |= given_attribute(system)
     attrs["integration"] = json.dumps(own, sort_keys=True)
     identity = {"system": system.hash, "integration": own, "more": more}
     return attrs | made_by(identity if points is None else identity | {"points": points})
+
+
+def given_attribute(system: System) -> dict[str, str]:
+    """Return the attribute with the numbers that were given in units, in these units."""
+    found = numbers_as_given(system) if system.as_given else {}
+    return {"as_given": json.dumps(found, sort_keys=True)} if found else {}
 
 
 def _short_arrays(value: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.solver.statistics import STATISTICS
+from snapbeam.solver.statistics import STATISTICS, name_in
 from snapbeam.util.display import html_table
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, integer, mapping
@@ -72,12 +72,12 @@ class RunSummary(Mapping[str, Any]):
 
     def __getattr__(self, name: str) -> Any:
         values = self.__dict__.get("_values", {})
-        if name in values:
-            return values[name]
+        if name_in(values, name) in values:
+            return values[name_in(values, name)]
         raise AttributeError(f"{type(self).__name__} has no {name!r}; it has {', '.join(values)}")
 
     def __getitem__(self, name: str) -> Any:
-        return self._values[name]
+        return self._values[name_in(self._values, name)]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -524,6 +524,12 @@ _EACH = {
     "striker_work": (OTHER_WORK, "work done"),
 }
 """Statistics of each of several strikers: column of the further strikers, and long name."""
+
+
+def name_in(held: Container[Any], name: str) -> str:
+    """The name by which runs have a statistic: that of the first striker is ``peak_force`` where there is one."""
+    whole = name.removesuffix("_contact_1") if isinstance(name, str) else name
+    return whole if name not in held and whole in _EACH else name
 
 
 def rows_for(strikers: int) -> dict[str, Statistic]:

@@ -39,7 +39,7 @@ def mean_over_seeds(dataset: xr.Dataset, confidence: float = 0.95) -> xr.Dataset
     -------
     xarray.Dataset
         Mean of each real statistic over the seeds with Student's interval, as ``peak_voltage``, ``peak_voltage_low``
-        and ``peak_voltage_high``: infinite with one seed or where a run has no value. That of a statistic which is
+        and ``peak_voltage_high``: infinite with one seed, where a run has no value or where all have the same. That of a statistic which is
         positive stays so: it is of the logarithm of the mean. ``snap``, the fraction of runs
         that snap through, with Wilson's interval; ``runs``, ``runs_failed``.
 

@@ -77,8 +77,8 @@ def threshold(
         Axes of the threshold, as in :func:`snapbeam.sweep`; none by default.
     integration : Integration, optional
         Solver settings. Runs always end early.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with runs; True prints it.
+    progress : callable or bool, optional
+        Report of runs, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

@@ -13,7 +13,7 @@ from snapbeam.model.parameters import lookup
 from snapbeam.model.system import System
 from snapbeam.solver import native
 from snapbeam.solver.assemble import make_ensemble
-from snapbeam.solver.statistics import STATISTICS, statistics_of
+from snapbeam.solver.statistics import STATISTICS, name_in, rows_for, statistics_of
 from snapbeam.sweeps.points import PointList
 from snapbeam.sweeps.sweep import sweep
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
@@ -112,7 +112,8 @@ def gradient(
         labels, units, reasons = [getattr(quantity, "__name__", "quantity")], ["1"], [""]
         evaluate = _by_systems(system, quantity, names)
     else:
-        labels = [quantity] if isinstance(quantity, str) else list(quantity)
+        rows = rows_for(len(system.contacts))
+        labels = [name_in(rows, each) for each in ([quantity] if isinstance(quantity, str) else quantity)]
         reasons = _reasons(labels)
         units = [STATISTICS[label].unit for label in labels]
         evaluate = _by_runs(system, labels, names, how)

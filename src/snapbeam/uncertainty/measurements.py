@@ -26,11 +26,11 @@ class ContactTest:
     Parameters
     ----------
     closing_speed : float
-        m/s.
+        Closing speed v, m/s.
     duration : float, optional
-        s.
+        Duration, s.
     peak_force : float, optional
-        N.
+        Peak force, N.
     effective_mass : float, optional
         1/(1/m_1 + 1/m_2), kg.
     relative_error : float

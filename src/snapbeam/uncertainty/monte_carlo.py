@@ -20,7 +20,7 @@ from snapbeam.model.parameters import PHYSICAL, in_table, lookup, physical_names
 from snapbeam.model.quantity import numbered, split_name
 from snapbeam.model.state import amplitude_scale
 from snapbeam.model.system import System
-from snapbeam.solver.statistics import STATISTICS, Statistic, of_one_named, rows_for
+from snapbeam.solver.statistics import STATISTICS, Statistic, name_in, of_one_named, rows_for
 from snapbeam.sweeps.compute import CheckpointOptions, compute_table
 from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
@@ -153,6 +153,7 @@ class Trials:
         self.rounds += 1
         self.runs += setup.points.size
         found = {name: work.values(name, table) for name in (*work.integers, *work.numbers)}
+        found |= {name: found[name_in(found, name)] for name in rows_for(2) if name_in(found, name) in found}
         if self.scaled:
             found |= dict(zip((key for key, _ in _SCALES.values()), setup.scales_of(columns), strict=True))
         return found
@@ -486,7 +487,7 @@ def require_held(names: Iterable[str], system: System) -> None:
     strikers = len(system.contacts)
     held = rows_for(strikers)
     for name in names:
-        if name in STATISTICS and name not in held:
+        if name in STATISTICS and name not in held and (name_in(held, name) not in held or not strikers):
             raise InputError(
                 f"{name}: the system has {strikers} striker{'s' * (strikers != 1)}; each has its own "
                 "statistics where there are several"

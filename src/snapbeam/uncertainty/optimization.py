@@ -788,10 +788,8 @@ def optimize_design(
         Settings of the optimiser.
     integration : Integration, optional
         Settings of the runs.
-    checkpoint : path or CheckpointOptions, optional
-        Checkpoint folder; an existing one is resumed.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with generations; True prints it.
+    checkpoint, progress : optional
+        Folder and report of generations, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

@@ -457,8 +457,8 @@ def estimate_posterior(
         Samples, at least 200.
     rng : int, numpy.random.Generator or None
         Seed, or a generator that gives one; None: random.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with samples; True prints it.
+    progress : callable or bool, optional
+        Report of samples, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

@@ -383,10 +383,8 @@ def quantile_threshold(
         Probabilities, runs and rounds.
     integration : Integration, optional
         Solver settings. Runs end early unless the outcome is a statistic beyond a value.
-    checkpoint : path or CheckpointOptions, optional
-        Checkpoint folder; an existing one is resumed.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with runs; True prints it.
+    checkpoint, progress : optional
+        Folder and report of runs, as in :func:`snapbeam.sweep`.
 
     Returns
     -------

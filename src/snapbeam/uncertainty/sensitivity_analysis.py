@@ -450,18 +450,16 @@ def sensitivity(
     method : {"local", "sobol", "given_data"}
         ``"local"``: half the difference of the quantities with a parameter one standard normal score up and down, over
         *samples* common random numbers. ``"sobol"``: first and total indices over four scrambled sequences of *samples*
-        points, all from one start. ``"given_data"``: first indices from *samples* plain samples, which may be
-        correlated.
+        points, whose scatter gives the intervals, all from one start. ``"given_data"``: first indices from *samples*
+        plain samples, which may be correlated.
     samples : int, optional
         Number of samples; 16, 128 and 1000 for the three methods.
     confidence : float
         Confidence level of the intervals, in (0, 1).
     integration : Integration, optional
         Settings of the runs.
-    checkpoint : path or CheckpointOptions, optional
-        Checkpoint folder, not for lifetimes; an existing one is resumed.
-    progress : callable, optional
-        Called as ``progress(done, total)`` with runs of each round, not for lifetimes; True prints it.
+    checkpoint, progress : optional
+        Folder and report of runs of each round, as in :func:`snapbeam.sweep`; not for lifetimes.
 
     Returns
     -------

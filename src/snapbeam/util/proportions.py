@@ -34,8 +34,9 @@ def proportion(
 
 
 def mean_interval(values: ArrayLike, confidence: float = 0.95, positive: bool = False) -> tuple[_Array, _Array, _Array]:
-    """Return the mean along the last axis, without NaN, and Student's interval, infinite for fewer than two values.
+    """Return the mean along the last axis, without NaN, and Student's interval.
 
+    It is infinite for fewer than two values, and for values that are all the same: their spread is not known.
     That of the mean m of a *positive* quantity is of its logarithm, of which s/m is the standard error: it stays positive,
     and holds skewed quantities more often.
     """
@@ -46,7 +47,8 @@ def mean_interval(values: ArrayLike, confidence: float = 0.95, positive: bool = 
     squares = np.where(known, (given - mean[..., None]) ** 2, 0.0).sum(axis=-1)
     freedom = np.maximum(count - 1, 1)
     half = special.stdtrit(freedom, 0.5 * (1.0 + confidence)) * np.sqrt(squares / freedom / np.maximum(count, 1))
-    good = (count > 1) & known.all(axis=-1)
+    least, most = (np.fmin.reduce(given, -1, initial=np.inf), np.fmax.reduce(given, -1, initial=-np.inf))
+    good = (least < most) & known.all(axis=-1)
     low, high = mean - half, mean + half
     if positive:
         as_said = (mean > 0.0) & ~(given < 0.0).any(axis=-1)

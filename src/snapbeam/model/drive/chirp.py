@@ -90,7 +90,7 @@ class Chirp(SweptSine):
     start_ratio, stop_ratio : float
         Omega at the beginning and at the end, either may be the greater.
     velocity_amplitude : float
-        V.
+        V over the sweep, as of a :class:`Sine`.
     sweep_cycles : float
         Duration over the first period 2 pi/(start_ratio omega_1), which is a cycle.
     sweep_type : {"linear", "log"}
@@ -118,19 +118,14 @@ class Chirp(SweptSine):
 class AccelerationChirp(SweptSine):
     """Sweep of the excitation frequency at constant acceleration amplitude, as shakers are controlled.
 
-    The displacement of the tip, or of the base, is a sin(integral of omega)/omega(t)^2.  Frequency and end of the sweep are
-    those of a :class:`~snapbeam.Chirp`.
+    The displacement of the tip, or of the base, is a sin(integral of omega)/omega(t)^2.
 
     Parameters
     ----------
-    start_ratio, stop_ratio : float
-        Omega at the beginning and at the end, either may be the greater.
+    start_ratio, stop_ratio, sweep_cycles, sweep_type
+        Frequencies, duration and kind of the sweep, as of a :class:`~snapbeam.Chirp`.
     acceleration_amplitude : float
         a over b omega_1^2.
-    sweep_cycles : float
-        Duration over the first period 2 pi/(start_ratio omega_1), which is a cycle.
-    sweep_type : {"linear", "log"}
-        Linear or logarithmic increase of the frequency in time.
 
     See Also
     --------

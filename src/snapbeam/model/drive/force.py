@@ -114,7 +114,7 @@ class ConstantForce(ForceHistory, Timed):
     Parameters
     ----------
     force : float
-        N.
+        Force F, N.
 
     See Also
     --------
@@ -196,10 +196,8 @@ class BurstForce(ForceHistory, EnvelopedSine):
         omega over omega_1.
     amplitude : float
         F_1, N.
-    duration_cycles : float
-        Cycles from the beginning of the rise to the end of the fall.
-    ramp_up_cycles, ramp_down_cycles : float
-        Cycles of rise and fall, each greater than 0, together at most *duration_cycles*.
+    duration_cycles, ramp_up_cycles, ramp_down_cycles
+        Length, rise and fall of the envelope, as of a :class:`~snapbeam.Burst`.
 
     See Also
     --------
@@ -225,14 +223,10 @@ class ChirpForce(ForceHistory, SweptSine):
 
     Parameters
     ----------
-    start_ratio, stop_ratio : float
-        omega over omega_1 at the beginning and at the end, either may be the greater.
+    start_ratio, stop_ratio, sweep_cycles, sweep_type
+        Frequencies, duration and kind of the sweep, as of a :class:`~snapbeam.Chirp`.
     amplitude : float
         F_1, N.
-    sweep_cycles : float
-        Duration over the first period 2 pi/(start_ratio omega_1), which is a cycle.
-    sweep_type : {"linear", "log"}
-        Linear or logarithmic increase of the frequency in time.
 
     See Also
     --------
@@ -259,14 +253,10 @@ class NoiseForce(ForceHistory, NoiseInBand):
 
     Parameters
     ----------
-    low_ratio, high_ratio : float
-        The band, over the first natural frequency.
+    low_ratio, high_ratio, seed, ramp_up_cycles
+        Band, seed and rise, as of a :class:`~snapbeam.BandLimitedNoise`.
     rms : float
         Root mean square of the force, N.
-    seed : int
-        0 to 2^31 - 1.
-    ramp_up_cycles : float
-        Cycles of the middle of the band in which the force rises.
 
     See Also
     --------

@@ -117,9 +117,9 @@ class RandomVibration(SampledAcceleration):
 
     With independent normal numbers A_k and B_k of variance 1 the acceleration is
 
-        a(t) = sum_k s_k (A_k cos(2 pi f_k t) + B_k sin(2 pi f_k t)),    s_k^2 = integral of the density around f_k,
+        a(t) = sum_k s_k (A_k cos(2 pi f_k t) + B_k sin(2 pi f_k t)),
 
-    with f_k in steps of less than half the reciprocal of the duration. With *ramp_up_s* the displacement rises
+    with s_k^2 the integral of the density around f_k, and f_k in steps of less than half the reciprocal of the duration. With *ramp_up_s* the displacement rises
     smoothly, and the acceleration is its second derivative. A seed gives the same motion in every run. A cycle is a
     period of the first mode; a run must end before the duration does.
 
@@ -129,7 +129,7 @@ class RandomVibration(SampledAcceleration):
         Break points, Hz and g^2/Hz, with straight lines between them on logarithmic axes and nothing outside; or the
         name of a spectrum of a standard, such as ``"MIL-STD-810G 514.6E-1"``.
     duration_s : float
-        s.
+        Duration, s.
     rms_g : float, optional
         Root mean square acceleration, g, to scale the density to.
     seed : int

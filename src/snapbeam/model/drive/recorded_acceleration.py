@@ -58,14 +58,7 @@ class RecordedAcceleration(FileKeys, SampledAcceleration):
 
     @classmethod
     def from_g(cls, record: ArrayLike, sampling_frequency: float) -> RecordedAcceleration:
-        """Return a motion whose acceleration is given in g = 9.80665 m/s^2.
-
-        Examples
-        --------
-        >>> import snapbeam as sb
-        >>> float(sb.RecordedAcceleration.from_g([0.0, 1.0, 0.0, -1.0], 1000.0).record[1])
-        9.80665
-        """
+        """Return a motion whose acceleration is given in g = 9.80665 m/s^2."""
         return cls(record=GRAVITY * finite_array("record", record, 1), sampling_frequency=sampling_frequency)
 
     @classmethod
@@ -78,15 +71,7 @@ class RecordedAcceleration(FileKeys, SampledAcceleration):
 
     @classmethod
     def from_psd(cls, psd: Any, duration_s: float, **options: Any) -> RandomVibration:
-        """Return a random vibration by its power spectral density, a :class:`RandomVibration` with its *options*.
-
-        Examples
-        --------
-        >>> import snapbeam as sb
-        >>> motion = sb.RecordedAcceleration.from_psd([(20, 0.04), (2000, 0.04)], duration_s=0.5, seed=1)
-        >>> round(motion.rms_g, 3)
-        8.899
-        """
+        """Return a random vibration by its power spectral density, a :class:`RandomVibration` with its *options*."""
         from snapbeam.model.drive.random_vibration import RandomVibration  # later: the order of DRIVES
 
         return RandomVibration(psd=psd, duration_s=duration_s, **options)
