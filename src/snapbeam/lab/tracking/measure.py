@@ -838,7 +838,7 @@ def _within_windows(windows: Floats, position: Floats, width: float, centre: Flo
 _SURE_LAG = 4.0  # standard errors
 _LAG = 0.04  # of the square of the speed by which the square of the blur must exceed what the exposure explains
 _PULSE_ODDS = 9.0  # chi-square by which no blur must be the better explanation for a pulse to be as likely as none
-_SELDOM = 0.005  # probability of a pulse that is left out
+_SELDOM = 0.05  # probability of a pulse that an interval of two standard errors may leave out
 
 
 class ExposureBlur(NamedTuple):
