@@ -179,10 +179,6 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         struck(dataclasses.replace(CHIRP, sweep_type="log")),
         {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.02, 0.5)},
     ),
-    "a chirp of constant acceleration": ExtendedSystem(
-        struck(ACCELERATION_CHIRP),
-        {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.acceleration_amplitude": (0.02, 0.5)},
-    ),
     "half_sine": ExtendedSystem(
         struck(sb.HalfSine(displacement_amplitude=0.6, duration=0.5)),
         {"drive.displacement_amplitude": (0.1, 2.0), "drive.duration": (0.05, 2.0)},
@@ -240,9 +236,6 @@ SYSTEMS: dict[str, ExtendedSystem] = {
     "a base of two sines": ExtendedSystem(on_a_base(TWO), {"base_excitation.velocity_amplitude_1": (0.05, 0.5)}),
     "a burst of the base": ExtendedSystem(on_a_base(BURST), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
     "a swept base": ExtendedSystem(on_a_base(CHIRP), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
-    "a base of swept acceleration": ExtendedSystem(
-        on_a_base(ACCELERATION_CHIRP), {"base_excitation.acceleration_amplitude": (0.05, 0.5)}
-    ),
     "a noisy base": ExtendedSystem(on_a_base(NOISE), {"base_excitation.velocity_rms": (0.02, 0.3)}),
     "a changing load": ExtendedSystem(
         loaded(sb.HarmonicForce(frequency_ratio=2.0, amplitude=3.0)), SINE | {"axial_load.amplitude": (0.0, 20.0)}
@@ -273,6 +266,13 @@ SYSTEMS: dict[str, ExtendedSystem] = {
         beam=SPRUNG,
         imperfection=UNEVEN,
         fewest=2,
+    ),
+    "a chirp of constant acceleration": ExtendedSystem(
+        struck(ACCELERATION_CHIRP),
+        {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.acceleration_amplitude": (0.02, 0.5)},
+    ),
+    "a base of swept acceleration": ExtendedSystem(
+        on_a_base(ACCELERATION_CHIRP), {"base_excitation.acceleration_amplitude": (0.05, 0.5)}
     ),
 }  # fmt: skip
 """By name; a test proves that no kind of part and no parameter is missing."""

@@ -237,6 +237,10 @@ OF_OTHERS = {
     ),
     "constant_velocity": (sb.ConstantVelocity(speed=0.4), {"speed": 0.5}),
     "fixed": (sb.FixedStop(), {}),
+    "acceleration_chirp": (
+        sb.model.AccelerationChirp(start_ratio=0.5, stop_ratio=2.0, acceleration_amplitude=0.1, sweep_cycles=9.0),
+        {"start_ratio": 0.6, "stop_ratio": 1.5, "acceleration_amplitude": 0.2, "sweep_cycles": 8.0, "sweep_type": "log"},
+    ),
     "displacement_sine": (
         sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.1),
         {"frequency_ratio": 1.1, "displacement_amplitude": 0.2, "phase": 0.1},

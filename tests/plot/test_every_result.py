@@ -140,7 +140,7 @@ def test_attractors_state_what_may_be_unseen() -> None:
         {"unseen_share_95": 0.07},
     )
     ax = plot_attractors(found)
-    assert "below 7 %" in ax.get_title()
+    assert "below 7 %" in ax.get_title().replace("\N{NO-BREAK SPACE}", " ")
     assert [line.get_label() for line in ax.lines] == [
         "0: period 1 in the upper well, 70.0 % of the states",
         "1: period 1 in the lower well, 30.0 % of the states",

@@ -216,7 +216,7 @@ CASES: dict[str, tuple[str, Callable[[sb.System], xr.Dataset], tuple[str, ...]]]
     "gradient": (
         "striker",
         lambda s: U.gradient(s, "peak_midspan_velocity", ["beam.thickness", "drive.velocity_m_s"], integration=sb.Integration(cycles=2)),
-        ("Change of maximum speed of mid-span at the\nend of a step\nfor 1 % of the parameter (%)",),
+        ("Change of maximum speed of mid-span\nfor 1 % of the parameter (%)",),
     ),
     "designs": ("striker", designs, ("Excitation frequency (Hz)",)),
     "hysteresis": ("base", lambda s: D.hysteresis(s, *numbers(GRAVITIES), integration=SHORT), (G,)),

@@ -26,7 +26,7 @@ def test_short_words_and_tables(system):
     for value in (run, run.summary, system, system.model):
         assert len(repr(value)) < 400
     html = run._repr_html_() + system._repr_html_() + run.summary._repr_html_()
-    assert "<table>" in html and "thickness = 0.0004" in html and "peak contact force" in html
+    assert "<table>" in html and "thickness = 400 µm" in html and "peak contact force" in html
 
 
 def test_progress_in_words(system, capsys):

@@ -890,9 +890,11 @@ def numbers_as_given(system: System) -> dict[str, float]:
     for full, raw in system.as_given.items():
         # a material, from which another parameter was computed, is no parameter
         own = sections.get(split_name(full)[0], {}).get(split_name(ratio_of(full))[1])
+        if own is None:
+            continue
         unit = PHYSICAL[full].unit if full in PHYSICAL else lookup(full).quantity.unit
         number = number_in_unit(raw, unit) if isinstance(raw, str) else raw
-        if own is not None and number is not None:
+        if number is not None:
             value = number / unit_of(system, full) if full in PHYSICAL else number
             if value == own:
                 found[full] = number
