@@ -338,6 +338,7 @@ def test_a_course_is_told_from_its_alternatives(kind, code):
     assert all(one.ratio < 5.0 or one.flagged for one in outcomes)
 
 
+@pytest.mark.slow
 def test_neither_softening_nor_two_laws_are_a_stop_or_a_creep():
     for kind in ("", "quadratic damping", "dry friction"):
         for k in range(6):

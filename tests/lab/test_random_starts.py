@@ -17,6 +17,7 @@ def test_starts_and_noise_of_many_kinds_are_no_high_pass():
     assert not [start for codes, _, start, *_ in found if "high_pass" in codes]
 
 
+@pytest.mark.slow
 def test_a_high_pass_is_told_where_the_noise_shows_it():
     found = [random_starts.judged(812, k, filtered=True) for k in range(12)]
     assert sum("high_pass" in codes for codes, *_ in found) >= 5

@@ -48,6 +48,7 @@ def test_pull_in_voltage(side: float) -> None:
     assert point.get_xdata()[0] == pytest.approx(exact, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_critical_points_need_no_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """What becomes of a beam beyond a critical point follows from its motion, without the wells that it may come to."""
     searched: list[int] = []

@@ -112,7 +112,9 @@ def slopes_of(
 
 
 @pytest.mark.parametrize("accuracy", ["standard", pytest.param("reference", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("kind", SYSTEMS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(each, marks=pytest.mark.slow) if each == "force" else each for each in SYSTEMS]
+)
 def test_derivatives_of_statistics(kind: str, accuracy: str) -> None:
     make, names = SYSTEMS[kind]
     for name in names:
