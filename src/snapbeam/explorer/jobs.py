@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import panel as pn
+from bokeh.document import Document
 from bokeh.models import ColumnDataSource, CustomJS
 from numpy.typing import NDArray
 
@@ -284,10 +285,10 @@ def sample_times(system: System, integration: Integration) -> NDArray[np.float64
 
 
 class Tab:
-    """One tab of a browser, with a thread of its own on which its page is changed."""
+    """One tab of a browser, with a thread of its own on which its page is changed; *doc* is the document of its session."""
 
-    def __init__(self) -> None:
-        self.doc = pn.state.curdoc
+    def __init__(self, doc: Document | None) -> None:
+        self.doc = doc
         self.closed = False
         self._runs: dict[int, Token] = {}
 

@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import parse_qs
 
 import panel as pn
+from bokeh.document import Document
 from bokeh.models import ColumnDataSource
 from markupsafe import Markup
 
@@ -78,8 +79,8 @@ _DRAGGED = 30
 class Page(jobs.Tab):
     """Content of one tab of a browser; *arguments* is the query string of the address."""
 
-    def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
-        super().__init__()
+    def __init__(self, shared: Shared, arguments: dict[str, list[bytes]], doc: Document | None = None) -> None:
+        super().__init__(doc)
         self.shared = shared
         self.address = Address.read(arguments)
         self.look: Look = look_of(

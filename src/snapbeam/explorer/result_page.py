@@ -6,6 +6,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import panel as pn
+from bokeh.document import Document
 from bokeh.events import Tap
 from bokeh.models import ColumnDataSource
 from markupsafe import Markup
@@ -31,8 +32,8 @@ _CLICK = "Click on the figure to compute the run that starts there."
 class ResultPage(Tab):
     """Figures of a result on the left, and a run of the stored or the clicked state on the right."""
 
-    def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
-        super().__init__()
+    def __init__(self, shared: Shared, arguments: dict[str, list[bytes]], doc: Document | None = None) -> None:
+        super().__init__(doc)
         assert isinstance(shared.source, ResultSource)
         self.shared, self.source = shared, shared.source
         address = Address.read(arguments)

@@ -246,11 +246,12 @@ def _factory(shared: Shared) -> Callable[[], Any]:
         from snapbeam.explorer.result_page import ResultPage
 
         shared.pages += 1
-        pn.state.curdoc.template = _TEMPLATE
-        pn.state.curdoc.template_variables.update(dist_url=_OWN, app_favicon=_ICON)
+        doc = pn.state.curdoc
+        doc.template = _TEMPLATE
+        doc.template_variables.update(dist_url=_OWN, app_favicon=_ICON)
         try:
             kind = ResultPage if isinstance(shared.source, ResultSource) else Page
-            made = kind(shared, dict(pn.state.session_args))
+            made = kind(shared, dict(pn.state.session_args), doc)
         except BaseException:
             shared.pages -= 1
             raise
