@@ -25,7 +25,7 @@
 #define SNAPBEAM_SELDOM __noinline__
 #define SNAPBEAM_CALLED __noinline__
 #define SNAPBEAM_LOOP _Pragma("unroll 1")
-#elif defined(__GNUC__) || defined(__clang__)
+#elif (defined(__GNUC__) || defined(__clang__)) && !defined(SNAPBEAM_CHECKED)  // sanitizers compile what is inlined for an hour
 #define SNAPBEAM_FN inline __attribute__((always_inline))
 #define SNAPBEAM_RARE __attribute__((noinline))
 #define SNAPBEAM_SELDOM
