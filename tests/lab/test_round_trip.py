@@ -69,17 +69,14 @@ def test_the_class_of_forty_runs_over_all_classes(tmp_path, snr):
 
 
 @pytest.mark.slow
-def test_the_class_of_forty_runs_at_the_size_of_the_paper(tmp_path):
+@pytest.mark.parametrize("seed", SEEDS[::4])
+def test_the_class_of_a_run_at_the_size_of_the_paper(tmp_path, seed):
     camera = SyntheticCamera(frame_rate=10_000.0, pixel_size=12e-6, shape=(384, 384))
-    seen: Counter = Counter()
-    for seed in SEEDS:
-        _, truth, tracked, (true, measured) = through_the_laboratory(tmp_path, seed, cycles=40, camera=camera)
-        assert measured == true, f"seed {seed}: {measured.label} instead of {true.label}"
-        miss = errors_px(tracked, truth, "displacement_mm", 12e-6)
-        assert rms(miss) <= 0.1 and abs(np.nanmean(miss)) <= 0.05
-        assert (tracked["flags"] != 0).mean() <= 0.01
-        seen[true] += 1
-    assert len(seen) >= 3
+    _, truth, tracked, (true, measured) = through_the_laboratory(tmp_path, seed, cycles=40, camera=camera)
+    assert measured == true, f"{measured.label} instead of {true.label}"
+    miss = errors_px(tracked, truth, "displacement_mm", 12e-6)
+    assert rms(miss) <= 0.1 and abs(np.nanmean(miss)) <= 0.05
+    assert (tracked["flags"] != 0).mean() <= 0.01
 
 
 @pytest.mark.slow

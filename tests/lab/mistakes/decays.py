@@ -161,7 +161,7 @@ CASES = (
     decay("a drift as large as the decay", drifting, "right", "decay.drift"),
     decay("two modes 3 Hz apart, and one asked for", two_close, "right", "decay.close_modes",
           "poles that stay in the stabilisation diagram"),
-    decay("viscous and quadratic damping", with_law(quadratic=3.0), "right", "decay.damping_curve",
+    decay("viscous and quadratic damping", with_law(quadratic=3.0), "right", "decay.damping_law",
           "laws and free curves of damping fitted to the envelope, and the one that the data ask for"),
     decay("viscous damping and dry friction", with_law(dry=0.2), "right", "decay.damping_law", "the same"),
     decay("a second hit after 0.3 s", second_hit, "flagged", "decay.disturbed"),

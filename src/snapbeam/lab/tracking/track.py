@@ -251,7 +251,7 @@ _BATCH_PIXELS = 5_000_000
 _CLEAR = 6.0  # px between the beam and the background that is followed, beside its blur
 _LEAST_BACKGROUND = 16  # rows of it
 _MOST_FRAMES = (10.0, 90.0)  # %, between which its shifts count
-_REACH, _STRIPE = 16, 8  # rows it may move by, and columns of the stripes that make either half
+_REACH, _STRIPE = 16, 8  # rows it may move by, and most of the stripes that make either half
 _FINE = (1.0, 4.0)  # px, between which its structure is followed
 _SWINGS, _SWING = 2.0, 0.2  # times by which both halves must move more alike than apart, and px, for a motion
 
@@ -418,10 +418,10 @@ class _FixedMarks:
 
 
 class _Background:
-    """Rows by which the background, on the far side of the beam, moves from frame to frame, by two halves of its columns.
+    """Rows by which the background, on the far side of the beam, moves from frame to frame, by two halves of its rows.
 
-    Nothing in it moves, so where both halves move alike the picture does: an electronic stabiliser, or the camera.  Light
-    that the beam sheds on it is smooth, and taken out.
+    Nothing in it moves, so where both halves move alike the picture does: an electronic stabiliser, or the camera.  Noise
+    of whole rows differs between the halves.  Light that the beam sheds on it is smooth, and taken out.
     """
 
     def __init__(self, head: Floats, row: Floats, scene: Scene, settings: TrackingSettings) -> None:
@@ -444,9 +444,9 @@ class _Background:
             return
         fine, height = self._fine(frames), self.reference.shape[0]
         parts = [fine[:, k : k + height] for k in range(2 * self.reach + 1)]
-        along = np.stack([np.einsum("nrc,rc->nc", part, self.reference) for part in parts], 1)
-        square = np.stack([np.einsum("nrc,nrc->nc", part, part) for part in parts], 1)
-        stripe = np.arange(fine.shape[2]) // _STRIPE % 2
+        along = np.stack([np.einsum("nrc,rc->nr", part, self.reference) for part in parts], 1)
+        square = np.stack([np.einsum("nrc,nrc->nr", part, part) for part in parts], 1)
+        stripe = np.arange(height) // min(_STRIPE, -(-height // 4)) % 2
         both = []
         for half in (0, 1):
             alike = along[..., stripe == half].sum(2) / np.sqrt(square[..., stripe == half].sum(2) + 1e-30)
