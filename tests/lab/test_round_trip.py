@@ -69,7 +69,7 @@ def test_the_class_of_forty_runs_over_all_classes(tmp_path, snr):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", SEEDS[::4])
+@pytest.mark.parametrize("seed", SEEDS[::16])
 def test_the_class_of_a_run_at_the_size_of_the_paper(tmp_path, seed):
     camera = SyntheticCamera(frame_rate=10_000.0, pixel_size=12e-6, shape=(384, 384))
     _, truth, tracked, (true, measured) = through_the_laboratory(tmp_path, seed, cycles=40, camera=camera)
