@@ -229,7 +229,7 @@ def _duration(seconds: float) -> str:
 # ----------------------------------------------------------------------------------------------------
 
 
-_HEIGHT, _LOW = 345, 240
+_HEIGHT, _LOW = 345, 195
 """Pixels of the figure, alone and above another one."""
 
 

@@ -97,6 +97,7 @@ class MapView:
                 made = kind(**{f"{name}_range_name": "unit"})
                 if axis.log:
                     getattr(self.plot, f"extra_{name}_scales")["unit"] = models.LogScale()
+                made.ticker.desired_num_ticks = 4  # labels do not touch on a phone
                 style_axis(made, self.look)
                 getattr(self.plot, place).insert(0, made)  # nearer than a colour bar
                 self.physical[name] = made

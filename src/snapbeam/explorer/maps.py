@@ -609,13 +609,13 @@ class Axis:
 
     @staticmethod
     def words_of(source: Source, name: str) -> str:
-        """Axis label: long name, symbol and unit."""
-        attrs = source.skeleton[name].attrs
+        """Axis label: name of a parameter as the fields have it, otherwise the long name; symbol and unit."""
         text, unit = source.label(name)
-        text = text.replace("omega_1", "ω₁").replace("^2", "²")
-        symbol = ""
-        if "parameter" in attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
-            symbol = plain_formulas(f"${lookup(str(attrs.get('parameter', name))).quantity.symbol}$")
+        text, symbol = text.replace("omega_1", "ω₁").replace("^2", "²"), ""
+        if "parameter" in source.skeleton[name].attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
+            full = parameter_of(source.skeleton, name)
+            text = short_names(parameter_of(source.skeleton, each) for each in source.dims)[full]
+            symbol = plain_formulas(f"${lookup(full).quantity.symbol}$")
         return " ".join(part for part in (text, symbol, "" if unit == "1" else f"({unit})") if part)
 
     @property

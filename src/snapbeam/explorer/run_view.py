@@ -816,6 +816,7 @@ class WaveformPanel(RunPanel):
         self.decades = models.FixedTicker(ticks=[])
         log.yaxis.ticker = self.decades
         log.line("x", "y", source=self.apart, color=look.second, line_width=1.4)
+        low.yaxis.ticker = models.BasicTicker(desired_num_ticks=3)
         low.line("x", "y", source=self.force, color=look.beam, line_width=1.2)
         for plot, source in zip((top, low), self.further, strict=True):
             plot.multi_line("x", "y", source=source, color=look.second, line_width=1.2, line_dash="dotdash")

@@ -154,6 +154,7 @@ def legend(plot: Any, look: Look, **options: Any) -> None:
     for item in list(plot.legend):
         plot.center.remove(item)
         plot.add_layout(item, "above")
+        item.stylesheets = ["@media (max-width: 600px) { .bk-label { font-size: 11px !important; } }"]
         item.update(
             location="top_left", orientation="horizontal", click_policy="hide", border_line_color=None,
             background_fill_color=look.card, background_fill_alpha=0.75, label_text_color=look.text,
