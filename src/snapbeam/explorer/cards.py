@@ -769,7 +769,7 @@ class SystemCard:
         self.vary.param.watch(lambda _: page.post(self._vary), "value")
         digits = PrintfTickFormatter(format="%.6g")
         self.slider = pn.widgets.FloatSlider(visible=False, width=330, format=digits)
-        self.slider.param.watch(lambda event: page.post(lambda: self._dragged(event.new)), "value")
+        self.slider.param.watch(lambda _: page.post(lambda: self._dragged(self.slider.value)), "value")  # the latest
         self.slider.param.watch(lambda event: page.post(lambda: self._released(event.new)), "value_throttled")
         laws = {LAWS.get(kind, kind.replace("_", " ")): kind for kind in _kinds("contact")}
         self.law = pn.widgets.Select(name="Contact law", options=laws, width=160)
@@ -834,10 +834,9 @@ class SystemCard:
             ends = sorted((0.5 * value, 1.5 * value))
             low, high = max(ends[0], item.low), min(ends[1], item.high)
             step = 1 if item.kind is int else (high - low) / 500
-            unit = "" if item.unit == "1" else f" ({item.unit})"
             self._varied = value
             self.slider.param.update(
-                name=f"{item.long_name}{unit}", start=low, end=max(high, low + step), step=step, value=value
+                name=self.fields[name].name, start=low, end=max(high, low + step), step=step, value=value
             )
 
     def _dragged(self, value: float) -> None:

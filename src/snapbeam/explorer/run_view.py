@@ -811,7 +811,7 @@ class WaveformPanel(RunPanel):
         low = self.over_time(y_range=(0.0, 1.0), **below)
         log = self.over_time(
             y_range=(1e-12, 1.0), y_axis_type="log", x_axis_label="cycles of excitation τ",
-            y_axis_label=f"|Δw| ({self.units[0]})", **below | {"share": 0.28},
+            y_axis_label=f"|Δw| ({self.units[0]})", visible=False, **below | {"share": 0.28},
         )  # fmt: skip
         self.decades = models.FixedTicker(ticks=[])
         log.yaxis.ticker = self.decades
@@ -826,14 +826,8 @@ class WaveformPanel(RunPanel):
             item = models.LegendItem(label=label, renderers=[renderer], visible=False)
             top.legend[0].items.append(item)
         self.low, self.top, self.log = low, top, log
-        self.alone = [
-            self.wrap(low),
-            pn.Row(self.below, pn.pane.Bokeh(self.beam.play), margin=0),
-            self.wrap(self.beam.small),
-        ]
-        self.paired = self.wrap(log)
-        self.paired.visible = False
-        return [self.wrap(top), *self.alone, self.paired]
+        self.choice = pn.Row(self.below, pn.pane.Bokeh(self.beam.play), margin=0)
+        return [self.wrap(top), self.wrap(low), self.choice, self.wrap(self.beam.small), self.wrap(log)]
 
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
@@ -861,10 +855,9 @@ class WaveformPanel(RunPanel):
         if self.run is None:
             return
         pair = self.other is not None
-        for part in self.alone:
-            part.visible = not pair
-        self.alone[-1].visible = not pair and self.beam.has_shape
-        self.paired.visible = pair
+        # of the figures, not of their panes: Panel 1.9 loses what a pane of Bokeh is told while changes are held
+        self.choice.visible = self.low.visible = not pair
+        self.beam.small.visible, self.log.visible = not pair and self.beam.has_shape, pair
         data = self.run.dataset
         x, label = across(self.run)
         scale = self.scales(self.run)[0]
