@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import wave
-from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import snapbeam as sb
 from snapbeam.model.parameter_file import Config
 
 pytestmark = pytest.mark.slow
-LECTURE = Path(__file__).parents[2] / "examples" / "lecture.md"
 
 
 @pytest.fixture(scope="module")
@@ -130,11 +129,16 @@ def give(teacher, class_counts) -> None:
     page.wait(lambda: page.js(played), "the sound")
 
 
-def follow(teacher) -> None:
-    """The second page: a click on a branch, and one above the fold."""
+def follow(teacher, diagram) -> None:
+    """The second page: a click on a branch of a bifurcation diagram, and on its end, shows the motion."""
     page = teacher.page
-    v, w = (np.array(page.data("diagram", name)) for name in ("x", "y")) if page.data("diagram", "x") else (None, None)
-    assert v is None and w is None
+    for at in (len(diagram["velocity_amplitude"]) // 2, -1):
+        point = diagram.isel(sweep=0, velocity_amplitude=at)
+        v, w = float(point["velocity_amplitude"]), float(point["midspan_displacement"][0])
+        page.click(v, w)
+        page.wait(lambda v=v: f"velocity amplitude {v:.6g}" in page.head() and page.data("mark", "x") == [v], "its run")
+        page.wait(lambda w=w: abs(page.data("waveform", "y")[0] - w) < 1e-5, "a waveform that begins there")
+        teacher.after(f"branch at {v:.3g}")
 
 
 def test_the_lecture_is_given_with_its_clicks(lecture, serve, tab):
@@ -144,4 +148,8 @@ def test_the_lecture_is_given_with_its_clicks(lecture, serve, tab):
         run = sb.simulate(system.replace(**{"drive.velocity_amplitude": velocity}), sb.Integration(cycles=60)).summary
         return f"{run.zero_crossings} crossing"
 
-    give(Teacher(tab(serve("class.nc", where=lecture).url, viewport={"width": 1280, "height": 800})), counts)
+    screen = {"viewport": {"width": 1280, "height": 800}}
+    give(Teacher(tab(serve("class.nc", where=lecture).url, **screen)), counts)
+    url = f"{serve('diagram.nc', where=lecture).url}?type=large"
+    with xr.open_dataset(lecture / "diagram.nc", engine="h5netcdf") as diagram:
+        follow(Teacher(tab(url, plot="result-plot", **screen)), diagram)

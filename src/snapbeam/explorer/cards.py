@@ -403,7 +403,7 @@ class MapCard:
         )
         self.view = MapView(self.look, self.plane.x, self.plane.y, _HEIGHT)
         self._see(view)
-        self.view.on_tap(lambda x, y: self.asked(self.point(x, y)))
+        style.on_tap(self.view.plot, lambda x, y: self.asked(self.point(x, y)))
         self.view.on_hover(self._hovered)
         self.view.on_view(self.control.view_moved)
         for edge in ("inner_width", "inner_height"):

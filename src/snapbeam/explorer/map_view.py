@@ -114,14 +114,6 @@ class MapView:
 
     # ------------------------------------------------------------------ what was asked for
 
-    def on_tap(self, tell: Callable[[float, float], None]) -> None:
-        """Say where the map was clicked.
-
-        Bokeh has other names for a click within 300 ms of another one, and for one of more than 300 ms.
-        """
-        for kind in ("tap", "doubletap", "pressup"):
-            self.plot.on_event(kind, lambda event: tell(float(event.x), float(event.y)))
-
     def on_hover(self, tell: Callable[[float | None, float | None], None]) -> None:
         """Say where the pointer is; None once it has left the map."""
 

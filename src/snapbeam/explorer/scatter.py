@@ -84,9 +84,5 @@ class ScatterView:
 
     def _tell(self) -> None:
         count, chosen = len(self.points.data["a"]), len(self.points.selected.indices)
-        words = (
-            f"{chosen} of {count} points are selected"
-            if chosen
-            else f"{count} points; draw a box or a lasso"
-        )
+        words = f"{chosen} of {count} points are selected" if chosen else f"{count} points; draw a box or a lasso"
         self.words.object = style.NOTE.format(words)
