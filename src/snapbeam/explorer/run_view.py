@@ -761,7 +761,7 @@ _DISPLACEMENTS = {
     "displacement_at_striker": ("beam, at the striker", "beam", 1.2, "dashed"),
 }
 """Label, colour, width and dashes of each curve, the striker first, so that it hides nothing."""
-_FIRST_BELOW = ("striker_forces", "contact_force", "voltage", "power_load")
+_FIRST_BELOW = ("striker_forces", "contact_force", "voltage", "power_load", "midspan_velocity")
 
 
 def _columns_of(dataset: xr.Dataset, name: str) -> _Array:
