@@ -26,6 +26,15 @@ FILES = {
     "external force": {"beam": BEAM} | ONE_MODE | {
         "force": {"type": "harmonic_force", "frequency_ratio": 0.5, "amplitude": 0.05, "location": 0.4}
     },
+    "noise": {"beam": BEAM} | ONE_MODE | {"axial_load": {"type": "noise_force", "low_ratio": 0.4, "high_ratio": 4.0, "rms": 2.0}},
+    "burst": {"beam": BEAM} | ONE_MODE | {
+        "force": {"type": "burst_force", "frequency_ratio": 0.9, "amplitude": 0.1, "duration_cycles": 6, "location": 0.4}
+    },
+    "sum": {"beam": BEAM} | ONE_MODE | {
+        "axial_load": {
+            "type": "harmonic_force+ramp_force", "frequency_ratio_1": 2.0, "amplitude_1": 0.5, "change_2": 1.0, "duration_2": 0.1,
+        }
+    },
     "axial load": {"beam": BEAM} | ONE_MODE | {"axial_load": {"type": "harmonic_force", "frequency_ratio": 2.0, "amplitude": 0.1}},
 }  # fmt: skip
 HOW = sb.Integration(cycles=5)
@@ -43,6 +52,9 @@ def system_of(name):
         ("two strikers", ["drive.frequency_ratio", "drive.velocity_amplitude"]),
         ("external force", ["force.frequency_ratio", "force.amplitude"]),
         ("axial load", ["axial_load.frequency_ratio", "axial_load.amplitude"]),
+        ("noise", ["axial_load.rms", "axial_load.high_ratio"]),
+        ("burst", ["force.frequency_ratio", "force.amplitude"]),
+        ("sum", ["axial_load.frequency_ratio_1", "axial_load.amplitude_1"]),
     ],
 )
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning", "ignore::snapbeam.DiagnosticWarning")

@@ -196,6 +196,9 @@ def test_points_selected_in_the_scatter_are_marked_in_the_map(tab, serve, folder
     page.wait(lambda: "intrawell" in page.text("key-box"), "the map")
     page.page.get_by_role("button", name="scatter").click()
     page.wait(lambda: "draw a box" in page.text("scatter-words"), "the scatter")
+    page.page.set_viewport_size({"width": 1280, "height": 800})
+    fits = "() => document.scrollingElement.scrollHeight <= window.innerHeight"
+    page.wait(lambda: page.js(fits), "map and scatter on 1280 by 800")
     page.page.wait_for_timeout(1000)  # the figures find their places
     force = small_map["peak_force"].transpose("velocity_amplitude", "frequency_ratio").values.ravel()
     counts = small_map["zero_crossings"].transpose("velocity_amplitude", "frequency_ratio").values.ravel()

@@ -60,6 +60,8 @@ def test_a_lecture_has_larger_type_and_keeps_the_view(tab, served, small_map) ->
         assert boxes[0]["y"] == boxes[1]["y"], "the tabs of a run in one row"
     page.page.get_by_role("button", name="Two points").click()
     page.wait(lambda: page.js(_FITS), "one point on 1280 by 800")
+    page.page.set_viewport_size({"width": 390, "height": 844})
+    page.wait(lambda: page.js("() => document.scrollingElement.scrollWidth") <= 390, "a lecture on a phone")
     page.page.get_by_role("button", name="Desk").click()
     page.wait(lambda: page.js(size) == usual, "the usual type")
 

@@ -29,7 +29,7 @@ from snapbeam.explorer.scatter import ScatterView
 from snapbeam.explorer.shared import Shared
 from snapbeam.model.parameter_axes import CHANGES_UNITS
 from snapbeam.model.parameter_file import Config, config_from_mapping
-from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters
+from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters, row_of
 from snapbeam.model.quantity import split_name
 from snapbeam.plot.dataset import plot_dataset
 from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
@@ -229,7 +229,7 @@ def _duration(seconds: float) -> str:
 # ----------------------------------------------------------------------------------------------------
 
 
-_HEIGHT, _LOW = 345, 240
+_HEIGHT, _LOW = 345, 195
 """Pixels of the figure, alone and above another one."""
 
 
@@ -403,7 +403,7 @@ class MapCard:
         )
         self.view = MapView(self.look, self.plane.x, self.plane.y, _HEIGHT)
         self._see(view)
-        self.view.on_tap(lambda x, y: self.asked(self.point(x, y)))
+        style.on_tap(self.view.plot, lambda x, y: self.asked(self.point(x, y)))
         self.view.on_hover(self._hovered)
         self.view.on_view(self.control.view_moved)
         for edge in ("inner_width", "inner_height"):
@@ -769,7 +769,7 @@ class SystemCard:
         self.vary.param.watch(lambda _: page.post(self._vary), "value")
         digits = PrintfTickFormatter(format="%.6g")
         self.slider = pn.widgets.FloatSlider(visible=False, width=330, format=digits)
-        self.slider.param.watch(lambda event: page.post(lambda: self._dragged(event.new)), "value")
+        self.slider.param.watch(lambda _: page.post(lambda: self._dragged(self.slider.value)), "value")  # the latest
         self.slider.param.watch(lambda event: page.post(lambda: self._released(event.new)), "value_throttled")
         laws = {LAWS.get(kind, kind.replace("_", " ")): kind for kind in _kinds("contact")}
         self.law = pn.widgets.Select(name="Contact law", options=laws, width=160)
@@ -801,7 +801,7 @@ class SystemCard:
                 return not row.kinds or kinds.get(row.section) in row.kinds
             return row.name in held
 
-        rows = [row for row in parameters().values() if _group(row) in _SECTIONS and shown(row)]
+        rows = [row for row in maps.rows_of(self.system) if _group(row) in _SECTIONS and shown(row)]
         return [
             row for row in rows
             if row.quantity.kind in (float, int, str, bool) and (row.section != "integration" or row.name in _INTEGRATION)
@@ -822,7 +822,8 @@ class SystemCard:
 
     def _vary(self) -> None:
         """Let the slider hold the chosen parameter, from half of its value to one and a half."""
-        held, rows = maps.held_values(self.system, self.integration), parameters()
+        held = maps.held_values(self.system, self.integration)
+        rows = {row.name: row for row in maps.rows_of(self.system)}
         numbers = [name for name in self.fields if isinstance(held.get(name), (int, float)) and held[name]]
         self.vary.options = {"": ""} | {
             name.replace("_", " "): name for name in numbers if rows[name].quantity.kind is not bool
@@ -834,20 +835,19 @@ class SystemCard:
             ends = sorted((0.5 * value, 1.5 * value))
             low, high = max(ends[0], item.low), min(ends[1], item.high)
             step = 1 if item.kind is int else (high - low) / 500
-            unit = "" if item.unit == "1" else f" ({item.unit})"
             self._varied = value
             self.slider.param.update(
-                name=f"{item.long_name}{unit}", start=low, end=max(high, low + step), step=step, value=value
+                name=self.fields[name].name, start=low, end=max(high, low + step), step=step, value=value
             )
 
     def _dragged(self, value: float) -> None:
         if value != self._varied:
-            self.page.drag({str(self.vary.value): parameters()[self.vary.value].quantity.kind(value)})
+            self.page.drag({str(self.vary.value): lookup(self.vary.value).quantity.kind(value)})
 
     def _released(self, value: float) -> None:
         self.page.drag({})
         name = str(self.vary.value)  # back at its place, the run that was shown before is computed again
-        self._use({name: parameters()[name].quantity.kind(value)} if value != self._varied else {})
+        self._use({name: lookup(name).quantity.kind(value)} if value != self._varied else {})
 
     def _edited(self) -> dict[str, Any]:
         return {name: each.value for name, each in self.fields.items() if each.value != self._filled[name]}
@@ -990,7 +990,7 @@ def changed_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
     found: dict[str, None] = {}
     sections = [{split_name(name)[0] for name in each} for each in (before, after)]
     for name in dict.fromkeys([*before, *after]):
-        value, (section, key), row = after.get(name), split_name(name), parameters().get(name)
+        value, (section, key), row = after.get(name), split_name(name), row_of(name)
         root = section.partition(".")[0]
         title = _SECTIONS.get(_group(row) if row else root, root.replace("_", " "))
         if maps.plain(before.get(name)) == maps.plain(value):

@@ -345,6 +345,11 @@ link.download = source.tags[0];
 document.body.appendChild(link);
 link.click();
 link.remove();
+if (source.tags[1].startsWith('audio/')) {  // heard at once
+  document.querySelector('audio')?.remove();
+  const sound = document.body.appendChild(new Audio(link.href));
+  sound.play().catch(() => {});
+}
 setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 """
 

@@ -97,6 +97,7 @@ class MapView:
                 made = kind(**{f"{name}_range_name": "unit"})
                 if axis.log:
                     getattr(self.plot, f"extra_{name}_scales")["unit"] = models.LogScale()
+                made.ticker.desired_num_ticks = 4  # labels do not touch on a phone
                 style_axis(made, self.look)
                 getattr(self.plot, place).insert(0, made)  # nearer than a colour bar
                 self.physical[name] = made
@@ -112,14 +113,6 @@ class MapView:
             getattr(self.plot, f"extra_{name}_ranges")["unit"].update(start=own.start * factor, end=own.end * factor)
 
     # ------------------------------------------------------------------ what was asked for
-
-    def on_tap(self, tell: Callable[[float, float], None]) -> None:
-        """Say where the map was clicked.
-
-        Bokeh has other names for a click within 300 ms of another one, and for one of more than 300 ms.
-        """
-        for kind in ("tap", "doubletap", "pressup"):
-            self.plot.on_event(kind, lambda event: tell(float(event.x), float(event.y)))
 
     def on_hover(self, tell: Callable[[float | None, float | None], None]) -> None:
         """Say where the pointer is; None once it has left the map."""

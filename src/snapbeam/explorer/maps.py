@@ -10,6 +10,7 @@ import shlex
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -22,7 +23,7 @@ from snapbeam.explorer.drawn import plain as plain_formulas
 from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token, check_run
 from snapbeam.model.parameter_axes import to_physical
 from snapbeam.model.parameter_file import config_from_mapping, config_text
-from snapbeam.model.parameters import PHYSICAL, lookup, parameters
+from snapbeam.model.parameters import PHYSICAL, Parameter, lookup, parameters, row_of
 from snapbeam.model.quantity import split_name
 from snapbeam.plot.axes import edges_of, is_geometric, positions
 from snapbeam.plot.dataset import figures_of
@@ -352,23 +353,32 @@ def default_axes(system: sb.System) -> dict[str, Any]:
 
     if DEFAULT_AXES.keys() <= system.parameters.keys():
         return {name: parse_axis(name, text) for name, text in DEFAULT_AXES.items()}
-    rows = [
-        row
-        for row in parameters().values()
-        if row.name in system.parameters
-        and row.is_run
-        and row.quantity.kind is float
-        and not row.short.endswith("phase")
-    ]
-    rows.sort(key=lambda row: (not row.name.endswith("frequency_ratio"), "amplitude" not in row.name))
-    if len(rows) < 2:
-        raise sb.InputError("system: has no two parameters of a run, such as an excitation, for the axes of a map")
-    axes = {}
-    for row in rows[:2]:
-        value = float(system.parameters[row.name]) or 1.0
-        low, high = sorted((0.1 * value, min(3.0 * value, row.quantity.high)))
-        axes[row.name] = np.linspace(low, high, 40)
-    return axes
+    held, order = (
+        system.parameters,
+        ("frequency_ratio", "amplitude", "rms", "stop_ratio", "high_ratio", "peak", "change"),
+    )
+    rows = [row for row in rows_of(system) if row.name in held and row.is_run and row.quantity.kind is float]
+    rows = [row for row in rows if "phase" not in row.name]
+    rows.sort(key=lambda row: next((at for at, word in enumerate(order) if word in row.name), len(order)))
+    axes: dict[str, Any] = {}
+    for row in rows:
+        value = float(held[row.name]) or 1.0
+        for least, most in ((0.1, 3.0), (0.5, 1.5)):  # of a band, less than its other edge
+            low, high = sorted((least * value, min(most * value, row.quantity.high)))
+            with suppress(sb.InputError):
+                for end in (low, high):
+                    system.replace(**{row.name: end})
+                axes[row.name] = np.linspace(low, high, 40)
+                break
+        if len(axes) == 2:
+            return axes
+    raise sb.InputError("system: has no two parameters of a run, such as an excitation, for the axes of a map")
+
+
+def rows_of(system: sb.System) -> list[Parameter]:
+    """The table of parameters, and after it the parameters that a system has of a sum of forces or motions."""
+    further = (row_of(name) for name in system.parameters if name not in parameters())
+    return [*parameters().values(), *(row for row in further if row is not None)]
 
 
 def axes_dataset(system: sb.System, axes: Mapping[str, Any], integration: sb.Integration) -> xr.Dataset:
@@ -609,13 +619,13 @@ class Axis:
 
     @staticmethod
     def words_of(source: Source, name: str) -> str:
-        """Axis label: long name, symbol and unit."""
-        attrs = source.skeleton[name].attrs
+        """Axis label: name of a parameter as the fields have it, otherwise the long name; symbol and unit."""
         text, unit = source.label(name)
-        text = text.replace("omega_1", "ω₁").replace("^2", "²")
-        symbol = ""
-        if "parameter" in attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
-            symbol = plain_formulas(f"${lookup(str(attrs.get('parameter', name))).quantity.symbol}$")
+        text, symbol = text.replace("omega_1", "ω₁").replace("^2", "²"), ""
+        if "parameter" in source.skeleton[name].attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
+            full = parameter_of(source.skeleton, name)
+            text = short_names(parameter_of(source.skeleton, each) for each in source.dims)[full]
+            symbol = plain_formulas(f"${lookup(full).quantity.symbol}$")
         return " ".join(part for part in (text, symbol, "" if unit == "1" else f"({unit})") if part)
 
     @property

@@ -7,7 +7,6 @@ from typing import Any
 import matplotlib.pyplot as plt
 import panel as pn
 from bokeh.document import Document
-from bokeh.events import Tap
 from bokeh.models import ColumnDataSource
 from markupsafe import Markup
 
@@ -20,7 +19,7 @@ from snapbeam.explorer.jobs import Downloads, Tab, Token, check_run, drawing, fi
 from snapbeam.explorer.maps import Point, ResultSource, brief, sections_of, started
 from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.style import NOTE, REFUSED, Html, button, framed_plot, look_of, sheet, styled
+from snapbeam.explorer.style import NOTE, REFUSED, Html, button, framed_plot, look_of, on_tap, sheet, styled
 from snapbeam.model.parameters import parameters
 from snapbeam.plot.dataset import start_of
 
@@ -128,7 +127,7 @@ class ResultPage(Tab):
                 plot.scatter(
                     "x", "y", source=self.mark, size=15, fill_color=None, line_color=self.look.accent, line_width=3
                 )
-                plot.on_event(Tap, lambda event: self.ask((event.x, event.y)))
+                on_tap(plot, lambda x, y: self.ask((x, y)))
             part = framed_plot(plot, margin=0)
             row = sum(other.width for _, other in found.plots if abs(other.y1 - box.y1) < 0.01)
             part.styles = {"flex": f"1 1 calc({100 * box.width / row:.0f}% - 2px)", "min-width": "min(230px, 100%)"}

@@ -761,7 +761,7 @@ _DISPLACEMENTS = {
     "displacement_at_striker": ("beam, at the striker", "beam", 1.2, "dashed"),
 }
 """Label, colour, width and dashes of each curve, the striker first, so that it hides nothing."""
-_FIRST_BELOW = ("striker_forces", "contact_force", "voltage", "power_load")
+_FIRST_BELOW = ("striker_forces", "contact_force", "voltage", "power_load", "midspan_velocity")
 
 
 def _columns_of(dataset: xr.Dataset, name: str) -> _Array:
@@ -811,11 +811,12 @@ class WaveformPanel(RunPanel):
         low = self.over_time(y_range=(0.0, 1.0), **below)
         log = self.over_time(
             y_range=(1e-12, 1.0), y_axis_type="log", x_axis_label="cycles of excitation τ",
-            y_axis_label=f"|Δw| ({self.units[0]})", **below | {"share": 0.28},
+            y_axis_label=f"|Δw| ({self.units[0]})", visible=False, **below | {"share": 0.28},
         )  # fmt: skip
         self.decades = models.FixedTicker(ticks=[])
         log.yaxis.ticker = self.decades
         log.line("x", "y", source=self.apart, color=look.second, line_width=1.4)
+        low.yaxis.ticker = models.BasicTicker(desired_num_ticks=3)
         low.line("x", "y", source=self.force, color=look.beam, line_width=1.2)
         for plot, source in zip((top, low), self.further, strict=True):
             plot.multi_line("x", "y", source=source, color=look.second, line_width=1.2, line_dash="dotdash")
@@ -825,14 +826,8 @@ class WaveformPanel(RunPanel):
             item = models.LegendItem(label=label, renderers=[renderer], visible=False)
             top.legend[0].items.append(item)
         self.low, self.top, self.log = low, top, log
-        self.alone = [
-            self.wrap(low),
-            pn.Row(self.below, pn.pane.Bokeh(self.beam.play), margin=0),
-            self.wrap(self.beam.small),
-        ]
-        self.paired = self.wrap(log)
-        self.paired.visible = False
-        return [self.wrap(top), *self.alone, self.paired]
+        self.choice = pn.Row(self.below, pn.pane.Bokeh(self.beam.play), margin=0)
+        return [self.wrap(top), self.wrap(low), self.choice, self.wrap(self.beam.small), self.wrap(log)]
 
     def show(self, run: Run, low: float, high: float) -> None:
         """Show a run between two cycles."""
@@ -860,10 +855,9 @@ class WaveformPanel(RunPanel):
         if self.run is None:
             return
         pair = self.other is not None
-        for part in self.alone:
-            part.visible = not pair
-        self.alone[-1].visible = not pair and self.beam.has_shape
-        self.paired.visible = pair
+        # of the figures, not of their panes: Panel 1.9 loses what a pane of Bokeh is told while changes are held
+        self.choice.visible = self.low.visible = not pair
+        self.beam.small.visible, self.log.visible = not pair and self.beam.has_shape, pair
         data = self.run.dataset
         x, label = across(self.run)
         scale = self.scales(self.run)[0]

@@ -34,12 +34,12 @@ class ScatterView:
         for each in self.choice:
             each.param.watch(lambda _: card.post(self.fill), "value")
         tools = {"tools": "box_select,lasso_select,pan,wheel_zoom,reset", "active_drag": "box_select"}
-        self.plot = style.figure(look, name="scatter-plot", height=200, used=390, share=0.5, **tools)
+        self.plot = style.figure(look, name="scatter-plot", height=165, used=390, share=0.4, **tools)
         faint = {"nonselection_fill_alpha": 0.12, "nonselection_line_alpha": 0.0}
         self.plot.scatter(
             "a", "b", color="color", source=self.points, size=5, line_color=look.faint, line_width=0.5, **faint
         )
-        self.words = style.Html("", css_classes=["scatter-words"])
+        self.words = style.Html("", width=170, css_classes=["scatter-words"])
         self.points.selected.on_change("indices", lambda attr, old, new: card.post(self._tell))
         self.layout = pn.Column(
             pn.FlexBox(*self.choice, self.words, margin=0, align_items="flex-end"), style.framed_plot(self.plot, margin=0),
@@ -75,7 +75,8 @@ class ScatterView:
             "color": colors if kinds is not None else [card.look.accent] * a.size,
         }
         for axis, each in zip(self.plot.axis, self.choice, strict=True):
-            axis.axis_label = card.source.title(each.value)
+            name, unit = each.value.replace("_", " "), card.source.label(each.value)[1]
+            axis.axis_label = name if unit == "1" else f"{name} ({unit})"
         if self._marked is not card.view:
             self._marked = card.view
             card.view.mark_selected(self.points)
@@ -83,9 +84,5 @@ class ScatterView:
 
     def _tell(self) -> None:
         count, chosen = len(self.points.data["a"]), len(self.points.selected.indices)
-        words = (
-            f"{chosen} of {count} points are selected"
-            if chosen
-            else f"{count} points: draw a box or a lasso to mark some in the map"
-        )
+        words = f"{chosen} of {count} points are selected" if chosen else f"{count} points; draw a box or a lasso"
         self.words.object = style.NOTE.format(words)

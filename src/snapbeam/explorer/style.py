@@ -139,6 +139,15 @@ def framed_plot(plot: Any, **options: Any) -> Any:
     return pn.pane.Bokeh(plot, sizing_mode="stretch_width", stylesheets=list(plot.stylesheets), **options)
 
 
+def on_tap(plot: Any, tell: Callable[[float, float], None]) -> None:
+    """Say where a figure was clicked.
+
+    Bokeh has other names for a click within 300 ms of another one, and for one of more than 300 ms.
+    """
+    for kind in ("tap", "doubletap", "pressup"):
+        plot.on_event(kind, lambda event: tell(float(event.x), float(event.y)))
+
+
 def fit(plot: Any, *curves: NDArray[Any]) -> None:
     """Let a figure show all of some curves."""
     known = [curve[np.isfinite(curve)] for curve in curves]
@@ -154,6 +163,7 @@ def legend(plot: Any, look: Look, **options: Any) -> None:
     for item in list(plot.legend):
         plot.center.remove(item)
         plot.add_layout(item, "above")
+        item.stylesheets = ["@media (max-width: 600px) { .bk-label { font-size: 11px !important; } }"]
         item.update(
             location="top_left", orientation="horizontal", click_policy="hide", border_line_color=None,
             background_fill_color=look.card, background_fill_alpha=0.75, label_text_color=look.text,
