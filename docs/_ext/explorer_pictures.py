@@ -63,10 +63,6 @@ def _seen(browser: Any, url: str) -> Image.Image:
     page.goto(url)
     page.wait_for_function(_SHOWN if "tab=" not in url else "() => window.Bokeh && Bokeh.documents[0]")
     page.wait_for_timeout(_WAIT / 4)
-    finer = page.get_by_role("button", name=re.compile("finer points"))
-    if "view=" in url and finer.is_visible():  # the page asks before a level that takes long
-        finer.click()
-        page.wait_for_timeout(_WAIT)
     picture = Image.open(io.BytesIO(page.screenshot()))
     page.close()
     return picture
