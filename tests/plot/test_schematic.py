@@ -104,6 +104,15 @@ def test_every_force_and_every_motion_is_drawn(model) -> None:
         assert panel.get_tightbbox().xmax <= figure.bbox.xmax + 1.0
 
 
+def test_no_motion_is_left_out(model) -> None:
+    pushes = [
+        sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.5 * n, amplitude=0.1), location=0.1 * n)
+        for n in range(1, 6)
+    ]
+    titles = [panel.get_title("left") for panel in plot_system(sb.System(model, forces=pushes)).axes[1:]]
+    assert titles == ["Force: harmonic", *(f"Force {n}: harmonic" for n in range(2, 6))]
+
+
 def test_free_beam(model) -> None:
     figure = plot_system(sb.System(model))
     assert len(figure.axes) == 1

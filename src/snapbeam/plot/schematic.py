@@ -43,7 +43,7 @@ def draw_tips(ax: Axes, system: System, tips: list[tuple[int, Any]]) -> None:
     scale = system.scale
     lead = tips[0][1]
     times = np.linspace(0.0, _CYCLES * float(lead.cycle(lead.columns(), scale)[0]), 1601)
-    for (number, drive), line in zip(tips, _LINES, strict=False):
+    for (number, drive), line in zip(tips, itertools.cycle(_LINES), strict=False):
         moved = _moved(drive, system, times)
         ax.plot(times / times[-1] * _CYCLES, moved / scale.length, label=f"striker {number}", **line)
     ax.set_xlabel("Cycles of the drive")
@@ -193,8 +193,6 @@ LAWS = {
 _CYCLES = 8.0
 _LONG = 22
 """Letters of a title that has room to the right of its axis."""
-_PANELS = 4
-"""Motions that are drawn, at most."""
 _LOAD_COLOR = _COLOR
 
 
@@ -223,7 +221,7 @@ def plot_system(system: System, title: str = "") -> Figure:
     both = len({each.striker.side for each in system.contacts}) > 1
     tips = [(numbered(name)[1], drive) for name, drive in system.moving if numbered(name)[0] == "drive"]
     others = [each for each in system.moving if numbered(each[0])[0] != "drive"]
-    rows = min(len(others) + bool(tips), _PANELS)
+    rows = len(others) + bool(tips)
     figure = new_figure("double", max(72.0 if both else 52.0, 40.0 * rows))
     with figure_style():
         # each part is laid out alone, so that the labels of the motion leave the beam its height
@@ -235,7 +233,7 @@ def plot_system(system: System, title: str = "") -> Figure:
         panels = iter(parts[1].subplots(rows, squeeze=False)[:, 0] if rows else ())
         if tips[1:]:
             draw_tips(next(panels), system, tips)
-        for panel, (section, drive) in zip(panels, others if tips[1:] else system.moving, strict=False):
+        for panel, (section, drive) in zip(panels, others if tips[1:] else system.moving, strict=True):
             _draw_drive(panel, system, section, drive)
         if title:
             ax.set_title(title, loc="left")
