@@ -86,3 +86,13 @@ def test_time_at_the_changed_load() -> None:
     assert load[cycle > 9.05] == pytest.approx(0.0, abs=1e-12)
     there, back = load[(cycle > 0.1) & (cycle < 2.4)], load[(cycle > 6.6) & (cycle < 8.9)]
     np.testing.assert_allclose(there, back[::-1], rtol=0.0, atol=1e-9)
+
+
+def test_a_force_is_added_to_forces_only():
+    harmonic, sine = (
+        sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.1),
+        sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1),
+    )
+    for one, other in ((harmonic, sine), (sine, harmonic)):
+        with pytest.raises(InputError, match="a force is no motion"):
+            one + other
