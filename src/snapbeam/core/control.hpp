@@ -17,10 +17,14 @@ namespace SNAPBEAM_SET {
 
 constexpr double GRADING = 0.5, RELEASE = 0.5, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
 constexpr double CONTACT_TURN[3] = {0.5, 0.35, 0.35};  // of each composition
+constexpr double TURNOVER[3] = {1.0, 0.5, 0.5}, TURNED_OVER = 4.0;
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 template <class L> constexpr int MOST_CORRECTIONS = L::directions > 0 ? 30 : CORRECTIONS;  // of a state the error is of second order, of derivatives of first
 
 template <class L> struct Group;
+template <class L>
+typename L::Number acceleration_along(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p,
+                                      const typename L::Cell *k, int without);
 template <class L>
 typename L::Number pressed_by(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p,
                               const typename L::Cell *k);
@@ -142,7 +146,7 @@ template <class L> struct Group {
         number(z.t), number(jump), number(turned), number(z.sign), number(z.gq), number(z.qr), number(stretch), number(energy);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
-            number(c.onset), number(c.safe), number(c.d0), number(c.r0), number(c.own_impulse), number(c.deepest), number(c.hardest);
+            number(c.onset), number(c.safe), number(c.d0), number(c.r0), number(c.own_impulse), number(c.deepest), number(c.hardest), number(c.f);
             Number closed = select(c.closed, Number(1.0), Number(0.0)), pressing = select(c.pressing, Number(1.0), Number(0.0));
             number(closed), number(pressing);
             if (c.state >= 0) number(c.P[c.state]), number(c.offset);
@@ -400,6 +404,11 @@ template <class L> struct Group {
                 // towards the end of its range, where a force may be infinite, a share of the way
                 const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.numbers()) - c.x, c.x - law.low(c.numbers())); });
                 want = min(want, by_stiffness);
+                const Real turnover = with_law(c.law, [&](auto law) {
+                    if constexpr (law.contact) return Real(INFINITY);
+                    else return value(law.turnover(c.numbers()));
+                });
+                if (any(turnover < Real(NEVER))) want = min(want, by_turnover(c, turnover));
                 if (any(value(space) < Real(NEVER))) want = min(want, Real(NEARER) * value(space) / (abs(value(dot<L>(c.row, z.p, n))) * z.tick));
                 continue;
             }
@@ -426,6 +435,13 @@ template <class L> struct Group {
         z.h = Number(ticks * z.tick);
         const Marks changed = alive & differ(ticks, key);
         if (any(changed)) new_flows(changed, level, again | landing);
+    }
+    // Ticks in which a speed along a row changes by a share of that in which a force turns over, or comes as near to zero as that.
+    SNAPBEAM_SELDOM Real by_turnover(const Channel<L> &c, Real turnover) {
+        for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].begun);
+        const Number bend = acceleration_along(z, c, z.q, z.p, z.k, -1);
+        const Real away = max(abs(value(dot<L>(c.row, z.p, s->size()))) - Real(TURNED_OVER) * turnover, Real(0.0));
+        return fma(Real(TURNOVER[problem->composition]), turnover, away) / (max(abs(value(bend)), Real(1e-300)) * z.tick);
     }
     // Steps in which a circuit neither follows the beam nor changes slowly.
     SNAPBEAM_FN Marks half_resolved(Real length) const {

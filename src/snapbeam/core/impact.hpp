@@ -25,13 +25,18 @@ template <class L> typename L::Number force_of(const Runs<L> &z, const Channel<L
     const auto x = c.contact ? penetration(z, c, q) : along(z, c, q), v = dot<L>(c.row, p, z.s->size());
     return c.circuit ? x : force_at(c, x, c.contact ? signal_slope(z, c) - v : v);
 }
+// Acceleration along the row of a channel at a state; that by channel *without* is left out.
+template <class L>
+typename L::Number acceleration_along(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p, const typename L::Cell *k, int without) {
+    typename L::Number a = dot<L>(c.row, k, z.s->size()) + linear_acceleration(*z.s, c.row, q, p);
+    for (int j = 0; j < z.channels; ++j)
+        if (j != without) a = fma(c.M[j], force_of(z, z.channel[j], q, p), a);
+    return a;
+}
 // Force that holds a contact together at a state, times M: what its row lacks of the acceleration of the tip.
 template <class L>
 typename L::Number pressed_by(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p, const typename L::Cell *k) {
-    typename L::Number a = dot<L>(c.row, k, z.s->size()) + linear_acceleration(*z.s, c.row, q, p);
-    for (int j = 0; j < z.channels; ++j)
-        if (&z.channel[j] != &c) a = fma(c.M[j], force_of(z, z.channel[j], q, p), a);
-    return signal_bend(z, c) - a;
+    return signal_bend(z, c) - acceleration_along(z, c, q, p, k, int(&c - z.channel));
 }
 
 // The derivatives of the state become those of a state so much later.

@@ -504,7 +504,7 @@ class Recording:
         most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
         width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
         samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // width), most + 8)
-        saved = (3 * (n + 64) + count * (11 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
+        saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
         self.recorder: dict[str, Any] = {
             "times": np.ascontiguousarray(times, dtype=float),
             "in_contact": int(in_contact),
