@@ -514,23 +514,25 @@ class DesignProblem:
             if isinstance(value, float)
         }
         whole = fixed | columns | found
-        if "cycles_to_settle" in {
-            *(objective.quantity for objective in self.objectives),
-            *(constraint.quantity for constraint in self.constraints),
-        }:
+        if "cycles_to_settle" in {each.quantity for each in self._parts}:
             whole[CYCLE] = self.trials.cycles(columns)
         return [{name: values[each == i] for name, values in whole.items()} for i in range(len(x))]
 
     @property
+    def _parts(self) -> tuple[Objective | Constraint, ...]:
+        """Objectives and constraints."""
+        return (*self.objectives, *self.constraints)
+
+    @property
     def _needs_runs(self) -> bool:
-        return {each._quantity.kind for each in (*self.objectives, *self.constraints)} != {"design"}
+        return {each._quantity.kind for each in self._parts} != {"design"}
 
     @property
     def not_smooth(self) -> str:
         """Reason why the search has no gradients; empty if it has."""
         if len(self.objectives) > 1:
             return "there are several objectives"
-        for each in (*self.objectives, *self.constraints):
+        for each in self._parts:
             name, kind = each.quantity, each._quantity.kind
             known = kind == "design" or (kind == "run" and name in STATISTICS)
             if why := "changes by jumps" if not known else not_smooth(name) if kind == "run" else "":
@@ -561,7 +563,7 @@ class DesignProblem:
         self.trials.runs += numbers.size
         scale, answers = self.trials.system.scale, []
         units = {"": 1.0, "length_scale": scale.length, "velocity_scale": scale.length * scale.omega}
-        for each in (*self.objectives, *self.constraints):
+        for each in self._parts:
             if each._quantity.kind == "design":
                 own = self._own(each, near)
                 runs, changes = own[:1], (own[1 : 1 + low.size] - own[1 + low.size :])[:, None]
