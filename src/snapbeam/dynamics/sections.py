@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize.elementwise import find_root
 
 from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.integration import Integration
@@ -29,12 +30,9 @@ _DIRECTIONS = ("up", "down", "both")
 _SAMPLES = 128
 """A period of the drive or, where that is shorter, of the first mode, to find passages in."""
 _ROUNDS = 40
-"""Maximum number of rounds of the secant rule that places a passage on its level."""
-_STALE = 2
-"""Rounds in a row without progress after which a passage counts as placed."""
+"""Maximum number of rounds that place a passage on its level."""
 _ON_LEVEL = 1e-12
 """Length of the bracket, over the period, at which a passage counts as placed."""
-_RATES = {"displacement_at_striker": "velocity_at_striker", "midspan_displacement": "midspan_velocity"}
 
 
 @checked
@@ -138,7 +136,7 @@ def _passages(
 ) -> tuple[_Array, float, str]:
     """Instants at which a variable passes its level, the maximum distance from it there, and why the search stopped.
 
-    They are found between samples, then by the secant rule (Illinois form) on the run itself.
+    They are found between samples, then on the run itself.
     """
     name, value, direction = level
     spacing = min(period, 1.0 / system.model.reference_frequency) / _SAMPLES
@@ -149,29 +147,17 @@ def _passages(
     at = np.flatnonzero({"up": rising, "down": falling, "both": rising | falling}[direction])
     if not at.size:
         return np.empty(0), 0.0, "no passage"
-    low, high, f_low, f_high = grid[at], grid[at + 1], seen[at], seen[at + 1]
-    side, stale = np.zeros(at.size), np.zeros(at.size, dtype=np.int64)
-    best, least = grid[at], np.abs(seen[at])
-    words = f"the maximum of {_ROUNDS} rounds of the secant rule"
-    for count in range(_ROUNDS):
-        middle = np.where(f_high == f_low, high, (low * f_high - high * f_low) / (f_high - f_low))
-        middle = np.clip(middle, low, high)
-        order = np.argsort(middle, kind="stable")
-        times, back = np.unique(middle[order], return_inverse=True)
-        f = np.empty(at.size)
-        f[order] = (simulate(system, how, sample_times=times).dataset[name].values - value)[back]
-        nearer = np.abs(f) < least
-        best, least = np.where(nearer, middle, best), np.where(nearer, np.abs(f), least)
-        above = f * f_high > 0.0
-        f_low = np.where(above & (side == 1), 0.5 * f_low, np.where(above, f_low, f))
-        f_high = np.where(~above & (side == -1), 0.5 * f_high, np.where(above, f, f_high))
-        low, high = np.where(above, low, middle), np.where(above, middle, high)
-        side = np.where(above, 1, -1)
-        stale = np.where(nearer, 0, stale + 1)
-        if ((least == 0.0) | (high - low <= _ON_LEVEL * period) | (stale >= _STALE)).all():
-            words = f"{count + 1} rounds of the secant rule, until no passage came nearer to its level"
-            break
-    return np.unique(best), float(least.max()), words
+
+    def off(times: _Array) -> _Array:
+        """Distances from the level at instants in any order."""
+        instants, back = np.unique(times, return_inverse=True)
+        found: _Array = (simulate(system, how, sample_times=instants).dataset[name].values - value)[back]
+        return found
+
+    bounds = {"xatol": _ON_LEVEL * period, "xrtol": 0.0, "fatol": 0.0, "frtol": 0.0}
+    found = find_root(off, (grid[at], grid[at + 1]), tolerances=bounds, maxiter=_ROUNDS)
+    words = f"{int(found.nit.max())} rounds of Chandrupatla's rule" + ("" if found.success.all() else ", the maximum")
+    return np.unique(found.x), float(np.abs(found.f_x).max()), words
 
 
 def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope, section: Any) -> xr.Dataset:
