@@ -31,8 +31,6 @@ _SAMPLES = 128
 """A period of the drive or, where that is shorter, of the first mode, to find passages in."""
 _ROUNDS = 40
 """Maximum number of rounds that place a passage on its level."""
-_ON_LEVEL = 1e-12
-"""Length of the bracket, over the period, at which a passage counts as placed."""
 
 
 @checked
@@ -154,8 +152,7 @@ def _passages(
         found: _Array = (simulate(system, how, sample_times=instants).dataset[name].values - value)[back]
         return found
 
-    bounds = {"xatol": _ON_LEVEL * period, "xrtol": 0.0, "fatol": 0.0, "frtol": 0.0}
-    found = find_root(off, (grid[at], grid[at + 1]), tolerances=bounds, maxiter=_ROUNDS)
+    found = find_root(off, (grid[at], grid[at + 1]), maxiter=_ROUNDS)
     words = f"{int(found.nit.max())} rounds of Chandrupatla's rule" + ("" if found.success.all() else ", the maximum")
     return np.unique(found.x), float(np.abs(found.f_x).max()), words
 
