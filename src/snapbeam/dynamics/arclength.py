@@ -204,7 +204,7 @@ def follow(
     max_points: int,
     step: float,
     max_step: float,
-    progress: Callable[[int, int], object] | None,
+    progress: Callable[[int, int], object],
     what: str = "orbit",
 ) -> Path[E_]:
     """Follow a curve from a point along its tangent.
@@ -218,7 +218,7 @@ def follow(
     max_points : int
     step, max_step : float
         First and maximum distance between points.
-    progress : callable, optional
+    progress : callable
     what : str
         Noun of a point, for the reason of the end.
 
@@ -266,8 +266,7 @@ def follow(
         ended = equations.end_at(last, point)
         if ended is None or ended[1]:
             points.append((equations, point))
-            if progress is not None:
-                progress(len(points), max_points)
+            progress(len(points), max_points)
         if ended is not None or crossed:
             path.end = f"limit of {'the' if count == 1 else 'a'} parameter" if ended is None else ended[0]
             return path

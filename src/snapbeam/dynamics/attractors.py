@@ -16,12 +16,11 @@ from scipy.stats import beta
 from snapbeam.dynamics.flow import AdvancedStates, Flow, minimal_period
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, in_unit, labelled
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, in_unit, labelled, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, jacobian, orbit_tolerance, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, finite_array, integer, seed_of, within
 
@@ -46,6 +45,7 @@ _SAME = 1e-5
 _SIGMAS = 3.0
 _TRANSIENT = 1000
 """Minimum number of periods to leave out."""
+_PARTS = 4
 _FEW = 8
 """Irregular runs of a group that exponents are taken of."""
 
@@ -332,43 +332,34 @@ def find_attractors(
     """
     flow = flow_of(system, integration)
     require_isolated_orbits(flow)
-    leave, rule = (
-        settling_periods(flow, least=_TRANSIENT)
-        if transient is None
-        else (integer("transient", transient, 1, 10**7), "as given")
-    )
+    leave, rule = settling_periods(flow, transient, least=_TRANSIENT, fewest=1)
     most, lasts = (integer("max_periods", max_periods, 1, 512), integer("check_periods", check_periods, 20, 10**7))
     rows = _states_of(flow, states, seed_of(rng))
     allowed = orbit_tolerance(tolerance)
 
-    told = counting(progress, "attractors", "parts")
-
-    def report(done: int) -> None:
-        if told is not None:
-            told(done, 4)
-
-    report(0)
+    report = reported(progress, "attractors", "parts")
+    report(0, _PARTS)
     there = flow.advance(rows, leave)
     seen = flow.advance(there, 2 * most, every=True)
-    report(1)
+    report(1, _PARTS)
     assert seen.every is not None
     known = np.asarray(np.isfinite(seen.states).all(axis=1))
     repeats = np.where(known, minimal_period(np.where(known[:, None, None], seen.every, 0.0), _REPEATS), 0)
     verified, reasons = _orbits(flow, seen, repeats, allowed)
     orbits = [orbit for orbit, _ in verified]
-    report(2)
+    report(2, _PARTS)
     regular = [_periodic(orbit, verification) for orbit, verification in verified]
     labels = np.full(len(rows), UNDECIDED)
     for s in np.flatnonzero(repeats > 0):
         labels[s] = _nearest(orbits, seen.states[s])
     irregular = np.flatnonzero(known & (repeats == 0))
     chaotic, members = _chaotic(flow, rows, seen, irregular, most, lasts, orbits)
-    report(3)
+    report(3, _PARTS)
     found, order = _ordered([*regular, *chaotic])
     for number, group in enumerate(members):
         labels[group] = len(regular) + number
     labels = np.where(labels >= 0, order[np.maximum(labels, 0)] if len(order) else UNDECIDED, UNDECIDED)
-    report(4)
+    report(4, _PARTS)
     return Attractors(flow, found, labels, lasts, _reason(labels, known, repeats, leave, rule, most, reasons))
 
 

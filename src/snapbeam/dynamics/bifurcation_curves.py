@@ -30,13 +30,12 @@ from snapbeam.dynamics.approaches import penetrations, turning_points
 from snapbeam.dynamics.arclength import OrbitEquations, Point, follow, tangent_of
 from snapbeam.dynamics.branches import SpecialPoint
 from snapbeam.dynamics.flow import Flow
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, impacts_of, jacobian, orbit_tolerance
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.parameters import ratio_of
 from snapbeam.model.quantity import numbered, split_name
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.singular_values import pinv, svd
 from snapbeam.util.validation import InputError, checked, instance, integer, interval, shown, within
 
@@ -418,7 +417,7 @@ def bifurcation_curve(
     # the special point was located with other steps of differences: once more, across the curve
     table = curve.derivative(y)[2]
     first = curve.correct(y, tangent_of(table, np.ones(y.size)), np.ones(y.size), table)
-    report = counting(progress, "bifurcation curve", "points")
+    report = reported(progress, "bifurcation curve", "points")
     back, ahead = (
         follow(
             curve,

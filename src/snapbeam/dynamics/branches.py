@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from snapbeam.dynamics.arclength import OrbitEquations, Path, Point, follow, tangent_of
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, orbit_at
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, jacobian, orbit_tolerance
 from snapbeam.dynamics.stroboscope import Stroboscope, jumps
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, choice, integer, interval, shown, within
 
@@ -452,7 +451,7 @@ def continuation(
     y = np.append(orbit.coordinates, begun / span)
     _, came, table = orbits.derivative(y)
     towards = np.append(np.zeros(y.size - 1), 1.0 if direction == "up" else -1.0)
-    report = counting(progress, "branch", "orbits")
+    report = reported(progress, "branch", "orbits")
     path = follow(
         orbits,
         Point(y, tangent_of(table, towards), came, table, orbit.iterations, orbit.residual),
@@ -462,7 +461,7 @@ def continuation(
         max_step=max_step,
         progress=report,
     )
-    if report is not None and len(path.points) < count:
+    if len(path.points) < count:
         report(len(path.points), len(path.points))
     return _branch(name, path)
 

@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.flow import Flow, minimal_period
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot, state_of
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, reported
 from snapbeam.dynamics.shooting import OrbitNotFoundError, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, integer, positive
 
@@ -164,7 +163,7 @@ def edge_tracking(
     distances, closest = [], 0.0
     stopped = f"{total} periods"
     begin = True
-    report = counting(progress, "edge tracking", "periods")
+    report = reported(progress, "edge tracking", "periods")
     for period in range(total):
         if begin:
             bracket = _bisect(flow, low, high, near, ahead, decide)
@@ -190,9 +189,8 @@ def edge_tracking(
             stopped = f"after {period + 1} periods the two states are equal to rounding; increase bisect_threshold"
             break
         begin = size > far
-        if report is not None:
-            report(period + 1, total)
-    if report is not None and len(states) < total:
+        report(period + 1, total)
+    if len(states) < total:
         report(len(states), len(states))
     if closest > near:
         stopped += (

@@ -89,9 +89,7 @@ def poincare_section(
     total = integer("periods", periods, 1, 10**6)
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)
-    before, rule = (
-        settling_periods(flow) if transient is None else (integer("transient", transient, 0, 10**7), "as given")
-    )
+    before, rule = settling_periods(flow, transient)
     begun = flow.coordinates()
     if before:
         begun = flow.advance(begun, before).states
