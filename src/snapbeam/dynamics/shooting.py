@@ -119,7 +119,7 @@ def impacts_of(advanced: AdvancedStates) -> NDArray[np.int64]:
 
 def require_isolated_orbits(flow: Flow) -> None:
     """Refuse a system whose periodic orbits form a continuum."""
-    if isinstance(flow, Stroboscope) and flow.space.has_memory:
+    if isinstance(flow, Stroboscope) and any(each.law.memory for each in flow.system.contacts):
         raise InputError(
             "contact: a periodic motion keeps any indentation that its impacts do not deepen, so that orbits and attractors are not "
             "isolated; follow the motion by sb.dynamics.poincare_section or sb.advance"
