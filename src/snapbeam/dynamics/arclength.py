@@ -94,6 +94,23 @@ class Equations:
         row = along / np.linalg.norm(along)
         return self.correct(one.y + part * along, row, one.tangent, nearer.table)
 
+    def halved(
+        self, one: Point, other: Point, is_before: Callable[[Point], bool], most: int, tolerance: float = 0.0
+    ) -> tuple[Point, Point]:
+        """The points on both sides of a change between two, by halving, as far as points are found."""
+        sides, parts, size = [one, other], [0.0, 1.0], float(np.linalg.norm(other.y - one.y))
+        for _ in range(most):
+            part = 0.5 * (parts[0] + parts[1])
+            try:
+                spot = self.between(one, other, part)
+            except OrbitNotFoundError:
+                break
+            side = 0 if is_before(spot) else 1
+            sides[side], parts[side] = spot, part
+            if (parts[1] - parts[0]) * size < tolerance:
+                break
+        return sides[0], sides[1]
+
     def observed(self, point: Point) -> tuple[Equations, Point]:
         """Equations and point at the phase from which the next one is sought."""
         return self, point

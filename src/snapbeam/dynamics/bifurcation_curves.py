@@ -179,26 +179,14 @@ class _Curve(OrbitEquations):
 
     def events(self, last: Point, point: Point, number: int) -> list[tuple[str, Point]]:
         """Points of codimension two between two points, by halving."""
-        found = []
-        ahead = _monitors(self, last, point)
-        size = float(np.linalg.norm(point.y - last.y))
+        ahead, found = _monitors(self, last, point), []
         for kind, begun in _monitors(self, last, last).items():
-            if not begun * ahead[kind] < 0.0:
-                continue
-            low, high, nearest = 0.0, 1.0, point
-            for _ in range(_HALVINGS):
-                part = 0.5 * (low + high)
-                try:
-                    nearest = self.between(last, point, part)
-                except OrbitNotFoundError:
-                    break
-                if begun * _monitors(self, last, nearest)[kind] > 0.0:
-                    low = part
-                else:
-                    high = part
-                if (high - low) * size < self.tolerance:
-                    break
-            found.append((kind, nearest))
+            if begun * ahead[kind] < 0.0:
+
+                def is_before(spot: Point, kind: str = kind, begun: float = begun) -> bool:
+                    return begun * _monitors(self, last, spot)[kind] > 0.0
+
+                found.append((kind, self.halved(last, point, is_before, _HALVINGS, self.tolerance)[1]))
         return found
 
     def has_returned(self, point: Point, first: tuple[_Curve, Point], near: float) -> bool:

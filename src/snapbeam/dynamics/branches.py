@@ -331,18 +331,7 @@ def _unsettled(point: Point) -> float:
 
 def _grazing(orbits: _Orbits, one: Point, other: Point, at: int) -> SpecialPoint:
     """Special point at which the number of impacts changes between two orbits, by bisection."""
-    sides = [one, other]
-    low, high = 0.0, 1.0
-    for _ in range(_HALVINGS):
-        part = 0.5 * (low + high)
-        try:
-            spot = orbits.between(one, other, part)
-        except OrbitNotFoundError:
-            break
-        if spot.came.impacts == one.came.impacts:
-            low, sides[0] = part, spot
-        else:
-            high, sides[1] = part, spot
+    sides = orbits.halved(one, other, lambda spot: spot.came.impacts == one.came.impacts, _HALVINGS)
     width = abs(float(sides[1].y[-1] - sides[0].y[-1])) * float(orbits.spans[0])
     found = orbits._value(sides[1].y)
     error = width + float(orbits.spans[0]) * _unsettled(sides[1])
