@@ -224,24 +224,9 @@ def follow(
     progress: Callable[[int, int], object],
     what: str = "orbit",
 ) -> Path[E_]:
-    """Follow a curve from a point along its tangent.
+    """Follow a curve from a point along its tangent, in steps from *step* to *max_step*.
 
-    Parameters
-    ----------
-    equations : Equations
-    first : Point
-    limits : array of shape (k, 2)
-        Minimum and maximum of each of the last k unknowns.
-    max_points : int
-    step, max_step : float
-        First and maximum distance between points.
-    progress : callable
-    what : str
-        Noun of a point, for the reason of the end.
-
-    Returns
-    -------
-    Path
+    *limits*, of shape (k, 2), are those of the last k unknowns; *what* is the noun of a point, for the reason of the end.
     """
     path: Path[E_] = Path([(equations, first)])
     points, count, length = path.points, len(limits), step

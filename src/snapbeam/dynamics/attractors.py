@@ -124,13 +124,6 @@ class Cloud:
         return found
 
 
-def cloud_of(points: _Array) -> Cloud:
-    """Cloud of points of shape (points, d): one half determines the distance of the other."""
-    first, second = points[::2], points[1::2]
-    away, _ = cKDTree(first).query(second)
-    return Cloud(points, cKDTree(points), 1.5 * float(np.quantile(away, 0.99)))
-
-
 @dataclass(frozen=True, eq=False)
 class Attractor:
     """One attractor: a periodic orbit or a chaotic set, with its states and its verification.
@@ -159,7 +152,11 @@ class Attractor:
     @cached_property
     def trapping_region(self) -> list[Ball] | Cloud:
         """Region from which a state is known to converge to the attractor."""
-        return balls_of(self.orbit) if self.orbit is not None else cloud_of(self.points)
+        if self.orbit is not None:
+            return balls_of(self.orbit)
+        # one half determines the distance of the other
+        away, _ = cKDTree(self.points[::2]).query(self.points[1::2])
+        return Cloud(self.points, cKDTree(self.points), 1.5 * float(np.quantile(away, 0.99)))
 
     def __repr__(self) -> str:
         if self.orbit is not None:
@@ -494,16 +491,11 @@ def _chaotic(
 
 def _groups(every: _Array) -> list[NDArray[np.int64]]:
     """Runs whose points lie among each other's, shape (runs, periods, d); in the order of their first run."""
-    count = len(every)
-    group = np.full(count, UNDECIDED)
-    trees = [cKDTree(run[np.isfinite(run).all(axis=1)]) for run in every]
+    count, trees = len(every), [cKDTree(run[np.isfinite(run).all(axis=1)]) for run in every]
+    group = np.arange(count)
     for i in range(count):
-        for j in range(i):
-            if group[j] == j and trees[i].n and trees[j].n and _mingle(trees[i], trees[j]):
-                group[i] = j
-                break
-        else:
-            group[i] = i
+        like = (j for j in range(i) if group[j] == j and trees[i].n and trees[j].n and _mingle(trees[i], trees[j]))
+        group[i] = next(like, i)
     return [np.flatnonzero(group == i) for i in range(count) if group[i] == i]
 
 

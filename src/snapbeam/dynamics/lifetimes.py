@@ -190,14 +190,6 @@ def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
     return count, lasting, exposure, distance, marks.size
 
 
-def checked_cycles(name: str, values: ArrayLike, most: float) -> NDArray[np.int64]:
-    """Whole numbers of cycles in increasing order, at most *most*."""
-    found = [integer(f"{name}[{i}]", value, 0, int(most)) for i, value in enumerate(np.atleast_1d(values).tolist())]
-    if not found or (np.diff(found) <= 0).any():
-        raise InputError(f"{name} = {found}: must be increasing whole numbers of cycles")
-    return np.array(found, dtype=np.int64)
-
-
 # What a sweep keeps of many starts at every point: when each snapped last, and where it ended.
 
 
@@ -382,7 +374,10 @@ def _after(after: ArrayLike | None, cycles: int, settings: LifetimeSettings) -> 
         )
     if after is None:
         after = sorted({int(part) for part in (cycles / 8, cycles / 4, cycles / 2, observed) if part <= observed})
-    return checked_cycles("after", after, observed)
+    found = [integer(f"after[{i}]", each, 0, int(observed)) for i, each in enumerate(np.atleast_1d(after).tolist())]
+    if not found or (np.diff(found) <= 0).any():
+        raise InputError(f"after = {found}: must be increasing whole numbers of cycles")
+    return np.array(found, dtype=np.int64)
 
 
 def _own_point(system: System) -> dict[str, NDArray[np.float64]]:

@@ -326,8 +326,13 @@ def largest_lyapunov(
             along = np.where((away > 0.0)[:, None], apart / away[:, None], along)
         report(period + 1, total)
     rate = growth / flow.period
-    lost, unit = np.isnan(growth).any(axis=0), _unit(flow)
-    told = _merged(int(lost.sum()), lost.size, size)
+    lost, unit = int(np.isnan(growth).any(axis=0).sum()), _unit(flow)
+    message = (
+        f"distance = {size:g}: the two trajectories become equal to rounding within a period, or fail, in {lost} of {runs} "
+        "runs, whose exponents are NaN; increase distance, or use lyapunov_spectrum"
+    )
+    numbers = {"merged": float(lost), "runs": float(runs)}
+    told = (Diagnostic("dynamics.trajectories_merged", message, numbers),) if lost else ()
     tell(told)
     return labelled(
         {
@@ -337,17 +342,7 @@ def largest_lyapunov(
         None,
         fixed_parameters(flow) | {
             "title": "largest Lyapunov exponent from two trajectories", "periods": total, "period": flow.period,
-            "transient": before, "termination_reason": _stopped(total, before, rule), "merged": int(lost.sum()),
+            "transient": before, "termination_reason": _stopped(total, before, rule), "merged": lost,
             "diagnostics": to_json(told),
         },
     )  # fmt: skip
-
-
-def _merged(lost: int, runs: int, size: float) -> tuple[Diagnostic, ...]:
-    if not lost:
-        return ()
-    message = (
-        f"distance = {size:g}: the two trajectories become equal to rounding within a period, or fail, in {lost} of {runs} "
-        "runs, whose exponents are NaN; increase distance, or use lyapunov_spectrum"
-    )
-    return (Diagnostic("dynamics.trajectories_merged", message, {"merged": float(lost), "runs": float(runs)}),)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize.elementwise import find_root
 
+from snapbeam.dynamics.results import in_unit, labelled
 from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -156,8 +157,6 @@ def _passages(
 
 
 def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope, section: Any) -> xr.Dataset:
-    from snapbeam.util.datasets import xr
-
     if not times.size:
         raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
     data = simulate(system, how, sample_times=times).dataset
@@ -165,10 +164,9 @@ def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope,
                  "modal_velocity"]]  # fmt: skip
     kept = kept.rename(time="point").reset_coords(drop=True)
     phase = (flow.clock.striker_phase + 2.0 * np.pi * times / flow.clock.cycle) % (2.0 * np.pi)
-    result = xr.Dataset(
-        {name: (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars},
-        {"time": ("point", times, {"units": "s", "long_name": "time since the transient"})},
+    return labelled(
+        {str(name): (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars}
+        | {"drive_phase": ("point", phase, in_unit("rad", "phase of the drive"))},
+        {"time": ("point", times, in_unit("s", "time since the transient"))},
         data.attrs | {"title": "Poincare section", "section": str(section)},
     )
-    result["drive_phase"] = ("point", phase, {"units": "rad", "long_name": "phase of the drive"})
-    return result

@@ -137,18 +137,8 @@ def newton(
 ) -> Shot:
     """A root of *residual* by Newton's method, its derivative kept by Broyden's updates as long as steps gain by it.
 
-    Parameters
-    ----------
-    residual, derivative : callable
-        r(x), and r(x) with its derivative.
-    first : array, optional
-        A derivative to begin with.
-    deflate : tuple of arrays
-        Roots to stay away from (Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026).
-
-    Raises
-    ------
-    OrbitNotFoundError
+    *residual* gives r(x), *derivative* r(x) and its derivative, *first* is a derivative to begin with. It stays away from
+    the roots *deflate* (Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026).
     """
     fresh = first is None
     if first is None:

@@ -122,7 +122,11 @@ def bifurcation_diagram(
     """
     swept = _Axis(system, name, values)
     kinds = [choice("sweeps", kind, SWEEPS) for kind in sweeps]
-    given, keep = _periods(periods)
+    try:
+        given, keep = periods
+    except (TypeError, ValueError):
+        raise InputTypeError(f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep") from None
+    integer("periods[1]", keep, 2, 10**6)
     flag("grazing", grazing)
     many = None
     if isinstance(initial_conditions, InitialConditions) or initial_conditions:
@@ -133,18 +137,13 @@ def bifurcation_diagram(
     leave, rule = settling_periods(flow, given, name="periods[0]")
     count, further = swept.values.size, 0 if many is None else many.count
     report, total = reported(progress, "bifurcation diagram", "values"), count * (bool(kinds) + further)
-
-    def kept(x: _Array, at: NDArray[np.int64]) -> tuple[_Array, _Array]:
-        """Recorded states of some runs, shape (runs, keep, d), and impacts and crossings a period."""
-        return _recorded(flow, swept, x, at, leave, keep)
-
     rows = np.empty((len(kinds) + further, count, keep, flow.dimension))
     counts = np.empty((len(rows), count, 2))
     x = np.repeat(flow.coordinates(), len(kinds), axis=0)
     side_by_side = np.arange(len(kinds))
     for step in range(count if kinds else 0):
         at = np.array([swept.order(kind)[step] for kind in kinds])
-        rows[side_by_side, at], counts[side_by_side, at] = kept(x, at)
+        rows[side_by_side, at], counts[side_by_side, at] = _recorded(flow, swept, x, at, leave, keep)
         x = rows[side_by_side, at, -1]
         report(step + 1, total)
     for number in range(further):
@@ -152,7 +151,9 @@ def bifurcation_diagram(
         location = swept.values if swept.name == "contact.location" else None
         state = many.state(flow.system, number, flow.system.start_state, location)
         begun = np.broadcast_to(flow.coordinates(state), (count, flow.dimension))
-        rows[len(kinds) + number], counts[len(kinds) + number] = kept(begun, np.arange(count))
+        rows[len(kinds) + number], counts[len(kinds) + number] = _recorded(
+            flow, swept, begun, np.arange(count), leave, keep
+        )
         report(count * (bool(kinds) + number + 1), total)
     labels = [*kinds, *(f"start {number}" for number in range(further))]
     dataset = _diagram(flow, swept, labels, rows, counts, grazing)
@@ -163,17 +164,10 @@ def bifurcation_diagram(
     return dataset
 
 
-def _periods(periods: tuple[int | None, int]) -> tuple[int | None, int]:
-    try:
-        leave, keep = periods
-    except (TypeError, ValueError):
-        raise InputTypeError(f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep") from None
-    return leave, integer("periods[1]", keep, 2, 10**6)
-
-
 def _recorded(
     flow: Stroboscope, swept: _Axis, x: _Array, at: NDArray[np.int64], leave: int, keep: int
 ) -> tuple[_Array, _Array]:
+    """States that some runs keep, shape (runs, keep, d), and impacts and crossings a period."""
     values, periods = swept.values[at], leave + keep
     if lookup(swept.name).is_run:
         found = [flow.advance(x, periods, every=True, points={swept.name: values})]
