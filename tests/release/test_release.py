@@ -213,20 +213,29 @@ def test_every_extra_is_tried():
 
 
 def test_the_conda_recipe_has_the_dependencies_of_the_package():
-    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     recipe = (ROOT / "recipe" / "recipe.yaml").read_text(encoding="utf-8")
-    run = re.search(r"  run:\n((?:    - [^\n]*\n)+)", recipe).group(1)
-    held = {line.strip("- ").replace("matplotlib-base", "matplotlib").replace(" ", "") for line in run.splitlines()}
-    assert held == {*stated["dependencies"], "python" + stated["requires-python"]}
+    held = {}
+    for part in ("build", "host", "run"):
+        lines = re.search(rf"  {part}:\n((?:    [^\n]*\n)+)", recipe).group(1).splitlines()
+        held[part] = {line.strip("- ").replace("matplotlib-base", "matplotlib").replace(" ", "") for line in lines}
+    project = stated["project"]
+    assert held["run"] == {*project["dependencies"], "python" + project["requires-python"]}
+    assert held["host"] == {*stated["build-system"]["requires"], "python", "pip"}
+    assert '${{compiler("cxx")}}' in held["build"]
 
 
 def test_the_paper_cites_what_its_bibliography_has():
-    """Each citation resolves, each entry is cited and has a DOI, and the text has at most 1,000 words."""
+    """Each citation resolves, each entry is cited and has a DOI, the sections are those of JOSS, of at most 1,000 words."""
     text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
     entries = dict(
         re.findall(r"@\w+\{(\w+),(.*?)\n\}", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.DOTALL)
     )
     body = text.split("---", 2)[2]
+    assert re.findall(r"^# (.*)$", body, re.MULTILINE) == [
+        "Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
+        "AI usage disclosure", "References",
+    ]  # fmt: skip
     assert set(re.findall(r"@([a-z]+\d{4})", body)) == set(entries)
     assert all("doi = {10." in entry for entry in entries.values())
     assert len(body.split()) <= 1000
