@@ -206,6 +206,25 @@ def test_no_compiler_is_needed(archives, tmp_path):
         assert {"avx2", "avx512"} & set(sets)
 
 
+def test_an_editable_core_lies_in_the_package(tmp_path):
+    """Also where one build has several configurations, as with Visual Studio, which adds a folder to a plain path."""
+    pytest.importorskip("nanobind", reason="part of the build")
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    cmake = shutil.which("cmake", path=path) or pytest.skip("cmake was not found")
+    words = ["-DSNAPBEAM_EDITABLE=ON", "-DSNAPBEAM_SETS=baseline", f"-DPython_EXECUTABLE={sys.executable}"]
+    done = subprocess.run(
+        [cmake, "-G", "Ninja Multi-Config", "-S", str(ROOT), "-B", str(tmp_path), *words], capture_output=True, text=True,
+        env={**os.environ, "PATH": path},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    rules = (tmp_path / "CMakeFiles" / "impl-Release.ninja").read_text(encoding="utf-8")
+    folders = {
+        Path(found).parent
+        for found in re.findall(r"^build (\S*[/\\]_core[.][\w.-]*(?:so|pyd))[ :]", rules, re.MULTILINE)
+    }
+    assert folders == {ROOT / "src" / "snapbeam"}
+
+
 def test_every_extra_is_tried():
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert set(stated["optional-dependencies"]) == set(alone.EXTRAS)
