@@ -21,7 +21,7 @@ from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.matlab_file import read_version_5
 from snapbeam.lab.signals import check_signal, even_sampling, si_unit, unit_factor
 from snapbeam.util.diagnostics import Diagnostic, tell
-from snapbeam.util.hdf5 import open_hdf5
+from snapbeam.util.hdf5 import members_of, open_hdf5
 from snapbeam.util.input_files import decoded, refuse_inflated
 from snapbeam.util.netcdf import hdf5_stream
 from snapbeam.util.packages import needing
@@ -379,33 +379,24 @@ def _refuse_length_of_hdf5(path: Path) -> None:
 
 def read_hdf5(path: Path, _told: Told) -> list[Channel]:
     """Return the channels of an HDF5 or NetCDF file; packed numbers by the CF conventions."""
-    import h5py
-
     with open(path, "rb") as opened:
         start = opened.read(4)
     if start[:3] == b"CDF":
         return _netcdf3(path, start[3])
     _refuse_length_of_hdf5(path)
     stored: dict[str, _Stored] = {}
-    groups: dict[str, dict[str, Any]] = {}
     with open_hdf5(path) as file:
-        groups[""] = _stating(file.attrs)
-
-        def visit(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Group):
-                groups[name] = _stating(item.attrs)
-                return
-            if not isinstance(item, h5py.Dataset) or item.ndim > 2 or item.dtype.kind not in "iufSO":
-                return
-            kept = item.dtype.kind in "iuf" or item.size == 1
+        inner, arrays = members_of(file)
+        groups = {name: _stating(item.attrs) for name, item in {"": file, **inner}.items()}
+        for name, item in arrays.items():
+            number = item.dtype.kind in "iuf"
+            kept = item.ndim <= 2 and (number or (item.dtype.kind in "SO" and item.size == 1))
             if not kept or (item.is_scale and not _is_axis(name, item.attrs)):
-                return
+                continue
             attributes = dict(item.attrs)
-            if item.dtype.kind in "iuf" and item.fillvalue:
+            if number and item.fillvalue:
                 attributes.setdefault("_FillValue", item.fillvalue)
             stored[name] = _Stored(np.squeeze(item[()]), attributes, _axis_of(item))
-
-        file.visititems(visit)
     return _channels(stored, groups)
 
 
@@ -853,23 +844,16 @@ def read_matlab(path: Path, _told: Told) -> list[Channel]:
 
 
 def _version_73(path: Path) -> dict[str, Any]:
-    import h5py
-
     _refuse_length_of_hdf5(path)
     values: dict[str, Any] = {}
     with open_hdf5(path) as file:
-
-        def visit(name: str, item: Any) -> None:
-            numbers = isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf"
-            if not numbers or name.startswith("#refs#") or item.attrs.get("MATLAB_empty", 0):
-                return
+        for name, item in members_of(file)[1].items():
+            if item.dtype.kind not in "iuf" or name.startswith("#refs#") or item.attrs.get("MATLAB_empty", 0):
+                continue
             array = np.asarray(item[()])
-            if item.attrs.get("MATLAB_class", b"") == b"char":
-                values[name] = np.array("".join(chr(int(code)) for code in array.ravel(order="F")))
-            else:
-                values[name] = np.squeeze(array.T)
-
-        file.visititems(visit)
+            letters = item.attrs.get("MATLAB_class", b"") == b"char"
+            text = "".join(chr(int(code)) for code in array.ravel(order="F")) if letters else ""
+            values[name] = np.array(text) if letters else np.squeeze(array.T)
     return values
 
 
