@@ -57,23 +57,21 @@ class FrameSource:
     is the standard error [px] that the format adds to every edge.
     """
 
+    shape = (0, 0)
+    numbers: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+    max_value = 255
+    frame_rate: float | None = None
+    pixel_size: float | None = None
+    pixel_width: float | None = None
+    exposure: float | None = None
+    frame_rate_question = pixel_size_hint = ""
+    diagnostics: tuple[Diagnostic, ...] = ()
+    edge_error = _full = 0.0
+    _dtype: Any = np.uint8
+
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.shape = (0, 0)
-        self.numbers: NDArray[np.int64] = np.empty(0, dtype=np.int64)
-        self.max_value = 255
-        self.frame_rate: float | None = None
-        self.pixel_size: float | None = None
-        self.pixel_width: float | None = None
-        self.exposure: float | None = None
-        self.frame_rate_question = ""
-        self.pixel_size_hint = ""
-        self.diagnostics: tuple[Diagnostic, ...] = ()
-        self.edge_error = 0.0
         self.metadata: dict[str, Any] = {}
-
-        self._dtype: Any = np.uint8
-        self._full = 0.0
 
     def _page(self, index: int) -> NDArray[Any]:
         """One picture in the numbers of the file, grey, of the shape and type of the first."""

@@ -223,11 +223,8 @@ def _stated_array(file: Any) -> int:
 
 def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
     """Write a signal to a NumPy file with its times and its unit."""
-    values, time, _ = check_signal(signal)
-    name = str(signal.name)
-    arrays: dict[str, Any] = {name: values, "time": time}
-    arrays |= {f"{name}_units": signal.attrs["units"], "time_units": "s"}
-    np.savez(path, **arrays)
+    (values, time, _), name = check_signal(signal), str(signal.name)
+    np.savez(path, **{name: values, "time": time, f"{name}_units": signal.attrs["units"], "time_units": "s"})
 
 
 # Arrays with names: vectors, and matrices with a channel in each row or column.  Attributes, and arrays of one number or
@@ -449,10 +446,8 @@ def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
 
     values, time, _ = check_signal(signal)
     with hdf5_stream(path) as stream, h5py.File(stream, "w") as file:
-        axis = file.create_dataset("time", data=time)
-        axis.attrs["units"] = "s"
-        data = file.create_dataset(str(signal.name), data=values)
-        data.attrs["units"] = signal.attrs["units"]
+        for name, numbers, unit in (("time", time, "s"), (str(signal.name), values, signal.attrs["units"])):
+            file.create_dataset(name, data=numbers).attrs["units"] = unit
 
 
 # A text table is a block of rows of numbers with the same count of cells, after any header.  Cells are separated by
@@ -875,21 +870,13 @@ def header_values(lines: Iterable[str]) -> dict[str, str]:
     return values
 
 
-def header_rate(
-    values: dict[str, str], where: str, decimal_comma: bool = False, known: float | None = None
-) -> float | None:
-    """Samples per second [Hz] that a header states; None if it does not.
-
-    *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
-    """
-    found = _stated_rates([("", values)], decimal_comma, known)
-    return _one_rate(found, f"{where}: the header") if found else None
-
-
 def _stated_rates(
     levels: Iterable[tuple[str, Mapping[str, Any]]], decimal_comma: bool = False, known: float | None = None
 ) -> dict[str, float]:
-    """Sampling rates [Hz] that the named values of some places state, by their places and names."""
+    """Sampling rates [Hz] that the named values of some places state, by their places and names.
+
+    *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
+    """
     return {
         f"{place}/{key}".lstrip("/"): rate
         for place, values in levels
@@ -1034,7 +1021,8 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
         if known is None and common["time"].size > 2:
             known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
     commas = table.block.decimal_comma and any("," in cell for row in table.block.rows[:_ABOVE] for cell in row)
-    rate = header_rate(values, str(path), commas, known)
+    stated = _stated_rates([("", values)], commas, known)
+    rate = _one_rate(stated, f"{path}: the header") if stated else None
     if times:
         if rate is not None:
             way_out = "correct the header, or name the times otherwise in columns (--columns), such as "
