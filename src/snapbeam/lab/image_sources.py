@@ -712,16 +712,17 @@ class VideoSource(FrameSource):
             self.close()
             self._decoder, self._next = self._frames(), 0
         try:
-            for number in range(self._next, index + 1):
+            while True:
                 frame = next(self._decoder, None)
                 if frame is None:
-                    raise InputError(f"{self.path}: ends after frame {number} of {self.numbers.size}")
+                    raise InputError(f"{self.path}: ends after frame {self._next} of {self.numbers.size}")
                 if frame.shape != self.shape:
-                    raise InputError(f"{self.path}: frame {number} is of shape {frame.shape}, not {self.shape}")
-                self._next = number + 1
+                    raise InputError(f"{self.path}: frame {self._next} is of shape {frame.shape}, not {self.shape}")
+                self._next += 1
+                if self._next > index:
+                    return frame
         except self._av.error.FFmpegError as error:
             raise InputError(f"{self.path}: frame {self._next} cannot be decoded ({error})") from None
-        return frame
 
     def close(self) -> None:
         """Close the file."""

@@ -153,7 +153,7 @@ def covered(rows: Floats, height: int) -> Floats:
         np.bincount(k.ravel(), part.ravel(), (height + 1) * columns)
         for k, part in zip(place, (share, 1.0 - share), strict=True)
     ]
-    return np.asarray(sum(sums).reshape(height + 1, columns)[:height] / len(rows), dtype=np.float64)
+    return np.asarray(np.add(*sums).reshape(height + 1, columns)[:height] / len(rows), dtype=np.float64)
 
 
 @functools.cache
