@@ -142,7 +142,7 @@ lock: constraints.txt
 
 audit: $(VENV)/.installed-dev
 	$(PIP) install --constraint constraints.txt --group archives
-	$(BIN)/python -m pip_audit --requirement constraints.txt --no-deps --disable-pip
+	$(BIN)/python -m pip_audit --strict --requirement constraints.txt --no-deps --disable-pip
 
 release: $(VENV)/.installed-dev
 	$(BIN)/python tests/release/prepare.py "$(VERSION)" "$(REPOSITORY)"

@@ -56,6 +56,7 @@ USES = {
     "": (
         ("python", "-c", _CORE),
         ("python", "-c", _README[0]),
+        ("python", str(Path(__file__).with_name("each_set.py"))),
         "snapbeam --version",
         "python -m snapbeam frequencies --count 3",
         f"snapbeam map --modes 1 --cycles 4 {_GRID} --plot map.png",

@@ -16,6 +16,7 @@ VERSIONS = {
     "src/snapbeam/_version.py": r'^(__version__ = ")([^"]+)(")$',
     "CITATION.cff": r"^(version: )(\S+)()$",
     "codemeta.json": r'^(  "version": ")([^"]+)(",)$',
+    "recipe/recipe.yaml": r'^(  version: ")([^"$]+)(")$',
     "docs/getting-started.md": r"^(  version = \{)([^}]+)(\},)$",
 }
 """File and pattern; the second group is the version."""

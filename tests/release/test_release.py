@@ -206,6 +206,25 @@ def test_no_compiler_is_needed(archives, tmp_path):
         assert {"avx2", "avx512"} & set(sets)
 
 
+def test_an_editable_core_lies_in_the_package(tmp_path):
+    """Also where one build has several configurations, as with Visual Studio, which adds a folder to a plain path."""
+    pytest.importorskip("nanobind", reason="part of the build")
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    cmake = shutil.which("cmake", path=path) or pytest.skip("cmake was not found")
+    words = ["-DSNAPBEAM_EDITABLE=ON", "-DSNAPBEAM_SETS=baseline", f"-DPython_EXECUTABLE={sys.executable}"]
+    done = subprocess.run(
+        [cmake, "-G", "Ninja Multi-Config", "-S", str(ROOT), "-B", str(tmp_path), *words], capture_output=True, text=True,
+        env={**os.environ, "PATH": path},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    rules = (tmp_path / "CMakeFiles" / "impl-Release.ninja").read_text(encoding="utf-8")
+    folders = {
+        Path(found).parent
+        for found in re.findall(r"^build (\S*[/\\]_core[.][\w.-]*(?:so|pyd))[ :]", rules, re.MULTILINE)
+    }
+    assert folders == {ROOT / "src" / "snapbeam"}
+
+
 def test_every_extra_is_tried():
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert set(stated["optional-dependencies"]) == set(alone.EXTRAS)
@@ -213,20 +232,29 @@ def test_every_extra_is_tried():
 
 
 def test_the_conda_recipe_has_the_dependencies_of_the_package():
-    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     recipe = (ROOT / "recipe" / "recipe.yaml").read_text(encoding="utf-8")
-    run = re.search(r"  run:\n((?:    - [^\n]*\n)+)", recipe).group(1)
-    held = {line.strip("- ").replace("matplotlib-base", "matplotlib").replace(" ", "") for line in run.splitlines()}
-    assert held == {*stated["dependencies"], "python" + stated["requires-python"]}
+    held = {}
+    for part in ("build", "host", "run"):
+        lines = re.search(rf"  {part}:\n((?:    [^\n]*\n)+)", recipe).group(1).splitlines()
+        held[part] = {line.strip("- ").replace("matplotlib-base", "matplotlib").replace(" ", "") for line in lines}
+    project = stated["project"]
+    assert held["run"] == {*project["dependencies"], "python" + project["requires-python"]}
+    assert held["host"] == {*stated["build-system"]["requires"], "python", "pip"}
+    assert '${{compiler("cxx")}}' in held["build"]
 
 
 def test_the_paper_cites_what_its_bibliography_has():
-    """Each citation resolves, each entry is cited and has a DOI, and the text has at most 1,000 words."""
+    """Each citation resolves, each entry is cited and has a DOI, the sections are those of JOSS, of at most 1,000 words."""
     text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
     entries = dict(
         re.findall(r"@\w+\{(\w+),(.*?)\n\}", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.DOTALL)
     )
     body = text.split("---", 2)[2]
+    assert re.findall(r"^# (.*)$", body, re.MULTILINE) == [
+        "Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
+        "AI usage disclosure", "References",
+    ]  # fmt: skip
     assert set(re.findall(r"@([a-z]+\d{4})", body)) == set(entries)
     assert all("doi = {10." in entry for entry in entries.values())
     assert len(body.split()) <= 1000

@@ -222,7 +222,8 @@ def test_limits_of_the_design_itself_cost_no_run() -> None:
 def test_no_feasible_design(objectives, quantity, limits, monkeypatch) -> None:
     """Every design that was tried is returned with its distance from each constraint, and the best of them is reported."""
     monkeypatch.setattr("snapbeam.util.diagnostics._told", set())
-    with pytest.warns(sb.DiagnosticWarning, match=r"none of the 12 designs .* loosen a constraint"):
+    count = 13 if (objectives, quantity) == ("speed", "peak_force") else 12  # the search ends with gradients
+    with pytest.warns(sb.DiagnosticWarning, match=rf"none of the {count} designs .* loosen a constraint"):
         ds = sb.uncertainty.optimize_design(
             small_system(location=0.3), {"velocity_amplitude": (0.001, 0.01)}, objectives,
             [
@@ -231,8 +232,8 @@ def test_no_feasible_design(objectives, quantity, limits, monkeypatch) -> None:
             ],
             SPREAD, sb.uncertainty.OptimizerSettings(generations=2, population=6, samples=8, validation_samples=20), integration=HOW,
         )  # fmt: skip
-    assert ds.sizes["tried"] == 12 and ds.sizes["design"] == 1
-    assert "none of the 12 designs" in ds.attrs["termination_reason"]
+    assert ds.sizes["tried"] == count and ds.sizes["design"] == 1
+    assert f"none of the {count} designs" in ds.attrs["termination_reason"]
     assert int(ds["constraints_satisfied"][0]) < 2
     assert (ds["violation"] > 0.0).all() and (ds[f"tried_distance_{quantity}"] < 0.0).all()
     assert (ds["tried_distance_acceleration"] > 0.0).all()

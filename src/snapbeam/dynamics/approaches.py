@@ -139,7 +139,7 @@ def carried(flow: Stroboscope, coordinates: _Array, phase: float) -> _Array:
     part = (phase - flow.clock.striker_phase) % (2.0 * np.pi) / (2.0 * np.pi)
     if part == 0.0:
         return coordinates
-    if not flow.space.of_beam_alone:  # to a tick of the clock
+    if flow.dimension > 2 * flow.space.modes:  # to a tick of the clock
         moved = advance(flow.system, flow.state(coordinates), part, integration=flow.integration)
         found: _Array = flow.space.of(moved.flat)[0]
         return found

@@ -94,6 +94,23 @@ class Equations:
         row = along / np.linalg.norm(along)
         return self.correct(one.y + part * along, row, one.tangent, nearer.table)
 
+    def halved(
+        self, one: Point, other: Point, is_before: Callable[[Point], bool], most: int, tolerance: float = 0.0
+    ) -> tuple[Point, Point]:
+        """The points on both sides of a change between two, by halving, as far as points are found."""
+        sides, parts, size = [one, other], [0.0, 1.0], float(np.linalg.norm(other.y - one.y))
+        for _ in range(most):
+            part = 0.5 * (parts[0] + parts[1])
+            try:
+                spot = self.between(one, other, part)
+            except OrbitNotFoundError:
+                break
+            side = 0 if is_before(spot) else 1
+            sides[side], parts[side] = spot, part
+            if (parts[1] - parts[0]) * size < tolerance:
+                break
+        return sides[0], sides[1]
+
     def observed(self, point: Point) -> tuple[Equations, Point]:
         """Equations and point at the phase from which the next one is sought."""
         return self, point
@@ -204,27 +221,12 @@ def follow(
     max_points: int,
     step: float,
     max_step: float,
-    progress: Callable[[int, int], object] | None,
+    progress: Callable[[int, int], object],
     what: str = "orbit",
 ) -> Path[E_]:
-    """Follow a curve from a point along its tangent.
+    """Follow a curve from a point along its tangent, in steps from *step* to *max_step*.
 
-    Parameters
-    ----------
-    equations : Equations
-    first : Point
-    limits : array of shape (k, 2)
-        Minimum and maximum of each of the last k unknowns.
-    max_points : int
-    step, max_step : float
-        First and maximum distance between points.
-    progress : callable, optional
-    what : str
-        Noun of a point, for the reason of the end.
-
-    Returns
-    -------
-    Path
+    *limits*, of shape (k, 2), are those of the last k unknowns; *what* is the noun of a point, for the reason of the end.
     """
     path: Path[E_] = Path([(equations, first)])
     points, count, length = path.points, len(limits), step
@@ -266,8 +268,7 @@ def follow(
         ended = equations.end_at(last, point)
         if ended is None or ended[1]:
             points.append((equations, point))
-            if progress is not None:
-                progress(len(points), max_points)
+            progress(len(points), max_points)
         if ended is not None or crossed:
             path.end = f"limit of {'the' if count == 1 else 'a'} parameter" if ended is None else ended[0]
             return path

@@ -16,12 +16,11 @@ from scipy.stats import beta
 from snapbeam.dynamics.flow import AdvancedStates, Flow, minimal_period
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, in_unit, labelled
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, in_unit, labelled, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, jacobian, orbit_tolerance, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, finite_array, integer, seed_of, within
 
@@ -46,6 +45,7 @@ _SAME = 1e-5
 _SIGMAS = 3.0
 _TRANSIENT = 1000
 """Minimum number of periods to leave out."""
+_PARTS = 4
 _FEW = 8
 """Irregular runs of a group that exponents are taken of."""
 
@@ -124,13 +124,6 @@ class Cloud:
         return found
 
 
-def cloud_of(points: _Array) -> Cloud:
-    """Cloud of points of shape (points, d): one half determines the distance of the other."""
-    first, second = points[::2], points[1::2]
-    away, _ = cKDTree(first).query(second)
-    return Cloud(points, cKDTree(points), 1.5 * float(np.quantile(away, 0.99)))
-
-
 @dataclass(frozen=True, eq=False)
 class Attractor:
     """One attractor: a periodic orbit or a chaotic set, with its states and its verification.
@@ -138,15 +131,6 @@ class Attractor:
     See Also
     --------
     snapbeam.dynamics.find_attractors, snapbeam.dynamics.Attractors
-
-    Examples
-    --------
-    >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> found = sb.dynamics.find_attractors(system, 12)
-    >>> [(each.kind, each.period) for each in found.attractors]
-    [('periodic', 1), ('periodic', 1), ('periodic', 1)]
     """
 
     kind: str
@@ -168,7 +152,11 @@ class Attractor:
     @cached_property
     def trapping_region(self) -> list[Ball] | Cloud:
         """Region from which a state is known to converge to the attractor."""
-        return balls_of(self.orbit) if self.orbit is not None else cloud_of(self.points)
+        if self.orbit is not None:
+            return balls_of(self.orbit)
+        # one half determines the distance of the other
+        away, _ = cKDTree(self.points[::2]).query(self.points[1::2])
+        return Cloud(self.points, cKDTree(self.points), 1.5 * float(np.quantile(away, 0.99)))
 
     def __repr__(self) -> str:
         if self.orbit is not None:
@@ -183,15 +171,6 @@ class Attractors:
     See Also
     --------
     snapbeam.dynamics.find_attractors, snapbeam.dynamics.basins_of_attraction
-
-    Examples
-    --------
-    >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> found = sb.dynamics.find_attractors(system, 12)
-    >>> found.undecided
-    0.0
     """
 
     flow: Flow
@@ -343,48 +322,41 @@ def find_attractors(
     >>> from snapbeam import paper
     >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
+    >>> [(each.kind, each.period) for each in found.attractors], found.undecided
+    ([('periodic', 1), ('periodic', 1), ('periodic', 1)], 0.0)
     >>> f"{found.unseen_share():.2f}"  # upper bound at 95 % of the fraction of states that go to other attractors
     '0.22'
     """
     flow = flow_of(system, integration)
     require_isolated_orbits(flow)
-    leave, rule = (
-        settling_periods(flow, least=_TRANSIENT)
-        if transient is None
-        else (integer("transient", transient, 1, 10**7), "as given")
-    )
+    leave, rule = settling_periods(flow, transient, least=_TRANSIENT, fewest=1)
     most, lasts = (integer("max_periods", max_periods, 1, 512), integer("check_periods", check_periods, 20, 10**7))
     rows = _states_of(flow, states, seed_of(rng))
     allowed = orbit_tolerance(tolerance)
 
-    told = counting(progress, "attractors", "parts")
-
-    def report(done: int) -> None:
-        if told is not None:
-            told(done, 4)
-
-    report(0)
+    report = reported(progress, "attractors", "parts")
+    report(0, _PARTS)
     there = flow.advance(rows, leave)
     seen = flow.advance(there, 2 * most, every=True)
-    report(1)
+    report(1, _PARTS)
     assert seen.every is not None
     known = np.asarray(np.isfinite(seen.states).all(axis=1))
     repeats = np.where(known, minimal_period(np.where(known[:, None, None], seen.every, 0.0), _REPEATS), 0)
     verified, reasons = _orbits(flow, seen, repeats, allowed)
     orbits = [orbit for orbit, _ in verified]
-    report(2)
+    report(2, _PARTS)
     regular = [_periodic(orbit, verification) for orbit, verification in verified]
     labels = np.full(len(rows), UNDECIDED)
     for s in np.flatnonzero(repeats > 0):
         labels[s] = _nearest(orbits, seen.states[s])
     irregular = np.flatnonzero(known & (repeats == 0))
     chaotic, members = _chaotic(flow, rows, seen, irregular, most, lasts, orbits)
-    report(3)
+    report(3, _PARTS)
     found, order = _ordered([*regular, *chaotic])
     for number, group in enumerate(members):
         labels[group] = len(regular) + number
     labels = np.where(labels >= 0, order[np.maximum(labels, 0)] if len(order) else UNDECIDED, UNDECIDED)
-    report(4)
+    report(4, _PARTS)
     return Attractors(flow, found, labels, lasts, _reason(labels, known, repeats, leave, rule, most, reasons))
 
 
@@ -519,16 +491,11 @@ def _chaotic(
 
 def _groups(every: _Array) -> list[NDArray[np.int64]]:
     """Runs whose points lie among each other's, shape (runs, periods, d); in the order of their first run."""
-    count = len(every)
-    group = np.full(count, UNDECIDED)
-    trees = [cKDTree(run[np.isfinite(run).all(axis=1)]) for run in every]
+    count, trees = len(every), [cKDTree(run[np.isfinite(run).all(axis=1)]) for run in every]
+    group = np.arange(count)
     for i in range(count):
-        for j in range(i):
-            if group[j] == j and trees[i].n and trees[j].n and _mingle(trees[i], trees[j]):
-                group[i] = j
-                break
-        else:
-            group[i] = i
+        like = (j for j in range(i) if group[j] == j and trees[i].n and trees[j].n and _mingle(trees[i], trees[j]))
+        group[i] = next(like, i)
     return [np.flatnonzero(group == i) for i in range(count) if group[i] == i]
 
 

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.dynamics.arclength import Equations, Path, Point, follow
-from snapbeam.dynamics.results import beam_attributes, in_unit, labelled
+from snapbeam.dynamics.results import beam_attributes, in_unit, labelled, reported
 from snapbeam.dynamics.shooting import OrbitNotFoundError
 from snapbeam.model.drive.fixed_stop import FixedStop
 from snapbeam.model.harvester import Harvester
 from snapbeam.model.state import amplitude_scale
 from snapbeam.model.striker import Contact
 from snapbeam.model.system import System
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.provenance import canonical_json
 from snapbeam.util.singular_values import lstsq
 from snapbeam.util.validation import InputError, checked, choice, instance, integer, positive, shown, within
@@ -138,24 +137,20 @@ def backbone_curve(
     structure = _Structure(system, well)
     integer("mode", mode, 1, structure.size)
     motions = _Motions(structure, limit, np.pi / lowest_frequency_ratio)
-    report = counting(progress, "backbone curve", "points")
+    report = reported(progress, "backbone curve", "points")
     first = motions.about_well(mode) if well != "both" else motions.across()
 
     def branch(way: float, before: int, most: int) -> Path[_Motions]:
-        def told(done: int, _: int) -> object:
-            return report(before + done, max_points) if report is not None else None
-
         start = first._replace(tangent=way * first.tangent)
         path = follow(
             motions, start, limits=np.empty((0, 2)), max_points=most, step=min(_FIRST, max_step), max_step=max_step,
-            progress=told, what="motion",
+            progress=lambda done, _: report(before + done, max_points), what="motion",
         )  # fmt: skip
         path.events = [*begun, *path.events][: len(path.points)]
         return path
 
     begun = [_measures(structure, first)]
-    if report is not None:
-        report(1, max_points)
+    report(1, max_points)
     if well != "both":
         path = branch(1.0, 0, max_points)
         return _dataset(structure, path.events, path.end)

@@ -12,10 +12,10 @@ from scipy import ndimage, stats
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.periodic_orbits import state_of
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, reported
 from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.state import State
-from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
+from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.proportions import proportion
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, instance, integer, shown
 
@@ -100,18 +100,16 @@ def basins_of_attraction(
     flow = attractors.flow
     step = integer("every", every, 1, 10**4)
     rates = [-each.exponent for each in attractors.attractors if each.orbit is not None]
-    total, rule = (
-        settling_periods(flow, rates) if periods is None else (integer("periods", periods, 1, 10**6), "as given")
-    )
+    total, rule = settling_periods(flow, periods, rates, name="periods", fewest=1)
     names, columns, rows = _plane(flow, grid, fixed_coordinates)
-    label, after = _labelled(attractors, flow, rows, total, step, counting(progress, "basins", "periods"))
+    label, after = _labelled(attractors, flow, rows, total, step, reported(progress, "basins", "periods"))
     dataset = _dataset(attractors, names, columns, label, after, total)
     dataset.attrs["termination_reason"] = (
         f"{total} periods ({rule})" if (label == UNDECIDED).any() else "every state is decided"
     )
     if isinstance(flow, Stroboscope):
         tested, interior = _tested(dataset["basin"].values)
-        finer, _ = _labelled(attractors, flow.with_half_step, rows[tested], total, step, None)
+        finer, _ = _labelled(attractors, flow.with_half_step, rows[tested], total, step, reported(False, "", ""))
         _add_sensitivity(dataset, tested, interior, finer != label[tested])
     told = _diagnostics(dataset, attractors)
     dataset.attrs["diagnostics"] = to_json(told)
@@ -199,7 +197,7 @@ def _plane(
 
 
 def _labelled(
-    found: Attractors, flow: Flow, rows: _Array, total: int, step: int, progress: Callable[[int, int], object] | None
+    found: Attractors, flow: Flow, rows: _Array, total: int, step: int, progress: Callable[[int, int], object]
 ) -> tuple[NDArray[np.int64], _Array]:
     label, after = np.full(len(rows), UNDECIDED), np.full(len(rows), np.nan)
     among = np.zeros((len(found.attractors), len(rows)), dtype=np.int64)
@@ -227,9 +225,8 @@ def _labelled(
             taken |= inside
         lost = ~np.isfinite(x).all(axis=1)
         open_, x = open_[~taken & ~lost], x[~taken & ~lost]
-        if progress is not None:
-            progress(done, total)
-    if progress is not None and done < total:
+        progress(done, total)
+    if done < total:
         progress(total, total)
     return label, after
 

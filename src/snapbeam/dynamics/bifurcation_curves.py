@@ -30,13 +30,12 @@ from snapbeam.dynamics.approaches import penetrations, turning_points
 from snapbeam.dynamics.arclength import OrbitEquations, Point, follow, tangent_of
 from snapbeam.dynamics.branches import SpecialPoint
 from snapbeam.dynamics.flow import Flow
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, impacts_of, jacobian, orbit_tolerance
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.parameters import ratio_of
 from snapbeam.model.quantity import numbered, split_name
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.singular_values import pinv, svd
 from snapbeam.util.validation import InputError, checked, instance, integer, interval, shown, within
 
@@ -180,26 +179,14 @@ class _Curve(OrbitEquations):
 
     def events(self, last: Point, point: Point, number: int) -> list[tuple[str, Point]]:
         """Points of codimension two between two points, by halving."""
-        found = []
-        ahead = _monitors(self, last, point)
-        size = float(np.linalg.norm(point.y - last.y))
+        ahead, found = _monitors(self, last, point), []
         for kind, begun in _monitors(self, last, last).items():
-            if not begun * ahead[kind] < 0.0:
-                continue
-            low, high, nearest = 0.0, 1.0, point
-            for _ in range(_HALVINGS):
-                part = 0.5 * (low + high)
-                try:
-                    nearest = self.between(last, point, part)
-                except OrbitNotFoundError:
-                    break
-                if begun * _monitors(self, last, nearest)[kind] > 0.0:
-                    low = part
-                else:
-                    high = part
-                if (high - low) * size < self.tolerance:
-                    break
-            found.append((kind, nearest))
+            if begun * ahead[kind] < 0.0:
+
+                def is_before(spot: Point, kind: str = kind, begun: float = begun) -> bool:
+                    return begun * _monitors(self, last, spot)[kind] > 0.0
+
+                found.append((kind, self.halved(last, point, is_before, _HALVINGS, self.tolerance)[1]))
         return found
 
     def has_returned(self, point: Point, first: tuple[_Curve, Point], near: float) -> bool:
@@ -418,7 +405,7 @@ def bifurcation_curve(
     # the special point was located with other steps of differences: once more, across the curve
     table = curve.derivative(y)[2]
     first = curve.correct(y, tangent_of(table, np.ones(y.size)), np.ones(y.size), table)
-    report = counting(progress, "bifurcation curve", "points")
+    report = reported(progress, "bifurcation curve", "points")
     back, ahead = (
         follow(
             curve,

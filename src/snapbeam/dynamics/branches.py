@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from snapbeam.dynamics.arclength import OrbitEquations, Path, Point, follow, tangent_of
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, orbit_at
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, jacobian, orbit_tolerance
 from snapbeam.dynamics.stroboscope import Stroboscope, jumps
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, choice, integer, interval, shown, within
 
@@ -50,16 +49,6 @@ class SpecialPoint:
     See Also
     --------
     snapbeam.dynamics.switch_branch, snapbeam.dynamics.bifurcation_curve
-
-    Examples
-    --------
-    >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
-    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
-    >>> [(point.kind, round(point.value, 4)) for point in branch.special_points]
-    [('fold', 0.0379)]
     """
 
     kind: str
@@ -84,16 +73,6 @@ class Branch:
     See Also
     --------
     snapbeam.dynamics.continuation, snapbeam.dynamics.SpecialPoint
-
-    Examples
-    --------
-    >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
-    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=5)
-    >>> len(branch.orbits), branch.termination_reason
-    (5, '5 orbits, the maximum (max_points)')
     """
 
     name: str
@@ -352,18 +331,7 @@ def _unsettled(point: Point) -> float:
 
 def _grazing(orbits: _Orbits, one: Point, other: Point, at: int) -> SpecialPoint:
     """Special point at which the number of impacts changes between two orbits, by bisection."""
-    sides = [one, other]
-    low, high = 0.0, 1.0
-    for _ in range(_HALVINGS):
-        part = 0.5 * (low + high)
-        try:
-            spot = orbits.between(one, other, part)
-        except OrbitNotFoundError:
-            break
-        if spot.came.impacts == one.came.impacts:
-            low, sides[0] = part, spot
-        else:
-            high, sides[1] = part, spot
+    sides = orbits.halved(one, other, lambda spot: spot.came.impacts == one.came.impacts, _HALVINGS)
     width = abs(float(sides[1].y[-1] - sides[0].y[-1])) * float(orbits.spans[0])
     found = orbits._value(sides[1].y)
     error = width + float(orbits.spans[0]) * _unsettled(sides[1])
@@ -451,9 +419,11 @@ def continuation(
     >>> from snapbeam import paper
     >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
-    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.032))
-    >>> float(branch.values.max())
-    0.032
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
+    >>> len(branch.orbits), branch.termination_reason
+    (12, '12 orbits, the maximum (max_points)')
+    >>> [(point.kind, round(point.value, 4)) for point in branch.special_points]
+    [('fold', 0.0379)]
     """
     low, high = interval("bounds", bounds)
     begun = orbit.flow.value(name)
@@ -470,7 +440,7 @@ def continuation(
     y = np.append(orbit.coordinates, begun / span)
     _, came, table = orbits.derivative(y)
     towards = np.append(np.zeros(y.size - 1), 1.0 if direction == "up" else -1.0)
-    report = counting(progress, "branch", "orbits")
+    report = reported(progress, "branch", "orbits")
     path = follow(
         orbits,
         Point(y, tangent_of(table, towards), came, table, orbit.iterations, orbit.residual),
@@ -480,7 +450,7 @@ def continuation(
         max_step=max_step,
         progress=report,
     )
-    if report is not None and len(path.points) < count:
+    if len(path.points) < count:
         report(len(path.points), len(path.points))
     return _branch(name, path)
 

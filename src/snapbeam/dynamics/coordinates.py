@@ -63,16 +63,6 @@ class Coordinates:
         )
 
     @property
-    def of_beam_alone(self) -> bool:
-        """True if strikers and circuits have no states."""
-        return not self._own
-
-    @property
-    def has_memory(self) -> bool:
-        """True if a contact leaves an indentation."""
-        return any(name == "indentation" for name, _, _ in self._own)
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Names of the coordinates."""
         modes = range(1, self.modes + 1)

@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.flow import Flow, minimal_period
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot, state_of
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, reported
 from snapbeam.dynamics.shooting import OrbitNotFoundError, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, integer, positive
 
@@ -42,15 +41,6 @@ class EdgeState:
     See Also
     --------
     snapbeam.dynamics.edge_tracking
-
-    Examples
-    --------
-    >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
-    >>> edge.orbit.period, edge.orbit.is_stable
-    (1, False)
     """
 
     flow: Flow
@@ -148,8 +138,8 @@ def edge_tracking(
     >>> from snapbeam import paper
     >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
-    >>> edge.termination_reason
-    '25 periods; it settled on an orbit of period 1'
+    >>> edge.termination_reason, edge.orbit.is_stable
+    ('25 periods; it settled on an orbit of period 1', False)
     """
     flow = flow_of(system, integration, "reference")
     total, ahead = integer("periods", periods, 2, 10**6), integer("horizon", horizon, 1, 10**6)
@@ -173,7 +163,7 @@ def edge_tracking(
     distances, closest = [], 0.0
     stopped = f"{total} periods"
     begin = True
-    report = counting(progress, "edge tracking", "periods")
+    report = reported(progress, "edge tracking", "periods")
     for period in range(total):
         if begin:
             bracket = _bisect(flow, low, high, near, ahead, decide)
@@ -199,9 +189,8 @@ def edge_tracking(
             stopped = f"after {period + 1} periods the two states are equal to rounding; increase bisect_threshold"
             break
         begin = size > far
-        if report is not None:
-            report(period + 1, total)
-    if report is not None and len(states) < total:
+        report(period + 1, total)
+    if len(states) < total:
         report(len(states), len(states))
     if closest > near:
         stopped += (

@@ -14,11 +14,10 @@ from scipy import stats
 
 from snapbeam.dynamics.flow import InitialConditions, held_in_space, starts_of
 from snapbeam.model.integration import Integration
+from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.simulation.save import code_flags
-from snapbeam.solver.assemble import cycles_of, make_ensemble, run_columns
-from snapbeam.solver.engines import engine_of
-from snapbeam.solver.statistics import statistics_of
+from snapbeam.solver.assemble import cycles_of, run_columns
 from snapbeam.sweeps.compute import CheckpointOptions, compute_table
 from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
@@ -191,14 +190,6 @@ def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
     return count, lasting, exposure, distance, marks.size
 
 
-def checked_cycles(name: str, values: ArrayLike, most: float) -> NDArray[np.int64]:
-    """Whole numbers of cycles in increasing order, at most *most*."""
-    found = [integer(f"{name}[{i}]", value, 0, int(most)) for i, value in enumerate(np.atleast_1d(values).tolist())]
-    if not found or (np.diff(found) <= 0).any():
-        raise InputError(f"{name} = {found}: must be increasing whole numbers of cycles")
-    return np.array(found, dtype=np.int64)
-
-
 # What a sweep keeps of many starts at every point: when each snapped last, and where it ended.
 
 
@@ -238,44 +229,21 @@ class LifetimeWork(PointWork):
         side = -1 if self.setup.system.striker is None or self.setup.system.striker.side == "below" else 1
         for s in range(count):
 
-            def report(done: int, s: int = s) -> None:
+            def report(done: int, _: int, s: int = s) -> None:
                 if progress is not None:
                     progress((s * size + done) // count, size)
 
-            found = self._integrate(points, s, threads, report)
+            def start(system: System, state: State | None, own: Columns, s: int = s) -> State:
+                return self.initial_conditions.state(system, s, state, own.get("contact.location"))
+
+            # how long it goes on is what is asked
+            found = self.setup.integrate(points, threads, report, start=start, endless=True)
             integers[0, s], integers[1, s] = found["status"], found["zero_crossings"]
             integers[2, s] = found["zero_crossings_last_quarter"]
             integers[3, s] = np.where(found["final_well"] == side, -1, 1)
             integers[4, s] = found["final_well_proven"]
             numbers[s] = found["last_zero_crossing"] / cycle
         return ResultTable(integers.reshape(-1, size).T.copy(), numbers.T.copy())
-
-    def _integrate(
-        self, points: Columns, number: int, threads: int | None, report: Callable[[int], object]
-    ) -> dict[str, NDArray[Any]]:
-        """Every point from one start.
-
-        A run ends early where it provably snaps no more, and never because it is sure to be called continuous: how
-        long it goes on is what is asked.
-        """
-        setup, found, done = self.setup, dict[str, NDArray[Any]](), 0
-        size = next(iter(points.values())).size
-        for system, integration, which, own in setup.groups(points):
-            begun = self.initial_conditions.state(
-                system, number, setup.start_of(system, own), own.get("contact.location")
-            )
-            columns = {name: values for name, values in own.items() if not name.startswith("initial_state.")}
-            ensemble = make_ensemble(system, integration, columns, start=begun)
-            ensemble.runs["decide_crossings"] = -1
-
-            def inside(finished: int, _: int, before: int = done) -> object:
-                return report(before + finished)
-
-            accumulators_of_runs = engine_of(ensemble).run_ensemble(ensemble, threads, inside)
-            for name, values in statistics_of(ensemble, accumulators_of_runs).items():
-                found.setdefault(name, np.zeros(size, dtype=values.dtype))[which] = values
-            done += which.size
-        return found
 
     def _cycles(self, points: Columns) -> NDArray[np.float64]:
         """Seconds of a cycle of each point."""
@@ -380,7 +348,8 @@ def lifetime_map(
     cycles = CYCLES if integration.cycles is None else integration.cycles
     cycles_after = _after(after, cycles, settings)
     integration = integration.replace(cycles=cycles, early_termination=True)
-    setup = _setup(held_in_space(system), axes, integration)
+    held = held_in_space(system)
+    setup = sweep_setup(held, PointList(_own_point(held)) if axes is None else axes, integration)
     work = LifetimeWork(setup, None, starts_of(initial_conditions))
     keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
     table, made = compute_table(work, keeping, cluster=cluster, progress=counting(progress, "lifetimes"))
@@ -405,13 +374,10 @@ def _after(after: ArrayLike | None, cycles: int, settings: LifetimeSettings) -> 
         )
     if after is None:
         after = sorted({int(part) for part in (cycles / 8, cycles / 4, cycles / 2, observed) if part <= observed})
-    return checked_cycles("after", after, observed)
-
-
-def _setup(system: System, axes: Any, integration: Integration) -> SweepSetup:
-    if axes is None:
-        axes = PointList(_own_point(system))
-    return sweep_setup(system, axes, integration)
+    found = [integer(f"after[{i}]", each, 0, int(observed)) for i, each in enumerate(np.atleast_1d(after).tolist())]
+    if not found or (np.diff(found) <= 0).any():
+        raise InputError(f"after = {found}: must be increasing whole numbers of cycles")
+    return np.array(found, dtype=np.int64)
 
 
 def _own_point(system: System) -> dict[str, NDArray[np.float64]]:
@@ -510,43 +476,21 @@ def refit(dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: 
     }
     for name, (values, text) in words.items():
         result[name] = (dims, values, {"units": "1", "long_name": text})
-    _probabilities(result, dims, good, time, lasting, runs["end_well"].values, cycles_after, settings)
+
+    def enter(name: str, dim: str, hits: list[NDArray[np.int64]], words: str) -> None:
+        table = np.stack(hits, axis=-1)
+        parts = proportion(table, np.broadcast_to(good.sum(axis=-1)[..., None], table.shape), settings.confidence)
+        for ending, values, text in zip(
+            ("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True
+        ):
+            result[f"{name}{ending}"] = ((*dims, dim), values, {"units": "1", "long_name": f"{text}{words}"})
+
+    ended, well = good & ~lasting, runs["end_well"].values
+    result[WELL] = ((WELL,), list(WELLS), {"long_name": "well that a run ends about"})
+    hits = [(ended & (well == side)).sum(axis=-1) for side in (-1, 1)]
+    enter("end_probability", WELL, hits, "probability of ending in a well")
+    result[AFTER] = ((AFTER,), cycles_after, {"units": "1", "long_name": "cycles"})
+    hits = [(good & (time > cycle)).sum(axis=-1) + (lasting & (time == cycle)).sum(axis=-1) for cycle in cycles_after]
+    enter("snapping_probability", AFTER, hits, "probability of snapping on after so many cycles")
     result.attrs |= {"settling_cycles": settings.settling_cycles, "confidence": settings.confidence}
     return result
-
-
-def _probabilities(
-    result: xr.Dataset,
-    dims: tuple[Any, ...],
-    good: NDArray[np.bool_],
-    time: NDArray[np.float64],
-    lasting: NDArray[np.bool_],
-    well: NDArray[np.int8],
-    cycles_after: NDArray[np.int64],
-    settings: LifetimeSettings,
-) -> None:
-    """Enter the probability of each end, and of snapping on after some cycles."""
-    total = good.sum(axis=-1)
-    ended = good & ~lasting
-    hits = np.stack([(ended & (well == side)).sum(axis=-1) for side in (-1, 1)], axis=-1)
-    result[WELL] = ((WELL,), list(WELLS), {"long_name": "well that a run ends about"})
-    _enter(result, "end_probability", (*dims, WELL), hits, total, "probability of ending in a well", settings)
-    on = np.stack([(good & (time > cycle)).sum(axis=-1) + (lasting & (time == cycle)).sum(axis=-1)
-                   for cycle in cycles_after], axis=-1)  # fmt: skip
-    result[AFTER] = ((AFTER,), cycles_after, {"units": "1", "long_name": "cycles"})
-    words = "probability of snapping on after so many cycles"
-    _enter(result, "snapping_probability", (*dims, AFTER), on, total, words, settings)
-
-
-def _enter(
-    result: xr.Dataset,
-    name: str,
-    dims: tuple[Any, ...],
-    hits: NDArray[np.int64],
-    total: NDArray[np.int64],
-    words: str,
-    settings: LifetimeSettings,
-) -> None:
-    parts = proportion(hits, np.broadcast_to(total[..., None], hits.shape), settings.confidence)
-    for ending, values, text in zip(("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True):
-        result[f"{name}{ending}"] = (dims, values, {"units": "1", "long_name": f"{text}{words}"})

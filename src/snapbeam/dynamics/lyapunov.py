@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.flow import AdvancedStates, Flow
-from snapbeam.dynamics.results import fixed_parameters, in_unit, labelled
+from snapbeam.dynamics.results import fixed_parameters, in_unit, labelled, reported
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup
@@ -18,7 +18,7 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.simulation.request import cycle_of
 from snapbeam.sweeps.points import Points, points_of
-from snapbeam.util.diagnostics import Diagnostic, counting, tell, to_json
+from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, shown, within
 
 if TYPE_CHECKING:
@@ -100,13 +100,13 @@ def lyapunov_spectrum(
     flow = flow_of(system, integration)
     count = integer("k", k, 1, flow.dimension)
     total = integer("periods", periods, _BLOCKS, 10**7)
-    before, rule = _transient(flow, transient, 0)
+    before, rule = settling_periods(flow, transient)
     begun, points, columns = _runs(flow, states, axes)
     advanced = flow.advance(begun, before, points=columns) if before else flow.advance(begun, 1, points=columns)
     runs = advanced.states.shape[0]
     frame = np.tile(np.eye(flow.dimension)[:count], (runs, 1, 1))
     growth, crossed = np.empty((total, runs, count)), np.zeros((total, runs), dtype=bool)
-    report = counting(progress, "Lyapunov spectrum", "periods")
+    report = reported(progress, "Lyapunov spectrum", "periods")
     together = max(1, _TOGETHER // runs)
     done = 0
     while done < total:
@@ -122,15 +122,10 @@ def lyapunov_spectrum(
                 crossed[i] = _crossed(found)
             advanced = ahead
         done += some
-        if report is not None:
-            report(done, total)
+        report(done, total)
     dataset = _dataset(flow, growth, crossed, points, before)
     dataset.attrs["termination_reason"] = _stopped(total, before, rule)
     return dataset
-
-
-def _transient(flow: Flow, given: int | None, least: int) -> tuple[int, str]:
-    return settling_periods(flow) if given is None else (integer("transient", given, least, 10**7), "as given")
 
 
 def _stopped(total: int, before: int, rule: str) -> str:
@@ -314,14 +309,14 @@ def largest_lyapunov(
     """
     flow = flow_of(system, integration)
     total = integer("periods", periods, _BLOCKS, 10**7)
-    before, rule = _transient(flow, transient, 1)
+    before, rule = settling_periods(flow, transient, fewest=1)
     size = within("distance", distance, *_DISTANCES, closed="both")
     begun, _, _ = _runs(flow, states, None)
     here = flow.advance(begun, before).states
     runs = here.shape[0]
     along = np.tile(np.ones(flow.dimension) / np.sqrt(flow.dimension), (runs, 1))
     growth = np.empty((total, runs))
-    report = counting(progress, "largest Lyapunov exponent", "periods")
+    report = reported(progress, "largest Lyapunov exponent", "periods")
     for period in range(total):
         both = flow.advance(np.concatenate([here, here + size * along]), 1).states
         here, apart = both[:runs], both[runs:] - both[:runs]
@@ -329,11 +324,15 @@ def largest_lyapunov(
         with np.errstate(divide="ignore", invalid="ignore"):
             growth[period] = np.where(away > 0.0, np.log(away / size), np.nan)
             along = np.where((away > 0.0)[:, None], apart / away[:, None], along)
-        if report is not None:
-            report(period + 1, total)
+        report(period + 1, total)
     rate = growth / flow.period
-    lost, unit = np.isnan(growth).any(axis=0), _unit(flow)
-    told = _merged(int(lost.sum()), lost.size, size)
+    lost, unit = int(np.isnan(growth).any(axis=0).sum()), _unit(flow)
+    message = (
+        f"distance = {size:g}: the two trajectories become equal to rounding within a period, or fail, in {lost} of {runs} "
+        "runs, whose exponents are NaN; increase distance, or use lyapunov_spectrum"
+    )
+    numbers = {"merged": float(lost), "runs": float(runs)}
+    told = (Diagnostic("dynamics.trajectories_merged", message, numbers),) if lost else ()
     tell(told)
     return labelled(
         {
@@ -343,17 +342,7 @@ def largest_lyapunov(
         None,
         fixed_parameters(flow) | {
             "title": "largest Lyapunov exponent from two trajectories", "periods": total, "period": flow.period,
-            "transient": before, "termination_reason": _stopped(total, before, rule), "merged": int(lost.sum()),
+            "transient": before, "termination_reason": _stopped(total, before, rule), "merged": lost,
             "diagnostics": to_json(told),
         },
     )  # fmt: skip
-
-
-def _merged(lost: int, runs: int, size: float) -> tuple[Diagnostic, ...]:
-    if not lost:
-        return ()
-    message = (
-        f"distance = {size:g}: the two trajectories become equal to rounding within a period, or fail, in {lost} of {runs} "
-        "runs, whose exponents are NaN; increase distance, or use lyapunov_spectrum"
-    )
-    return (Diagnostic("dynamics.trajectories_merged", message, {"merged": float(lost), "runs": float(runs)}),)

@@ -45,15 +45,6 @@ class PeriodicOrbit:
     See Also
     --------
     snapbeam.dynamics.periodic_orbit, snapbeam.dynamics.continuation
-
-    Examples
-    --------
-    >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
-    >>> orbit.is_stable, bool(abs(orbit.multipliers).max() < 1.0)
-    (True, True)
     """
 
     flow: Flow
@@ -128,21 +119,7 @@ class PeriodicOrbit:
         return self.flow
 
     def plot(self, kind: str = "phase_portrait", ax: Any = None, **options: Any) -> Any:
-        """Draw the orbit over its whole period, or its Floquet multipliers.
-
-        Parameters
-        ----------
-        kind : {"phase_portrait", "multipliers"}
-            Picture to draw.
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw in; new ones by default.
-        **options
-            Options of :func:`snapbeam.plot.plot_phase_portrait` or :func:`snapbeam.plot.plot_multipliers`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
+        """Draw the orbit over its whole period (``"phase_portrait"``), or its ``"multipliers"``; returns the axes."""
         if choice("kind", kind, ("phase_portrait", "multipliers")) == "multipliers":
             return plotter("plot_multipliers")(self.to_dataset(), ax=ax, **options)
         flow = self._stroboscope
@@ -239,8 +216,8 @@ def periodic_orbit(
     >>> from snapbeam import paper
     >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
-    >>> orbit.period, orbit.residual < 1e-10
-    (1, True)
+    >>> orbit.period, orbit.residual < 1e-10, orbit.is_stable
+    (1, True, True)
     """
     flow = flow_of(system, integration, "reference")
     require_isolated_orbits(flow)
@@ -253,7 +230,7 @@ def periodic_orbit(
         raise InputError(f"phase = {shown(phase)}: is for a System")
     periods = integer("period", period, 1, 10_000)
     allowed = orbit_tolerance(tolerance)
-    x = _guess_of(flow, guess)
+    x = orbit_at(guess, flow).coordinates if isinstance(guess, PeriodicOrbit) else state_of(flow, "guess", guess)
     before = integer("transient", transient, 0, 10**7)
     if before:
         x = flow.advance(x[None], before).states[0]
@@ -284,12 +261,6 @@ def periodic_orbit(
 
 def _points(orbits: Sequence[PeriodicOrbit], flow: Flow) -> tuple[_Array, ...]:
     return tuple(point for orbit in orbits for point in orbit_at(orbit, flow).points)
-
-
-def _guess_of(flow: Flow, guess: State | ArrayLike | PeriodicOrbit | None) -> _Array:
-    if isinstance(guess, PeriodicOrbit):
-        return np.array(orbit_at(guess, flow).coordinates)
-    return state_of(flow, "guess", guess)
 
 
 def state_of(flow: Flow, name: str, given: State | ArrayLike | None) -> _Array:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.parameters import lookup, ratio_of
 from snapbeam.simulation.simulate import given_attribute
+from snapbeam.util.diagnostics import counting
 from snapbeam.util.provenance import canonical_json
 
 if TYPE_CHECKING:
@@ -30,6 +31,13 @@ def labelled(
         for name, (dims, values, words) in variables.items()
     }
     return xr.Dataset(found, coords, attrs)
+
+
+def reported(
+    progress: Callable[[int, int], object] | bool | None, what: str, noun: str
+) -> Callable[[int, int], object]:
+    """Function to which a tool reports ``(done, total)``, as :func:`counting`; it does nothing where no report is wanted."""
+    return counting(progress, what, noun) or (lambda done, total: None)
 
 
 def in_unit(unit: str, words: str) -> dict[str, str]:

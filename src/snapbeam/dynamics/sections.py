@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize.elementwise import find_root
 
+from snapbeam.dynamics.results import in_unit, labelled
 from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -29,12 +31,7 @@ _DIRECTIONS = ("up", "down", "both")
 _SAMPLES = 128
 """A period of the drive or, where that is shorter, of the first mode, to find passages in."""
 _ROUNDS = 40
-"""Maximum number of rounds of the secant rule that places a passage on its level."""
-_STALE = 2
-"""Rounds in a row without progress after which a passage counts as placed."""
-_ON_LEVEL = 1e-12
-"""Length of the bracket, over the period, at which a passage counts as placed."""
-_RATES = {"displacement_at_striker": "velocity_at_striker", "midspan_displacement": "midspan_velocity"}
+"""Maximum number of rounds that place a passage on its level."""
 
 
 @checked
@@ -93,9 +90,7 @@ def poincare_section(
     total = integer("periods", periods, 1, 10**6)
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)
-    before, rule = (
-        settling_periods(flow) if transient is None else (integer("transient", transient, 0, 10**7), "as given")
-    )
+    before, rule = settling_periods(flow, transient)
     begun = flow.coordinates()
     if before:
         begun = flow.advance(begun, before).states
@@ -138,7 +133,7 @@ def _passages(
 ) -> tuple[_Array, float, str]:
     """Instants at which a variable passes its level, the maximum distance from it there, and why the search stopped.
 
-    They are found between samples, then by the secant rule (Illinois form) on the run itself.
+    They are found between samples, then on the run itself.
     """
     name, value, direction = level
     spacing = min(period, 1.0 / system.model.reference_frequency) / _SAMPLES
@@ -149,34 +144,19 @@ def _passages(
     at = np.flatnonzero({"up": rising, "down": falling, "both": rising | falling}[direction])
     if not at.size:
         return np.empty(0), 0.0, "no passage"
-    low, high, f_low, f_high = grid[at], grid[at + 1], seen[at], seen[at + 1]
-    side, stale = np.zeros(at.size), np.zeros(at.size, dtype=np.int64)
-    best, least = grid[at], np.abs(seen[at])
-    words = f"the maximum of {_ROUNDS} rounds of the secant rule"
-    for count in range(_ROUNDS):
-        middle = np.where(f_high == f_low, high, (low * f_high - high * f_low) / (f_high - f_low))
-        middle = np.clip(middle, low, high)
-        order = np.argsort(middle, kind="stable")
-        times, back = np.unique(middle[order], return_inverse=True)
-        f = np.empty(at.size)
-        f[order] = (simulate(system, how, sample_times=times).dataset[name].values - value)[back]
-        nearer = np.abs(f) < least
-        best, least = np.where(nearer, middle, best), np.where(nearer, np.abs(f), least)
-        above = f * f_high > 0.0
-        f_low = np.where(above & (side == 1), 0.5 * f_low, np.where(above, f_low, f))
-        f_high = np.where(~above & (side == -1), 0.5 * f_high, np.where(above, f, f_high))
-        low, high = np.where(above, low, middle), np.where(above, middle, high)
-        side = np.where(above, 1, -1)
-        stale = np.where(nearer, 0, stale + 1)
-        if ((least == 0.0) | (high - low <= _ON_LEVEL * period) | (stale >= _STALE)).all():
-            words = f"{count + 1} rounds of the secant rule, until no passage came nearer to its level"
-            break
-    return np.unique(best), float(least.max()), words
+
+    def off(times: _Array) -> _Array:
+        """Distances from the level at instants in any order."""
+        instants, back = np.unique(times, return_inverse=True)
+        found: _Array = (simulate(system, how, sample_times=instants).dataset[name].values - value)[back]
+        return found
+
+    found = find_root(off, (grid[at], grid[at + 1]), maxiter=_ROUNDS)
+    words = f"{int(found.nit.max())} rounds of Chandrupatla's rule" + ("" if found.success.all() else ", the maximum")
+    return np.unique(found.x), float(np.abs(found.f_x).max()), words
 
 
 def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope, section: Any) -> xr.Dataset:
-    from snapbeam.util.datasets import xr
-
     if not times.size:
         raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
     data = simulate(system, how, sample_times=times).dataset
@@ -184,10 +164,9 @@ def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope,
                  "modal_velocity"]]  # fmt: skip
     kept = kept.rename(time="point").reset_coords(drop=True)
     phase = (flow.clock.striker_phase + 2.0 * np.pi * times / flow.clock.cycle) % (2.0 * np.pi)
-    result = xr.Dataset(
-        {name: (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars},
-        {"time": ("point", times, {"units": "s", "long_name": "time since the transient"})},
+    return labelled(
+        {str(name): (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars}
+        | {"drive_phase": ("point", phase, in_unit("rad", "phase of the drive"))},
+        {"time": ("point", times, in_unit("s", "time since the transient"))},
         data.attrs | {"title": "Poincare section", "section": str(section)},
     )
-    result["drive_phase"] = ("point", phase, {"units": "rad", "long_name": "phase of the drive"})
-    return result

@@ -119,7 +119,7 @@ def impacts_of(advanced: AdvancedStates) -> NDArray[np.int64]:
 
 def require_isolated_orbits(flow: Flow) -> None:
     """Refuse a system whose periodic orbits form a continuum."""
-    if isinstance(flow, Stroboscope) and flow.space.has_memory:
+    if isinstance(flow, Stroboscope) and any(each.law.memory for each in flow.system.contacts):
         raise InputError(
             "contact: a periodic motion keeps any indentation that its impacts do not deepen, so that orbits and attractors are not "
             "isolated; follow the motion by sb.dynamics.poincare_section or sb.advance"
@@ -137,18 +137,8 @@ def newton(
 ) -> Shot:
     """A root of *residual* by Newton's method, its derivative kept by Broyden's updates as long as steps gain by it.
 
-    Parameters
-    ----------
-    residual, derivative : callable
-        r(x), and r(x) with its derivative.
-    first : array, optional
-        A derivative to begin with.
-    deflate : tuple of arrays
-        Roots to stay away from (Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026).
-
-    Raises
-    ------
-    OrbitNotFoundError
+    *residual* gives r(x), *derivative* r(x) and its derivative, *first* is a derivative to begin with. It stays away from
+    the roots *deflate* (Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026).
     """
     fresh = first is None
     if first is None:

@@ -25,7 +25,7 @@ from snapbeam.solver.engines import engine_of
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import InputError, InputTypeError, instance, shown
+from snapbeam.util.validation import InputError, InputTypeError, instance, integer, shown
 
 _Array = NDArray[np.float64]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
@@ -285,12 +285,21 @@ def jumps(flow: Flow) -> bool:
     return isinstance(flow, Stroboscope) and flow.jumps
 
 
-def settling_periods(flow: Flow, rates: ArrayLike = (), least: int = 200) -> tuple[int, str]:
-    """The number of periods after which a motion of *flow* counts as settled, and the rule that gave it.
+def settling_periods(
+    flow: Flow,
+    given: int | None = None,
+    rates: ArrayLike = (),
+    least: int = 200,
+    name: str = "transient",
+    fewest: int = 0,
+) -> tuple[int, str]:
+    """The number of periods after which a motion of *flow* counts as settled, if none is *given*, and the rule that gave it.
 
     It is 16 time constants of the slowest mode, 1/min(zeta_j omega_j), or of further decay *rates*, 1/s (per period of
     a map, which has no modes), but at least *least* and at most 20,000 periods.
     """
+    if given is not None:
+        return integer(name, given, fewest, 10**7), "as given"
     known = [float(rate) for rate in np.ravel(np.asarray(rates, dtype=np.float64))]
     if isinstance(flow, Stroboscope):
         model = flow.system.struck_model

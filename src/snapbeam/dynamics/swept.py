@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.dynamics.approaches import passage_of
 from snapbeam.dynamics.clock import frequencies_of
 from snapbeam.dynamics.flow import InitialConditions, minimal_period, starts_of
-from snapbeam.dynamics.results import fixed_parameters, labelled
+from snapbeam.dynamics.results import fixed_parameters, labelled, reported
 from snapbeam.dynamics.stroboscope import Stroboscope, settling_periods
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import lookup, ratio_of
@@ -21,7 +21,6 @@ from snapbeam.model.system import System
 from snapbeam.simulation.simulate import simulate
 from snapbeam.solver.assemble import make_ensemble, run_columns
 from snapbeam.solver.statistics import rows_for
-from snapbeam.util.diagnostics import counting
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError, InputTypeError, axis, checked, choice, flag, instance, integer, shown
 
@@ -123,7 +122,11 @@ def bifurcation_diagram(
     """
     swept = _Axis(system, name, values)
     kinds = [choice("sweeps", kind, SWEEPS) for kind in sweeps]
-    given, keep = _periods(periods)
+    try:
+        given, keep = periods
+    except (TypeError, ValueError):
+        raise InputTypeError(f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep") from None
+    integer("periods[1]", keep, 2, 10**6)
     flag("grazing", grazing)
     many = None
     if isinstance(initial_conditions, InitialConditions) or initial_conditions:
@@ -131,34 +134,27 @@ def bifurcation_diagram(
     if not kinds and many is None:
         raise InputError("sweeps = (): must be at least one, or initial_conditions at least 1")
     flow = Stroboscope(system, Integration() if integration is None else integration)
-    leave, rule = settling_periods(flow) if given is None else (given, "as given")
+    leave, rule = settling_periods(flow, given, name="periods[0]")
     count, further = swept.values.size, 0 if many is None else many.count
-    told = counting(progress, "bifurcation diagram", "values")
-
-    def report(done: int) -> None:
-        if told is not None:
-            told(done, count * (bool(kinds) + further))
-
-    def kept(x: _Array, at: NDArray[np.int64]) -> tuple[_Array, _Array]:
-        """Recorded states of some runs, shape (runs, keep, d), and impacts and crossings a period."""
-        return _recorded(flow, swept, x, at, leave, keep)
-
+    report, total = reported(progress, "bifurcation diagram", "values"), count * (bool(kinds) + further)
     rows = np.empty((len(kinds) + further, count, keep, flow.dimension))
     counts = np.empty((len(rows), count, 2))
     x = np.repeat(flow.coordinates(), len(kinds), axis=0)
     side_by_side = np.arange(len(kinds))
     for step in range(count if kinds else 0):
         at = np.array([swept.order(kind)[step] for kind in kinds])
-        rows[side_by_side, at], counts[side_by_side, at] = kept(x, at)
+        rows[side_by_side, at], counts[side_by_side, at] = _recorded(flow, swept, x, at, leave, keep)
         x = rows[side_by_side, at, -1]
-        report(step + 1)
+        report(step + 1, total)
     for number in range(further):
         assert many is not None
         location = swept.values if swept.name == "contact.location" else None
         state = many.state(flow.system, number, flow.system.start_state, location)
         begun = np.broadcast_to(flow.coordinates(state), (count, flow.dimension))
-        rows[len(kinds) + number], counts[len(kinds) + number] = kept(begun, np.arange(count))
-        report(count * (bool(kinds) + number + 1))
+        rows[len(kinds) + number], counts[len(kinds) + number] = _recorded(
+            flow, swept, begun, np.arange(count), leave, keep
+        )
+        report(count * (bool(kinds) + number + 1), total)
     labels = [*kinds, *(f"start {number}" for number in range(further))]
     dataset = _diagram(flow, swept, labels, rows, counts, grazing)
     dataset.attrs |= {
@@ -168,18 +164,10 @@ def bifurcation_diagram(
     return dataset
 
 
-def _periods(periods: tuple[int | None, int]) -> tuple[int | None, int]:
-    try:
-        leave, keep = periods
-    except (TypeError, ValueError):
-        raise InputTypeError(f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep") from None
-    left = None if leave is None else integer("periods[0]", leave, 0, 10**7)
-    return left, integer("periods[1]", keep, 2, 10**6)
-
-
 def _recorded(
     flow: Stroboscope, swept: _Axis, x: _Array, at: NDArray[np.int64], leave: int, keep: int
 ) -> tuple[_Array, _Array]:
+    """States that some runs keep, shape (runs, keep, d), and impacts and crossings a period."""
     values, periods = swept.values[at], leave + keep
     if lookup(swept.name).is_run:
         found = [flow.advance(x, periods, every=True, points={swept.name: values})]
@@ -302,7 +290,7 @@ def hysteresis(
     restarts, begun, count = _restarts(system), system.start_state.phase, swept.values.size
     for value in swept.values:
         make_ensemble(system.replace(**{swept.name: float(value)}), settings)
-    told = counting(progress, "hysteresis", "values")
+    told = reported(progress, "hysteresis", "values")
     rows = rows_for(len(system.contacts))
     tables: dict[str, Any] = {
         key: np.full((len(kinds), count), _missing(key, each.dtype), each.dtype) for key, each in rows.items()
@@ -317,8 +305,7 @@ def hysteresis(
         for key, table in tables.items():
             table[i, k] = run.summary[key]
         state = run.final_state
-        if told is not None:
-            told(done, len(places))
+        told(done, len(places))
         if state is None:
             break
         if restarts:

@@ -28,28 +28,12 @@ class Recording:
     Made by :func:`open_recording`. Frames are read on demand and not stored. Use it as a context manager, or call
     :meth:`close`.
 
-    Attributes
-    ----------
-    path
-        File, folder or pattern.
-    shape
-        (height, width) of a frame in the region, pixels.
-    region
-        (first row, last row + 1, first column, last column + 1) in the full frame.
-    numbers
-        Number of each frame counted from the first, int (frames,); a hole is a missing frame.
-    frame_rate, pixel_size, pixel_width
-        Frames per second [Hz] and metres per pixel: its height, for motion along columns, and its width.
-    exposure
-        Shutter time [s], or ``None``.
-    max_value
-        Grey level at which a pixel is saturated.
-    metadata
-        Other metadata of the file.
-    diagnostics
-        Diagnostics of the file.
-    edge_error
-        Standard error [px] of every edge from the way the file stores pictures.
+    ``path`` is the file, folder or pattern; ``shape`` the (height, width) of a frame in the region [px]; ``region``
+    (first row, last row + 1, first column, last column + 1) in the full frame; ``numbers`` the number of each frame
+    counted from the first, where a hole is a missing frame; ``frame_rate`` in Hz; ``pixel_size`` [m] the height of a pixel,
+    for motion along columns, and ``pixel_width`` its width; ``exposure`` the shutter time [s] or None; ``max_value`` the
+    grey level at which a pixel is saturated; ``metadata`` and ``diagnostics`` those of the file, and ``edge_error`` the
+    standard error [px] of every edge from the way the file stores pictures.
 
     Examples
     --------

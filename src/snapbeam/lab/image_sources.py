@@ -23,7 +23,7 @@ from snapbeam.lab.photron import CameraHeader, check_pixels, read_header, read_m
 from snapbeam.lab.signal_formats import is_time, seconds_in, stated_unit
 from snapbeam.lab.signals import unit_factor
 from snapbeam.util.diagnostics import Diagnostic
-from snapbeam.util.hdf5 import open_hdf5
+from snapbeam.util.hdf5 import members_of, open_hdf5
 from snapbeam.util.input_files import refuse_inflated
 from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError
@@ -57,23 +57,21 @@ class FrameSource:
     is the standard error [px] that the format adds to every edge.
     """
 
+    shape = (0, 0)
+    numbers: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+    max_value = 255
+    frame_rate: float | None = None
+    pixel_size: float | None = None
+    pixel_width: float | None = None
+    exposure: float | None = None
+    frame_rate_question = pixel_size_hint = ""
+    diagnostics: tuple[Diagnostic, ...] = ()
+    edge_error = _full = 0.0
+    _dtype: Any = np.uint8
+
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.shape = (0, 0)
-        self.numbers: NDArray[np.int64] = np.empty(0, dtype=np.int64)
-        self.max_value = 255
-        self.frame_rate: float | None = None
-        self.pixel_size: float | None = None
-        self.pixel_width: float | None = None
-        self.exposure: float | None = None
-        self.frame_rate_question = ""
-        self.pixel_size_hint = ""
-        self.diagnostics: tuple[Diagnostic, ...] = ()
-        self.edge_error = 0.0
         self.metadata: dict[str, Any] = {}
-
-        self._dtype: Any = np.uint8
-        self._full = 0.0
 
     def _page(self, index: int) -> NDArray[Any]:
         """One picture in the numbers of the file, grey, of the shape and type of the first."""
@@ -356,16 +354,9 @@ class ArraySource(FrameSource):
         if self.path.suffix.lower() == ".npy":
             self.metadata = {"format": "NumPy stack"}
             return np.load(self.path, mmap_mode="r", allow_pickle=False)
-        import h5py
-
         self._file = open_hdf5(self.path, in_parts=True)
-        found: dict[str, Any] = {}
-
-        def visit(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset) and _are_pictures(item.shape, item.dtype, 1):
-                found[name] = item
-
-        self._file.visititems(visit)
+        arrays = members_of(self._file)[1]
+        found = {name: item for name, item in arrays.items() if _are_pictures(item.shape, item.dtype, 1)}
         if dataset:
             if dataset not in found:
                 raise InputError(
@@ -391,7 +382,7 @@ class ArraySource(FrameSource):
         self._times = [
             np.asarray(item, dtype=np.float64) * seconds_in(name, stated_unit(item.attrs) or None)
             for name, item in found[chosen].parent.items()
-            if isinstance(item, h5py.Dataset) and item.shape == found[chosen].shape[:1] and is_time(name)
+            if getattr(item, "shape", None) == found[chosen].shape[:1] and is_time(name)
         ]
         self.metadata = {"format": "HDF5 stack", "dataset": chosen}
         return found[chosen]
@@ -693,7 +684,7 @@ class VideoSource(FrameSource):
             self.tell_colour(3)
         deep = re.search(r"(9|10|12|14|16|48)(le|be)", name)
         self._format = "gray16le" if deep else "gray"
-        self.max_value = 65535 if deep else 255
+        self.take_type(np.dtype(np.uint16 if deep else np.uint8))
 
     def _cine(self, stream: Any, metadata: dict[str, str], count: int) -> None:
         """Read frame rate, exposure and times of frames from the header of a Phantom recording."""
@@ -715,27 +706,23 @@ class VideoSource(FrameSource):
             levels = frame.to_ndarray(format=self._format)
             yield levels if self._light is None else self._light[levels >> 6]
 
-    def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
-        """Return some frames, in some rows."""
-        out = np.empty(
-            (stop - start, rows[1] - rows[0], self.shape[1]), np.uint16 if self.max_value > 255 else np.uint8
-        )
-        if self._decoder is None or self._next > start:
+    def _page(self, index: int) -> NDArray[Any]:
+        """One frame; those before it are decoded too, from the last one that was asked for or from the first."""
+        if self._decoder is None or self._next > index:
             self.close()
             self._decoder, self._next = self._frames(), 0
         try:
-            while self._next < stop:
+            while True:
                 frame = next(self._decoder, None)
                 if frame is None:
                     raise InputError(f"{self.path}: ends after frame {self._next} of {self.numbers.size}")
                 if frame.shape != self.shape:
                     raise InputError(f"{self.path}: frame {self._next} is of shape {frame.shape}, not {self.shape}")
-                if self._next >= start:
-                    out[self._next - start] = frame[rows[0] : rows[1]]
                 self._next += 1
+                if self._next > index:
+                    return frame
         except self._av.error.FFmpegError as error:
             raise InputError(f"{self.path}: frame {self._next} cannot be decoded ({error})") from None
-        return out
 
     def close(self) -> None:
         """Close the file."""

@@ -21,7 +21,7 @@ from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.matlab_file import read_version_5
 from snapbeam.lab.signals import check_signal, even_sampling, si_unit, unit_factor
 from snapbeam.util.diagnostics import Diagnostic, tell
-from snapbeam.util.hdf5 import open_hdf5
+from snapbeam.util.hdf5 import members_of, open_hdf5
 from snapbeam.util.input_files import decoded, refuse_inflated
 from snapbeam.util.netcdf import hdf5_stream
 from snapbeam.util.packages import needing
@@ -223,11 +223,8 @@ def _stated_array(file: Any) -> int:
 
 def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
     """Write a signal to a NumPy file with its times and its unit."""
-    values, time, _ = check_signal(signal)
-    name = str(signal.name)
-    arrays: dict[str, Any] = {name: values, "time": time}
-    arrays |= {f"{name}_units": signal.attrs["units"], "time_units": "s"}
-    np.savez(path, **arrays)
+    (values, time, _), name = check_signal(signal), str(signal.name)
+    np.savez(path, **{name: values, "time": time, f"{name}_units": signal.attrs["units"], "time_units": "s"})
 
 
 # Arrays with names: vectors, and matrices with a channel in each row or column.  Attributes, and arrays of one number or
@@ -379,33 +376,24 @@ def _refuse_length_of_hdf5(path: Path) -> None:
 
 def read_hdf5(path: Path, _told: Told) -> list[Channel]:
     """Return the channels of an HDF5 or NetCDF file; packed numbers by the CF conventions."""
-    import h5py
-
     with open(path, "rb") as opened:
         start = opened.read(4)
     if start[:3] == b"CDF":
         return _netcdf3(path, start[3])
     _refuse_length_of_hdf5(path)
     stored: dict[str, _Stored] = {}
-    groups: dict[str, dict[str, Any]] = {}
     with open_hdf5(path) as file:
-        groups[""] = _stating(file.attrs)
-
-        def visit(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Group):
-                groups[name] = _stating(item.attrs)
-                return
-            if not isinstance(item, h5py.Dataset) or item.ndim > 2 or item.dtype.kind not in "iufSO":
-                return
-            kept = item.dtype.kind in "iuf" or item.size == 1
+        inner, arrays = members_of(file)
+        groups = {name: _stating(item.attrs) for name, item in {"": file, **inner}.items()}
+        for name, item in arrays.items():
+            number = item.dtype.kind in "iuf"
+            kept = item.ndim <= 2 and (number or (item.dtype.kind in "SO" and item.size == 1))
             if not kept or (item.is_scale and not _is_axis(name, item.attrs)):
-                return
+                continue
             attributes = dict(item.attrs)
-            if item.dtype.kind in "iuf" and item.fillvalue:
+            if number and item.fillvalue:
                 attributes.setdefault("_FillValue", item.fillvalue)
             stored[name] = _Stored(np.squeeze(item[()]), attributes, _axis_of(item))
-
-        file.visititems(visit)
     return _channels(stored, groups)
 
 
@@ -458,10 +446,8 @@ def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
 
     values, time, _ = check_signal(signal)
     with hdf5_stream(path) as stream, h5py.File(stream, "w") as file:
-        axis = file.create_dataset("time", data=time)
-        axis.attrs["units"] = "s"
-        data = file.create_dataset(str(signal.name), data=values)
-        data.attrs["units"] = signal.attrs["units"]
+        for name, numbers, unit in (("time", time, "s"), (str(signal.name), values, signal.attrs["units"])):
+            file.create_dataset(name, data=numbers).attrs["units"] = unit
 
 
 # A text table is a block of rows of numbers with the same count of cells, after any header.  Cells are separated by
@@ -853,23 +839,16 @@ def read_matlab(path: Path, _told: Told) -> list[Channel]:
 
 
 def _version_73(path: Path) -> dict[str, Any]:
-    import h5py
-
     _refuse_length_of_hdf5(path)
     values: dict[str, Any] = {}
     with open_hdf5(path) as file:
-
-        def visit(name: str, item: Any) -> None:
-            numbers = isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf"
-            if not numbers or name.startswith("#refs#") or item.attrs.get("MATLAB_empty", 0):
-                return
+        for name, item in members_of(file)[1].items():
+            if item.dtype.kind not in "iuf" or name.startswith("#refs#") or item.attrs.get("MATLAB_empty", 0):
+                continue
             array = np.asarray(item[()])
-            if item.attrs.get("MATLAB_class", b"") == b"char":
-                values[name] = np.array("".join(chr(int(code)) for code in array.ravel(order="F")))
-            else:
-                values[name] = np.squeeze(array.T)
-
-        file.visititems(visit)
+            letters = item.attrs.get("MATLAB_class", b"") == b"char"
+            text = "".join(chr(int(code)) for code in array.ravel(order="F")) if letters else ""
+            values[name] = np.array(text) if letters else np.squeeze(array.T)
     return values
 
 
@@ -891,21 +870,13 @@ def header_values(lines: Iterable[str]) -> dict[str, str]:
     return values
 
 
-def header_rate(
-    values: dict[str, str], where: str, decimal_comma: bool = False, known: float | None = None
-) -> float | None:
-    """Samples per second [Hz] that a header states; None if it does not.
-
-    *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
-    """
-    found = _stated_rates([("", values)], decimal_comma, known)
-    return _one_rate(found, f"{where}: the header") if found else None
-
-
 def _stated_rates(
     levels: Iterable[tuple[str, Mapping[str, Any]]], decimal_comma: bool = False, known: float | None = None
 ) -> dict[str, float]:
-    """Sampling rates [Hz] that the named values of some places state, by their places and names."""
+    """Sampling rates [Hz] that the named values of some places state, by their places and names.
+
+    *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
+    """
     return {
         f"{place}/{key}".lstrip("/"): rate
         for place, values in levels
@@ -1050,7 +1021,8 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
         if known is None and common["time"].size > 2:
             known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
     commas = table.block.decimal_comma and any("," in cell for row in table.block.rows[:_ABOVE] for cell in row)
-    rate = header_rate(values, str(path), commas, known)
+    stated = _stated_rates([("", values)], commas, known)
+    rate = _one_rate(stated, f"{path}: the header") if stated else None
     if times:
         if rate is not None:
             way_out = "correct the header, or name the times otherwise in columns (--columns), such as "

@@ -13,9 +13,9 @@ import dataclasses
 import functools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,9 +32,9 @@ from snapbeam.util.validation import (
     choice,
     finite,
     finite_array,
-    instance,
     integer,
     nonnegative,
+    or_default,
     positive,
     seed_of,
     shown,
@@ -50,36 +50,15 @@ FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frame
 _FINE = 8  # rows of light drawn for a row of pixels
 
 
-def _summed(at: NDArray[np.int64], values: Floats, rows: int) -> Floats:
-    """Sums of *values* (..., columns) by the rows *at*, shape (rows, columns): those above in row 0, those below left out."""
-    columns = at.shape[-1]
-    place = np.clip(at, 0, rows) * columns + np.arange(columns)
-    sums = np.bincount(place.ravel(), values.ravel(), minlength=(rows + 1) * columns)
-    return np.asarray(sums.reshape(rows + 1, columns)[:rows], dtype=np.float64)
-
-
 @dataclass(frozen=True)
 class SyntheticCamera:
     """The camera: sampling, optics, light and noise.
 
-    Attributes
-    ----------
-    frame_rate, pixel_size
-        Frames per second [Hz]; metres per pixel.
-    shape
-        (height, width) of the region, pixels.
-    exposure
-        Shutter time [s], at most a frame; half a frame unless given.
-    bit_depth
-        Bits of a pixel, 8 to 16.
-    snr_db
-        20 log10(contrast of the beam's edge / standard deviation of the pixel noise); infinite for no noise.
-    blur
-        Blur of the optics, standard deviation in pixels.
-    lens
-        "gaussian", the edges that the tracker fits; "disk", a lens out of focus that sees areas.
-    light
-        Relative change of the light from left to right and from top to bottom.
+    ``frame_rate`` [Hz], ``pixel_size`` [m], ``shape`` (height, width) of the region [px]; ``exposure`` [s], half a frame
+    unless given; ``bit_depth`` from 8 to 16; ``snr_db`` is 20 log10(contrast of the beam's edge / standard deviation of
+    the pixel noise), infinite for no noise.  ``blur`` is the standard deviation [px] of the optics; a "gaussian" ``lens``
+    has the edges that the tracker fits, a "disk" is out of focus and sees areas.  ``light`` changes by these shares from
+    left to right and from top to bottom.
 
     Examples
     --------
@@ -158,20 +137,6 @@ class SyntheticStage:
             raise InputError(f"beam = {self.beam!r}: must differ from background = {self.background!r}")
 
 
-def lamp_light(camera: SyntheticCamera, height: int, width: int) -> NDArray[np.float32]:
-    """The lamp's unevenness over a turned picture."""
-    across = 1.0 + camera.light[0] * ((np.arange(width) - (width - 1) / 2.0) / width)
-    down = 1.0 + camera.light[1] * (np.arange(height) / height - 0.5)
-    return np.asarray(down[:, None] * across[None, :], dtype=np.float32)
-
-
-def glare_light(height: int, width: int, row: float, strength: float, wide: bool) -> NDArray[np.float32]:
-    """A reflection about *row*, in the middle columns or, if *wide*, in all."""
-    rows = (np.arange(height) - row) / (0.12 * height)
-    columns = np.zeros(width) if wide else (np.arange(width) - (width - 1) / 2.0) / (0.3 * width)
-    return np.asarray(strength * np.exp(-(rows[:, None] ** 2) - columns[None, :] ** 2), dtype=np.float32)
-
-
 # Every shape covers an exact share of each cell of a grid four times finer than the pixels, averaged over the
 # exposure; the cells are spread by the lens and summed into pixels.  Nothing here knows
 # of error functions, so a tracker that fits them is not tested against itself.
@@ -180,10 +145,15 @@ def glare_light(height: int, width: int, row: float, strength: float, wide: bool
 def covered(rows: Floats, height: int) -> Floats:
     """Change of coverage by cell, shape (height, columns), by what lies below *rows* (instants, columns; cells from the top)."""
     inside = np.maximum(rows, 0.0)
-    first = np.floor(inside)
-    share = first + 1.0 - inside
-    at = first.astype(np.int64)
-    return (_summed(at, share, height) + _summed(at + 1, 1.0 - share, height)) / len(rows)
+    columns, at = rows.shape[-1], np.floor(inside).astype(np.int64)
+    share = at + 1.0 - inside
+    # what lies below the last row is counted in one more, which is left out
+    place = np.clip(np.stack([at, at + 1]), 0, height) * columns + np.arange(columns)
+    sums = [
+        np.bincount(k.ravel(), part.ravel(), (height + 1) * columns)
+        for k, part in zip(place, (share, 1.0 - share), strict=True)
+    ]
+    return np.asarray(np.add(*sums).reshape(height + 1, columns)[:height] / len(rows), dtype=np.float64)
 
 
 @functools.cache
@@ -289,27 +259,12 @@ class Fixture:
 class Defects:
     """Departures from the ideal camera and scene.
 
-    Attributes
-    ----------
-    glare_frames, blurred_frames, repeated_frames, blank_frames, hidden_frames
-        Numbers of frames with a reflection, 4 px more blur, a repeat of the frame before, black, or with the
-        beam hidden by something of the background's grey.
-    glare_strength, glare_wide
-        Light of the reflection over full scale, and whether it spans all columns.
-    gamma
-        Grey level = light**gamma.
-    gain
-        Light relative to full scale of the camera.
-    flicker
-        Relative change of the light with mains frequency (100 Hz).
-    texture
-        Relative unevenness of the surfaces, which moves with them.
-    shot
-        Noise of bright pixels that grows with the root of the light: standard deviation at full scale.
-    fixture
-        A bar that never moves.
-    drift
-        Rows by which the whole picture has sunk at the end of the recording [px], evenly over time.
+    The numbers of frames with a reflection, with 4 px more blur, that repeat the frame before, that are black, or whose
+    beam is hidden by something of the background's grey; the light of the reflection over full scale, and whether it
+    spans all columns.  The grey level is light**``gamma``; ``gain`` is light over full scale, ``flicker`` its relative
+    change at 100 Hz (mains), ``texture`` the relative unevenness of the surfaces, ``shot`` the standard deviation at full
+    scale of noise that grows with the root of the light, ``fixture`` a bar that never moves, and ``drift`` the rows by
+    which the picture has sunk at the end [px], evenly over time.
 
     Examples
     --------
@@ -386,34 +341,24 @@ def read_out(
     return np.asarray(np.rint(level * (2**camera.bit_depth - 1)), dtype=np.uint16)
 
 
+@dataclass(eq=False)
 class SyntheticRecording:
     """Frames drawn on demand; made by :func:`render_recording`.
 
-    Attributes
-    ----------
-    truth
-        Dataset over ``time`` with ``displacement_mm``, ``shaker_displacement_mm`` and ``penetration_mm``,
-        means over each exposure, and ``disturbed``, 1 where a frame was spoiled on purpose.
+    ``truth`` has ``displacement_mm``, ``shaker_displacement_mm`` and ``penetration_mm`` over ``time``, means over each
+    exposure, and ``disturbed``, 1 where a frame was spoiled on purpose.
     """
 
-    def __init__(
-        self,
-        camera: SyntheticCamera,
-        stage: SyntheticStage,
-        defects: Defects,
-        truth: xr.Dataset,
-        instants: _Instants,
-        seed: int,
-    ) -> None:
-        self.camera = camera
-        self.stage = stage
-        self.defects = defects
-        self.truth = truth
-        self.seed = seed
-        self._instants = instants
-        self._picture = Picture(camera, stage, defects.texture, seed)
-        self._lamp = lamp_light(camera, self._picture.height, self._picture.width)
-        self._spoiled = defects.frames(len(self))
+    camera: SyntheticCamera
+    stage: SyntheticStage
+    defects: Defects
+    truth: xr.Dataset
+    instants: _Instants = field(repr=False)
+    seed: int
+
+    def __post_init__(self) -> None:
+        self._picture = Picture(self.camera, self.stage, self.defects.texture, self.seed)
+        self._spoiled = self.defects.frames(len(self))
 
     def __len__(self) -> int:
         return int(self.truth.sizes["time"])
@@ -433,18 +378,21 @@ class SyntheticRecording:
     def _light(self, index: int) -> NDArray[np.float32]:
         """Light of one frame on the sensor, shares of full scale, shaker below."""
         defects, shape = self.defects, self._picture
-        beam, tip = self._instants.rows(index)
+        beam, tip = self.instants.rows(index)
         shift = defects.drift * index / max(len(self) - 1, 1)
         if index in self._spoiled["hidden"]:
             beam = beam - 10.0 * shape.height
         light = self._picture.draw(beam + shift, tip + shift, blurred=index in self._spoiled["blurred"])
         if defects.fixture is not None:
             light = with_fixture(light, defects.fixture, shift, self.camera.blur)
-        light = light * self._lamp
+        rows, columns = np.arange(shape.height)[:, None], np.arange(shape.width) - (shape.width - 1) / 2.0
+        across, down = self.camera.light
+        lamp = (1.0 + down * (rows / shape.height - 0.5)) * (1.0 + across * (columns / shape.width))
+        light = light * lamp.astype(np.float32)
         if index in self._spoiled["glare"]:
-            light = light + glare_light(
-                shape.height, shape.width, float(beam.mean()), defects.glare_strength, defects.glare_wide
-            )
+            beside = 0.0 * columns if defects.glare_wide else columns / (0.3 * shape.width)
+            about = ((rows - float(beam.mean())) / (0.12 * shape.height)) ** 2 + beside**2
+            light = light + (defects.glare_strength * np.exp(-about)).astype(np.float32)
         if defects.flicker:
             turn = 2.0 * math.pi * 100.0 * index / self.camera.frame_rate
             light = light * np.float32(1.0 + defects.flicker * math.sin(turn))
@@ -476,15 +424,20 @@ class SyntheticRecording:
         )
 
 
-class _Instants:
+class _Instants(NamedTuple):
     """Rows of beam and tip at instants spread over each exposure, and their exact means."""
 
-    def __init__(
-        self, time: Floats, beam: Floats, shaker: Floats, camera: SyntheticCamera, start: float, zero_row: float
-    ) -> None:
-        self.time, self.beam, self.shaker = time, beam, shaker
-        self.camera, self.start, self.zero_row = camera, start, zero_row
-        self.exposure = float(camera.exposure or 0.0)
+    time: Floats
+    beam: Floats
+    shaker: Floats
+    camera: SyntheticCamera
+    start: float
+    zero_row: float
+
+    @property
+    def exposure(self) -> float:
+        """Shutter time [s]."""
+        return float(self.camera.exposure or 0.0)
 
     def means(self, opened: Floats) -> tuple[Floats, Floats]:
         """Mean displacements over the exposures that start at *opened*."""
@@ -578,17 +531,11 @@ def render_recording(
     >>> dict(synthetic.truth["displacement_mm"].sizes)
     {'time': 69}
     """
-    for name, value, kind in (("camera", camera, SyntheticCamera), ("stage", stage, SyntheticStage)):
-        if value is not None:
-            instance(name, value, kind, f"a {kind.__name__}")
-    if defects is not None:
-        instance("defects", defects, Defects, "Defects")
-    camera = SyntheticCamera() if camera is None else camera
-    stage = SyntheticStage() if stage is None else stage
-    known = [field.name for field in dataclasses.fields(Defects)]
+    camera = or_default("camera", camera, SyntheticCamera, "a SyntheticCamera")
+    stage = or_default("stage", stage, SyntheticStage, "a SyntheticStage")
     for name in spoiled:
-        choice("defect", name, tuple(known))
-    defects = dataclasses.replace(Defects() if defects is None else defects, **spoiled)
+        choice("defect", name, tuple(one.name for one in dataclasses.fields(Defects)))
+    defects = dataclasses.replace(or_default("defects", defects, Defects, "Defects"), **spoiled)
     instants = axis("time", time, -math.inf, math.inf)
     if instants.size < 2:
         raise InputError(f"time of {instants.size} sample: must hold at least 2")

@@ -130,13 +130,15 @@ class SweepSetup:
         threads: int | None = None,
         progress: Progress | None = None,
         *,
-        start: Callable[[System, State | None], State] | None = None,
+        start: Callable[[System, State | None, Columns], State] | None = None,
         step_factor: float = 1.0,
+        endless: bool = False,
     ) -> dict[str, NDArray[Any]]:
         """Integrate runs and return their statistics, arrays of shape (runs,) by name.
 
-        The results of a run depend only on its own point, not on the other runs of its batch.  ``start(system, state)``
-        returns other initial conditions; *state* is that of the points, or None if they do not determine it.
+        The results of a run depend only on its own point, not on the other runs of its batch.  ``start(system, state,
+        points)`` returns other initial conditions; *state* is that of the points, or None if they do not determine it.
+        *endless*: no run ends because it is sure to be continuous.
         """
         total = next(iter(columns.values())).size
         found: dict[str, NDArray[Any]] = {}
@@ -144,12 +146,14 @@ class SweepSetup:
         for system, integration, which, points in self.groups(columns):
             state = self.start_of(system, points)
             if start is not None:
-                state = start(system, state)
+                state = start(system, state, points)
             own = {name: values for name, values in points.items() if not name.startswith("initial_state.")}
             for part in _alike(system, state, which.size):
                 columns_of_part = {name: values[part] for name, values in own.items()}
                 begun = state[part] if state is not None and state.batch else state
                 ensemble = make_ensemble(system, integration, columns_of_part, start=begun, step_factor=step_factor)
+                if endless:
+                    ensemble.runs["decide_crossings"] = -1
                 ensemble = replace(
                     ensemble, on_gpu=integration.engine == "cuda"
                 )  # else the CPU: few runs, or one after the other

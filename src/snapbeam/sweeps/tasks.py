@@ -140,7 +140,7 @@ class PointWork:
             for repeat in range(replicates.count):
                 before += size
 
-                def start(system: System, state: State | None, number: int = repeat) -> State:
+                def start(system: System, state: State | None, _: Columns, number: int = repeat) -> State:
                     return perturbed_start(system, replicates, number, state)
 
                 repeats.append(setup.integrate(points, threads, report, start=start)["response_class"])

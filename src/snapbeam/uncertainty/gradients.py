@@ -14,7 +14,7 @@ from snapbeam.model.system import System
 from snapbeam.solver import native
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.statistics import STATISTICS, name_in, rows_for, statistics_of
-from snapbeam.sweeps.points import PointList
+from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.sweep import sweep
 from snapbeam.util.diagnostics import Diagnostic, tell, to_json
 from snapbeam.util.differences import differences
@@ -207,6 +207,28 @@ def _exact(
     return moved, error, growth
 
 
+def slopes_of_runs(
+    system: System, how: Integration, columns: Columns, beside: Sequence[tuple[Columns, Columns]]
+) -> tuple[Columns, list[Columns]] | None:
+    """Statistics of runs and their exact changes between pairs of columns beside; None where the core takes no derivative.
+
+    The columns of each pair differ a little, by a parameter of a design.
+    """
+    structural = any(name.startswith("initial_state.") or not lookup(name).is_run for name in columns)
+    if structural or how.engine == "python" or how.tolerance is not None:
+        return None
+    here, *sides = (make_ensemble(system, how, each) for each in (columns, *(side for pair in beside for side in pair)))
+    pairs = list(zip(sides[::2], sides[1::2], strict=True))
+    if here.channels.of_user or not all(native.differentiable(*pair) for pair in pairs):
+        return None
+    found, _, whole = native.changed_accumulators(here, [(*pair, 1.0) for pair in pairs], how.threads)
+    changes = []
+    for near, records in zip(pairs, found, strict=True):
+        high, low = (statistics_of(each, own) for each, own in zip(near, records, strict=True))
+        changes.append({name: high[name] - low[name] for name in high if STATISTICS[name].dtype == "float64"})
+    return statistics_of(here, whole), changes
+
+
 def _value(system: System, name: str) -> float:
     """A parameter that may be changed in proportion."""
     row = lookup(name)
@@ -227,13 +249,15 @@ def _reasons(quantities: list[str]) -> list[str]:
         if name not in STATISTICS:
             smooth = [each for each, row in STATISTICS.items() if row.dtype == "float64" and each not in _NOT_SMOOTH]
             raise InputError(f"quantity = {shown(name)}: must be one of {', '.join(smooth)}, or a function of a system")
-    jumps = {
-        name: "is a class or a count, which changes by jumps"
-        for name in quantities
-        if STATISTICS[name].dtype != "float64"
-    }
-    reasons = jumps | {name: _NOT_SMOOTH[name] for name in quantities if name in _NOT_SMOOTH}
-    return [f"{reasons[name]}, so that it has no derivative" if name in reasons else "" for name in quantities]
+    return [f"{why}, so that it has no derivative" if (why := not_smooth(name)) else "" for name in quantities]
+
+
+def not_smooth(name: str) -> str:
+    """Reason why a statistic is no smooth function of parameters; empty if it is one."""
+    counted = STATISTICS[name].dtype != "float64"
+    if STATISTICS[name].update is not None:
+        return "is updated by a function of its own"
+    return "is a class or a count, which changes by jumps" if counted else _NOT_SMOOTH.get(name, "")
 
 
 _Evaluation = Callable[[_Array], tuple[_Array, _Array | None]]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -9,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+from scipy import optimize, stats
 
 from snapbeam.model.integration import Integration
 from snapbeam.model.parameters import in_table, lookup
@@ -20,6 +22,7 @@ from snapbeam.sweeps.points import Columns
 from snapbeam.sweeps.setup import is_positive
 from snapbeam.uncertainty.differential_evolution import DifferentialEvolution, front_of
 from snapbeam.uncertainty.distributions import ParameterUncertainty
+from snapbeam.uncertainty.gradients import not_smooth, slopes_of_runs
 from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, scale_key, trials_of
 from snapbeam.util.diagnostics import Diagnostic, counting, tell
 from snapbeam.util.proportions import mean_interval, proportion
@@ -197,6 +200,13 @@ class Objective:
             return f"{share} of the {quantity.long_name}"
         return quantity.long_name if quantity.kind == "design" else f"mean {quantity.long_name}"
 
+    def followed(self, values: _Array, changes: _Array) -> tuple[float, _Array]:
+        """Value of runs, and its change where theirs, of shape (variables, runs), are small."""
+        if self.quantile is None:
+            return float(values.mean()), changes.mean(axis=1)
+        one = np.argsort(values, kind="stable")[min(math.ceil(self.quantile * values.size) - 1, values.size - 1)]
+        return float(values[one]), changes[:, one]
+
     def estimate(self, values: NDArray[Any], failed: int, confidence: float) -> tuple[float, float, float]:
         """Value and interval from runs that came to an end.
 
@@ -316,6 +326,15 @@ class Constraint:
         low = -np.inf if self.lower is None else self.lower
         high = np.inf if self.upper is None else self.upper
         return np.asarray((values >= low) & (values <= high))
+
+    def followed(self, values: _Array, changes: _Array, needed: int) -> tuple[float, _Array]:
+        """Distance of the last of the *needed* runs from its limit, over its size, and its change."""
+        low, high = (-np.inf if self.lower is None else self.lower), (np.inf if self.upper is None else self.upper)
+        inside = np.minimum(values - low, high - values)
+        one = np.argsort(-inside, kind="stable")[min(needed, values.size) - 1]
+        sign = 1.0 if values[one] - low < high - values[one] else -1.0
+        size = max(abs(self.lower or 0.0), abs(self.upper or 0.0), 1e-300)
+        return float(inside[one]) / size, sign * changes[:, one] / size
 
     def excess(self, values: _Array) -> _Array:
         """Constraint violation of designs, over its size; 0 if satisfied."""
@@ -495,20 +514,70 @@ class DesignProblem:
             if isinstance(value, float)
         }
         whole = fixed | columns | found
-        if "cycles_to_settle" in {
-            *(objective.quantity for objective in self.objectives),
-            *(constraint.quantity for constraint in self.constraints),
-        }:
+        if "cycles_to_settle" in {each.quantity for each in self._parts}:
             whole[CYCLE] = self.trials.cycles(columns)
         return [{name: values[each == i] for name, values in whole.items()} for i in range(len(x))]
 
     @property
+    def _parts(self) -> tuple[Objective | Constraint, ...]:
+        """Objectives and constraints."""
+        return (*self.objectives, *self.constraints)
+
+    @property
     def _needs_runs(self) -> bool:
-        kinds = {
-            *(objective._quantity.kind for objective in self.objectives),
-            *(constraint._quantity.kind for constraint in self.constraints),
-        }
-        return kinds != {"design"}
+        return {each._quantity.kind for each in self._parts} != {"design"}
+
+    @property
+    def not_smooth(self) -> str:
+        """Reason why the search has no gradients; empty if it has."""
+        if len(self.objectives) > 1:
+            return "there are several objectives"
+        for each in self._parts:
+            name, kind = each.quantity, each._quantity.kind
+            known = kind == "design" or (kind == "run" and name in STATISTICS)
+            if why := "changes by jumps" if not known else not_smooth(name) if kind == "run" else "":
+                return f"{name} {why}"
+        return "" if self._needs_runs else "no run is needed"
+
+    def slopes(self, design: _Array) -> tuple[_Array, _Array] | None:
+        """Objective to minimise and slacks of the constraints of one design on the common samples, with their derivatives.
+
+        Enough runs satisfy a constraint if the last one that is needed does: its distance from the limit is the slack,
+        and as smooth as the statistic. Derivatives of statistics are exact; None where the core takes none.
+
+        Returns
+        -------
+        values : array of shape (1 + constraints,)
+        derivatives : array of shape (1 + constraints, variables)
+        """
+        low, high = np.array(list(self.bounds.values())).T
+        moves, numbers = _MOVE * np.diag(high - low), np.arange(self.samples)
+        near = np.clip(np.concatenate([[design], design + moves, design - moves]), low, high)
+        distance = np.diag(near[1 : 1 + low.size] - near[1 + low.size :])
+        made = [self.trials.columns({n: np.full(numbers.size, v) for n, v in zip(self.bounds, row, strict=True)}, numbers)
+                for row in near]  # fmt: skip
+        pairs = list(zip(made[1 : 1 + low.size], made[1 + low.size :], strict=True))
+        found = slopes_of_runs(self.trials.system, self.trials.integration, made[0], pairs)
+        if found is None or not reached(found[0]).all():
+            return None
+        self.trials.runs += numbers.size
+        scale, answers = self.trials.system.scale, []
+        units = {"": 1.0, "length_scale": scale.length, "velocity_scale": scale.length * scale.omega}
+        for each in self._parts:
+            if each._quantity.kind == "design":
+                own = self._own(each, near)
+                runs, changes = own[:1], (own[1 : 1 + low.size] - own[1 + low.size :])[:, None]
+            else:
+                runs, changes = found[0][each.quantity], np.array([change[each.quantity] for change in found[1]])
+            if isinstance(each, Objective):
+                value, change = each.followed(runs, changes)
+                answers.append(self._sign(each) * np.append(value, change / distance))
+            else:
+                unit, needed = units[each.scale], _share_for(each.required, self.validation_samples) * runs.size
+                value, change = each.followed(unit * runs, unit * changes, math.ceil(needed - 1e-9))
+                answers.append(np.append(value, change / distance))
+        table = np.array(answers)
+        return table[:, 0], table[:, 1:]
 
     def _own(self, of: Objective | Constraint, x: _Array) -> _Array:
         """A quantity of designs themselves, in units of the nominal system of each."""
@@ -631,6 +700,10 @@ def problem_of(
 
 _STALLED, _IMPROVED = 10, 1e-4
 """Generations without an improvement of the best design by more than this share after which the search stops."""
+_DIFFERENTIATED = 25
+"""Maximum number of designs that are differentiated at the end of a search."""
+_MOVE, _KEPT = 1e-6, 1e-6
+"""Change of a variable, over its range, with which the numbers of runs are differentiated; slack that gradients leave."""
 _CLOSE = 1e-3
 """Distance of two designs, over the range of each variable, below which they are not refined."""
 CHECK, REPORT = 10**9, 2 * 10**9
@@ -772,6 +845,10 @@ def optimize_design(
     Further samples report the result, so that the search does not bias the intervals. The search stops after ten
     generations without progress.
 
+    The search of one objective ends with sequential quadratic programming from the best design, with exact gradients
+    through the runs, if statistics and variables have them (:func:`snapbeam.uncertainty.gradient`): a required share of
+    runs is the statistic of the last run that is needed. Probabilities of outcomes, counts and classes change by jumps.
+
     Parameters
     ----------
     system : System
@@ -857,6 +934,14 @@ def optimize_design(
         if stalled >= _STALLED:
             stopped = f"{generation + 1} generations, the last {_STALLED} without progress"
             break
+    why = problem.not_smooth
+    polished, count = (search.designs[0], 0) if why else _polished(problem, search.designs[0])
+    if count:
+        worth, distances = problem.judge(polished[None])
+        tried.append((polished[None], worth.objectives, worth.violation, distances))
+        stopped += f"; gradients of {count} designs from the best one"
+    else:
+        stopped += f"; without gradients: {why or 'runs have no exact derivatives by these variables'}"
     x, objective_values, violation, distances = (np.concatenate(parts) for parts in zip(*tried, strict=True))
     if not (violation == 0.0).any():
         words = f"none of the {len(x)} designs satisfies the constraints; the one that violates them least is reported"
@@ -907,6 +992,34 @@ def _front(objectives: _Array, violation: _Array) -> list[int]:
     _, unique = np.unique(objectives[front], axis=0, return_index=True)
     kept = front[np.sort(unique)]
     return [int(i) for i in kept[np.argsort(objectives[kept, 0], kind="stable")]]
+
+
+def _polished(problem: DesignProblem, begin: _Array) -> tuple[_Array, int]:
+    """Best design on the way of sequential quadratic programming with exact gradients, and how many were differentiated."""
+    low, high = np.array(list(problem.bounds.values())).T
+    known: dict[bytes, tuple[_Array, _Array]] = {}
+
+    def at(unit: _Array) -> tuple[_Array, _Array]:
+        inside = np.clip(unit, 0.0, 1.0)
+        if inside.tobytes() not in known:
+            came = problem.slopes(low + (high - low) * inside) if len(known) < _DIFFERENTIATED else None
+            if came is None or not np.isfinite(np.column_stack(came)).all():
+                raise FloatingPointError
+            known[inside.tobytes()] = came[0] - _KEPT * (np.arange(came[0].size) > 0), came[1] * (high - low)
+        return known[inside.tobytes()]
+
+    with contextlib.suppress(FloatingPointError):  # a jump on the way: what was found before it counts
+        start = (begin - low) / (high - low)
+        size = max(abs(float(at(start)[0][0])), 1e-300)
+        optimize.minimize(
+            lambda u: at(u)[0][0] / size, start, jac=lambda u: at(u)[1][0] / size, method="SLSQP",
+            bounds=[(0.0, 1.0)] * low.size, options={"ftol": _IMPROVED},
+            constraints={"type": "ineq", "fun": lambda u: at(u)[0][1:], "jac": lambda u: at(u)[1][1:]},
+        )  # fmt: skip
+    best = min(
+        known, key=lambda unit: (max(0.0, -known[unit][0][1:].min(initial=0.0)), known[unit][0][0]), default=None
+    )
+    return begin if best is None else low + (high - low) * np.frombuffer(best), len(known)
 
 
 @dataclass

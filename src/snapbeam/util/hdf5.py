@@ -6,7 +6,7 @@ import os
 import stat
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from snapbeam.util.input_files import refuse_inflated
 from snapbeam.util.validation import InputError, file_path
@@ -75,6 +75,16 @@ def open_hdf5(path: str | os.PathLike[str], name: str = "path", *, in_parts: boo
         # of damaged bytes the library makes errors of every kind, in words about its own calls
         raise InputError(f"{name} = {str(path)!r}: is no NetCDF or HDF5 file, or is damaged") from error
     return file
+
+
+def members_of(group: h5py.Group) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Groups and datasets in a group and in those below it, by their names."""
+    import h5py
+
+    found: dict[str, Any] = {}
+    group.visititems(found.__setitem__)
+    groups = {name: item for name, item in found.items() if isinstance(item, h5py.Group)}
+    return groups, {name: item for name, item in found.items() if isinstance(item, h5py.Dataset)}
 
 
 def _size(file: h5py.File, where: str) -> tuple[int, bool]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,106 +26,81 @@ _SCENE = "Scene"
 _OUTPUT = lab.OUTPUT
 
 
+def _option(name: str, kind: Any, default: Any, about: str = "", *more: Any) -> inspect.Parameter:
+    """A keyword of the command: an option with its text, panel, placeholder and names, or of a kind with its own."""
+    kind = Annotated[kind, option(about, *more)] if about else kind
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+
+
+_RECORDING = Annotated[
+    Path,
+    typer.Argument(
+        help="Photron .cih/.cihx, .cine, .avi, .mp4, .mov, TIFF, .npy, .h5, or a folder of numbered images.",
+        metavar="RECORDING",
+    ),
+]
+_REAL, _TEXT, _FILE = float | None, str | None, Path | None
+_OPTIONS = (
+    _option("frame_rate", _REAL, None, "Frame rate, Hz; required for videos and images.", _CAMERA),
+    _option("pixel_size", _REAL, None, "Pixel size, m, such as 12e-6; required if the file has none.", _CAMERA),
+    _option("region", _TEXT, None, "Part of the frame to use.", _CAMERA, "ROW:ROW,COLUMN:COLUMN"),
+    _option("side", str, "below", "Side of the beam on which the shaker is: below, above, left or right.", _SCENE),
+    _option("objects", str, "auto", "Brightness of the objects against the background: bright, dark or auto.", _SCENE),
+    _option("threshold", _REAL, None, "Grey level of the binarisation threshold; Otsu's by default.", _SCENE),
+    _option("contact_column", _REAL, None, "Column of the contact; by default, that of the tip.", _SCENE),
+    _option("shaker", bool, True, "Track the shaker too.", _SCENE, None, "--shaker/--no-shaker"),
+    _option("marker", bool, True, "Look for a sticker on the shaker.", _SCENE, None, "--marker/--no-marker"),
+    _option("tip_distance", _REAL, None,
+            "Distance from the tip of the shaker to the nearer edge of the sticker, m.", _SCENE),
+    _option("beam_thickness", _REAL, None, "Thickness of the beam by gauge, m, to check the pixel size.", _SCENE),
+    _option("beam_thickness_error", _REAL, None, "Standard error of --beam-thickness, m; 1 % by default.", _SCENE),
+    _option("tip_diameter", _REAL, None,
+            "Diameter of the shaker's rod behind its tip by gauge, m, to check the pixel size.", _SCENE),
+    _option("tip_diameter_error", _REAL, None, "Standard error of --tip-diameter, m; 1 % by default.", _SCENE),
+    _option("drive_amplitude", _REAL, None,
+            "Amplitude of the shaker's displacement by vibrometer, m, to check the pixel size.", _SCENE),
+    _option("drive_amplitude_error", _REAL, None, "Standard error of --drive-amplitude, m; 0.2 % by default.", _SCENE),
+    _option("columns", int, 24, "Number of columns in which the edge of the beam is fitted.", _SCENE),
+    _option("blur_limit", _REAL, None, "Edge width, px, above which a frame is flagged as blurred.", _SCENE),
+    _option("gamma", float, 1.0, "Gamma of the camera (exponent of grey level over light), to correct.", _CAMERA),
+    _option("background", _FILE, None, "Image of the scene without beam and shaker, to subtract.", _CAMERA, "FILE"),
+    _option("fixed_mark", list[str] | None, None,
+            "Part of the region with a stationary object; snapbeam subtracts the camera drift measured there. "
+            "May be repeated.", _CAMERA, "ROW:ROW,COLUMN:COLUMN"),
+    _option("scale_marks", _TEXT, None,
+            "Pixel size from two marks a known distance apart, m: ROW,COLUMN:ROW,COLUMN=0.010.", _CAMERA, "MARKS"),
+    _option("rest_frames", _TEXT, None,
+            "Frames at rest: number at the start, or FIRST:LAST+1; negative numbers count from the "
+            "end.", _SCENE, "N or A:B"),
+    _option("buckling_level", _REAL, None,
+            "Buckling level b, m, for normalised displacements; by default in mm only.", _SCENE),
+    _option("location", float, 1 / 2.1, "Location of the contact over the length (x_s).", _SCENE),
+    _option("rest_displacement", _REAL, None,
+            "Displacement of the beam at rest, m; the well facing the shaker by default.", _SCENE),
+    _option("output", Path, Path("track.nc"), "NetCDF file to write.", _OUTPUT, "FILE", "--output", "-o"),
+    _option("operator", lab.Operator, None),
+    _option("picture", _FILE, None, "Figure of a frame with the fitted edges to write.", _OUTPUT, "FILE"),
+    _option("frame", int, 0, "Number of the frame of --picture.", _OUTPUT),
+    _option("report", _FILE, None, "Figure of the tracking quality over time to write.", _OUTPUT, "FILE"),
+    _option("video", _FILE, None, "Annotated video to write, .mp4, .mov or .avi.", _OUTPUT, "FILE"),
+    _option("video_every", int, 1, "Interval of the frames shown in --video.", _OUTPUT),
+    _option("strict", lab.Strict, False),
+)  # fmt: skip
+
+
+def _with_options(command: Callable[..., None]) -> Callable[..., None]:
+    first = inspect.Parameter("recording", inspect.Parameter.KEYWORD_ONLY, annotation=_RECORDING)
+    command.__signature__ = inspect.Signature([first, *_OPTIONS])  # type: ignore[attr-defined]
+    return command
+
+
 @cli_command
+@_with_options
 def track(
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            help="Photron .cih/.cihx, .cine, .avi, .mp4, .mov, TIFF, .npy, .h5, or a folder of numbered images.",
-            metavar="RECORDING",
-        ),
-    ],
-    frame_rate: Annotated[float | None, option("Frame rate, Hz; required for videos and images.", _CAMERA)] = None,
-    pixel_size: Annotated[
-        float | None, option("Pixel size, m, such as 12e-6; required if the file has none.", _CAMERA)
-    ] = None,
-    region: Annotated[str | None, option("Part of the frame to use.", _CAMERA, "ROW:ROW,COLUMN:COLUMN")] = None,
-    side: Annotated[
-        str, option("Side of the beam on which the shaker is: below, above, left or right.", _SCENE)
-    ] = "below",
-    objects: Annotated[
-        str, option("Brightness of the objects against the background: bright, dark or auto.", _SCENE)
-    ] = "auto",
-    threshold: Annotated[
-        float | None, option("Grey level of the binarisation threshold; Otsu's by default.", _SCENE)
-    ] = None,
-    contact_column: Annotated[
-        float | None, option("Column of the contact; by default, that of the tip.", _SCENE)
-    ] = None,
-    shaker: Annotated[bool, option("Track the shaker too.", _SCENE, None, "--shaker/--no-shaker")] = True,
-    marker: Annotated[bool, option("Look for a sticker on the shaker.", _SCENE, None, "--marker/--no-marker")] = True,
-    tip_distance: Annotated[
-        float | None, option("Distance from the tip of the shaker to the nearer edge of the sticker, m.", _SCENE)
-    ] = None,
-    beam_thickness: Annotated[
-        float | None, option("Thickness of the beam by gauge, m, to check the pixel size.", _SCENE)
-    ] = None,
-    beam_thickness_error: Annotated[
-        float | None, option("Standard error of --beam-thickness, m; 1 % by default.", _SCENE)
-    ] = None,
-    tip_diameter: Annotated[
-        float | None,
-        option("Diameter of the shaker's rod behind its tip by gauge, m, to check the pixel size.", _SCENE),
-    ] = None,
-    tip_diameter_error: Annotated[
-        float | None, option("Standard error of --tip-diameter, m; 1 % by default.", _SCENE)
-    ] = None,
-    drive_amplitude: Annotated[
-        float | None,
-        option("Amplitude of the shaker's displacement by vibrometer, m, to check the pixel size.", _SCENE),
-    ] = None,
-    drive_amplitude_error: Annotated[
-        float | None, option("Standard error of --drive-amplitude, m; 0.2 % by default.", _SCENE)
-    ] = None,
-    columns: Annotated[int, option("Number of columns in which the edge of the beam is fitted.", _SCENE)] = 24,
-    blur_limit: Annotated[
-        float | None, option("Edge width, px, above which a frame is flagged as blurred.", _SCENE)
-    ] = None,
-    gamma: Annotated[
-        float, option("Gamma of the camera (exponent of grey level over light), to correct.", _CAMERA)
-    ] = 1.0,
-    background: Annotated[
-        Path | None, option("Image of the scene without beam and shaker, to subtract.", _CAMERA, "FILE")
-    ] = None,
-    fixed_mark: Annotated[
-        list[str] | None,
-        option(
-            "Part of the region with a stationary object; snapbeam subtracts the camera drift measured there. May be "
-            "repeated.",
-            _CAMERA, "ROW:ROW,COLUMN:COLUMN",
-        ),
-    ] = None,
-    scale_marks: Annotated[
-        str | None,
-        option("Pixel size from two marks a known distance apart, m: ROW,COLUMN:ROW,COLUMN=0.010.", _CAMERA, "MARKS"),
-    ] = None,
-    rest_frames: Annotated[
-        str | None,
-        option(
-            "Frames at rest: number at the start, or FIRST:LAST+1; negative numbers count from the end.",
-            _SCENE, "N or A:B",
-        ),
-    ] = None,
-    buckling_level: Annotated[
-        float | None, option("Buckling level b, m, for normalised displacements; by default in mm only.", _SCENE)
-    ] = None,
-    location: Annotated[float, option("Location of the contact over the length (x_s).", _SCENE)] = 1 / 2.1,
-    rest_displacement: Annotated[
-        float | None,
-        option("Displacement of the beam at rest, m; the well facing the shaker by default.", _SCENE),
-    ] = None,
-    output: Annotated[Path, option("NetCDF file to write.", _OUTPUT, "FILE", "--output", "-o")] = Path("track.nc"),
-    operator: lab.Operator = None,
-    picture: Annotated[
-        Path | None, option("Figure of a frame with the fitted edges to write.", _OUTPUT, "FILE")
-    ] = None,
-    frame: Annotated[int, option("Number of the frame of --picture.", _OUTPUT)] = 0,
-    report: Annotated[
-        Path | None, option("Figure of the tracking quality over time to write.", _OUTPUT, "FILE")
-    ] = None,
-    video: Annotated[Path | None, option("Annotated video to write, .mp4, .mov or .avi.", _OUTPUT, "FILE")] = None,
-    video_every: Annotated[int, option("Interval of the frames shown in --video.", _OUTPUT)] = 1,
-    strict: lab.Strict = False,
+    recording: Path, *, output: Path, picture: Path | None, report: Path | None, video: Path | None, frame: int,
+    video_every: int, frame_rate: float | None, pixel_size: float | None, region: str | None, scale_marks: str | None,
+    fixed_mark: list[str] | None, rest_frames: str | None, background: Path | None, operator: str | None, strict: bool,
+    **scene: Any,
 ) -> None:  # fmt: skip
     """Track beam and shaker in every frame of a high-speed recording.
 
@@ -137,7 +113,6 @@ def track(
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
     """
-    given = dict(locals())
     from snapbeam.util.netcdf import write_netcdf
     from snapbeam.util.validation import integer
 
@@ -159,9 +134,8 @@ def track(
     from snapbeam.lab.tracking.track import tracking_quality, tracking_report
     from snapbeam.util.diagnostics import diagnostics_of, refuse
 
-    given |= {"background": None, "rest_frames": _rest(rest_frames)}
-    given["fixed_marks"] = [lab.whole_numbers("fixed_mark", text, 4) for text in fixed_mark or ()]
-    settings = TrackingSettings(**{field.name: given[field.name] for field in fields(TrackingSettings)})
+    marks: list[Any] = [lab.whole_numbers("fixed_mark", text, 4) for text in fixed_mark or ()]
+    settings = TrackingSettings(rest_frames=_rest(rest_frames), fixed_marks=marks, **scene)
     part = None if region is None else lab.whole_numbers("region", region, 4)
     start = time.monotonic()
     look = (settings, frame, picture or output)

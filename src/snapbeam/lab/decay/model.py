@@ -45,13 +45,9 @@ _BEYOND = ((2.0, 0.0455), (5.0, 0.01))  # standard errors, and the probability b
 _FEW = 4  # amplitudes below which a record tells nothing of its law
 _SHARE = 0.9  # of the probability of all forms, that one of the list must have
 _SMOOTH = 8  # degree of the polynomial that a residual of amplitudes is tested with
-_RARE, _RARER = (
-    3.0,
-    2.0,
-)  # logarithm of how much rarer than viscous damping alone dry friction or drag, and free forms, are
-_RAREST = (
-    8.0  # the same of free forms that fall with amplitude, over those that rise: what falls is mostly dry friction
-)
+# logarithms of how much rarer than viscous damping alone dry friction or drag and free forms are, and of the same of
+# free forms that fall with amplitude, over those that rise: what falls is mostly dry friction
+_RARE, _RARER, _RAREST = 3.0, 2.0, 8.0
 _SIZE = 2.0  # of the viscous rate: a term of a form at the start, to a standard deviation
 _POWERS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
 _SCALES = (0.1, 0.15, 0.25, 0.4, 0.6, 1.0)
