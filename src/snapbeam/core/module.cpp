@@ -104,7 +104,7 @@ class Arguments {  // the arrays and numbers of one mapping
         for (const Arguments *each = this; each; each = each->before_)
             for (const Held &held : each->arrays_)
                 if ((WRITABLE || held.written) && first < last && first < held.last && held.first < last) refuse(key, "must not share memory with another array");
-        arrays_.push_back({nb::borrow(given_[key]), first, last, WRITABLE});
+        arrays_.push_back({nb::ndarray<>(found.handle()), first, last, WRITABLE});
         return const_cast<T *>(found.data());
     }
     template <class T> T *optional(const char *key, const std::vector<size_t> &shape) {
@@ -137,7 +137,7 @@ class Arguments {  // the arrays and numbers of one mapping
     nb::dict given_;
     const char *name_;
     const Arguments *before_;
-    struct Held { nb::object array; const char *first, *last; bool written; };  // of an array of the arguments
+    struct Held { nb::ndarray<> array; const char *first, *last; bool written; };  // an array of the arguments, whose memory stays
     std::vector<Held> arrays_;
 };
 
