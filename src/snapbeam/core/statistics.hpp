@@ -434,19 +434,21 @@ template <class L> struct Totals {
         }
         c.sums[WORK] += select(acts, c.work, zero), c.sums[GROSS_WORK] += select(acts, abs(c.work), zero), c.sums[LOST] += select(acts, c.lost, zero);
         if (!c.harvests) return;
-        c.sums[LATE_LOST] += select(acts, late_share(z) * c.lost, zero);
-        Number most;
+        Number most, before, after;  // at both ends what the power lost is P[0] times the square of
         if (c.circuit) {
-            const Number before = c.P[c.state];
-            const Cubic<Number> up(before, c.r0, c.z, c.r1, z.h), down(-before, -c.r0, -c.z, -c.r1, z.h);
-            most = max(max(abs(before), abs(c.z)), select(c.follows, zero, max(crest(up, c.r0, c.r1), crest(down, -c.r0, -c.r1))));
+            before = c.P[c.state], after = c.z;
+            const Cubic<Number> up(before, c.r0, after, c.r1, z.h), down(-before, -c.r0, -after, -c.r1, z.h);
+            most = max(max(abs(before), abs(after)), select(c.follows, zero, max(crest(up, c.r0, c.r1), crest(down, -c.r0, -c.r1))));
         } else {  // in proportion to a velocity
-            const Number v0 = dot<L>(c.row, z.p, s->size()), v1 = dot<L>(c.row, z.p1, s->size());
-            Number speed = max(abs(v0), abs(v1));
+            before = dot<L>(c.row, z.p, s->size()), after = dot<L>(c.row, z.p1, s->size());
+            Number speed = max(abs(before), abs(after));
             const Marks higher = acts & (Real(1.3) * value(speed) * value(c.P[0]) > value(c.sums[PEAK_FORCE]));
-            if (any(higher)) assign(higher, speed, speed_on(dot<L>(c.row, z.q1, s->size()) - dot<L>(c.row, z.q, s->size()), v0, bend_at(z, c.row, false), v1, bend_at(z, c.row, true), z.h));
+            if (any(higher)) assign(higher, speed, speed_on(dot<L>(c.row, z.q1, s->size()) - dot<L>(c.row, z.q, s->size()), before, bend_at(z, c.row, false), after, bend_at(z, c.row, true), z.h));
             most = c.P[0] * speed;
         }
+        // of a step in which the last quarter begins, with a power that changes linearly
+        const Number share = late_share(z), tilt = Number(0.5) * z.h * c.P[0] * (after * after - before * before);
+        c.sums[LATE_LOST] += select(acts, share * fma(tilt, Number(1.0) - share, c.lost), zero);
         assign(acts, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], most));
     }
 
