@@ -46,7 +46,7 @@ template <int K> void move_in_time(Group<Tangents<K>> &runs, Dual<K> later) {
     const Structure<L> &s = *z.s;
     double *rate = reinterpret_cast<double *>(static_cast<Dual<K> *>(runs.scratch));
     runs.totals.move_in_time(z, later);
-    for (int i = 0; i < s.size(); ++i) rate[i] = z.k[i].v - s.omega[i] * s.omega[i] * z.q[i].v - 2.0 * s.sigma[i] * z.p[i].v;
+    for (int i = 0; i < s.size(); ++i) rate[i] = z.k[i].v - s.omega[i].v * s.omega[i].v * z.q[i].v - 2.0 * s.sigma[i].v * z.p[i].v;
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         const double f = force_of(z, c, z.q, z.p).v;

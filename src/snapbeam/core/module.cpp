@@ -376,6 +376,11 @@ static void integrate_tangents(nb::dict problem, nb::dict batch, nb::dict tangen
     t.rows = a.array<double>("rows", {runs, K, channels + 1, n});
     t.signals = a.array<double>("signals", {runs, K, size_t(p.signals), SIGNAL_NUMBERS});
     t.end = a.array<double>("end", {runs, K});
+    t.jumps = a.array<double>("jumps", {runs, K, size_t(p.jumps)});
+    const size_t pieces = call.of_batch.length("pieces");
+    t.pieces = a.optional<double>("pieces", {K, pieces, size_t(PIECE_NUMBERS)}), t.all_pieces = long(pieces) * PIECE_NUMBERS;
+    t.structure = a.optional<double>("structure", {K, STRUCTURE_ROWS, n});
+    if (t.structure) t.G = a.array<double>("G", {K, n, n}), t.scalars = a.array<double>("scalars", {K, STRUCTURE_SCALARS});
     t.states = a.array<double, true>("states", {runs, size_t(b.outputs), K, 2 * n + channels}, false);
     t.statistics = a.array<double, true>("statistics", {runs, K, STATISTICS}, false);
     t.of_channels = a.array<double, true>("of_channels", {runs, K, channels, OF_CHANNEL}, false);

@@ -259,6 +259,7 @@ template <int W> SNAPBEAM_FN Pack<W> sqrt(Pack<W> x) {
 }
 template <class T> SNAPBEAM_FN T exp(T x) { return each(x, [](double y) { return ::exp(y); }); }
 template <class T> SNAPBEAM_FN T log(T x) { return each(x, [](double y) { return ::log(y); }); }
+template <class T> SNAPBEAM_FN T sinh(T x) { return each(x, [](double y) { return ::sinh(y); }); }
 template <class T> SNAPBEAM_FN T tanh(T x) { return each(x, [](double y) { return ::tanh(y); }); }
 template <class T> SNAPBEAM_FN T power(T x, T n) { return select(x > T(0.0), exp(n * log(max(x, T(1e-300)))), T(0.0)); }
 

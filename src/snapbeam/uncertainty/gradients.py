@@ -48,12 +48,14 @@ def gradient(
 ) -> xr.Dataset:
     """Derivatives of smooth quantities by parameters of the system, with error estimates.
 
-    Statistics have exact derivatives through the run, with those of the times of impacts, by parameters that leave the
-    modes, a user's laws and the times of jumps of a motion: a frequency, an amplitude, a gap, a contact's stiffness or
-    location, a resistance. The step is a quarter of the usual one, and the error a third of the change that this makes.
+    Statistics have exact derivatives through the run, with those of the times of impacts and of the jumps of motions, by
+    the parameters of the beam, its ends and damping (through the derivatives of the assembled matrices), of motions,
+    contacts, forces and circuits. The step is a quarter of the usual one, and the error a third of the change that this
+    makes.
 
-    By other parameters, and of a function, central differences of order six are taken, with a step that is shortened
-    until orders six and four agree and all runs have the same number of impacts.
+    With a user's laws, engine = "python" or a tolerance, where a parameter changes the number of pieces of a motion, and
+    of a function, central differences of order six are taken, with a step that is shortened until orders six and four
+    agree and all runs have the same number of impacts.
 
     Parameters
     ----------
@@ -303,8 +305,9 @@ def _dataset(
         Diagnostic(
             "gradient.doubtful",
             f"{label}: estimated relative error of the derivative by "
-            f"{', '.join(f'{name} {each:.1g}' for name, each in large.items())}: an impact grazes, or begins or ends with the run, or the "
-            "motion is chaotic; change the parameter a little or the number of cycles",
+            f"{', '.join(f'{name} {each:.1g}' for name, each in large.items())}: an impact grazes, or begins or ends with the run, the "
+            "motion is chaotic, or the derivative is what is left of larger parts; change the parameter a little or the number of cycles, or "
+            "take accuracy = 'reference'",
             {"relative_error": max(large.values())},
         )
         for label, reason, errors in zip(labels, reasons, error, strict=True)
