@@ -148,6 +148,8 @@ def test_results_of_another_kind(system, run, tmp_path):
         lambda: sb.lab.measure_response(run.dataset, start="a"),
         lambda: sb.lab.identify_decay(signal, frequencies="abc"),
         lambda: sb.lab.identify_decay(signal, frequencies=[]),
+        lambda: sb.lab.identify_decay(signal, buckling_level=1e200),
+        lambda: sb.lab.identify_decay(signal, buckling_level=1e-200),
         lambda: sb.lab.make_signal([0.1, 0.3], "m", time=range(10**12)),
         lambda: sb.force_displacement(system, displacement_range=[1.0, 2.0, 3.0]),
     ):
