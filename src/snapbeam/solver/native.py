@@ -546,7 +546,11 @@ class Recording:
         arrays.batch["states"] = np.empty((1, 1, 2 * n + 1 + 2 * count))
         # one step may hold many instants
         span = 2.0 * float(ensemble.step_times[0])
-        most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
+        most = 0
+        for begin in range(0, times.size, _SAMPLES):  # a signal is heard between the parts
+            part = times[begin : begin + _SAMPLES]
+            found = np.searchsorted(times, part + span, side="right") - np.arange(begin, begin + part.size)
+            most = max(most, int(found.max()))
         width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
         samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // width), most + 8)
         saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
