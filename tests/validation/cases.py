@@ -181,11 +181,12 @@ def basin_shares(points: int = 100) -> list[Row]:
     source = "Two-well Duffing oscillator, Attractors.jl `attractor_mapping.jl`"
     share = float(left.mean())
     grid = "Of a grid; the source has 1000 random starts, a standard error of .016."
+    two_errors = 2.0 * 0.016 / 0.488
     return [
         Row(source, COMPUTED, "attractor in the left well, x at t = 0", -0.779, float(np.median(at[left])), 1e-3),
         Row(source, COMPUTED, "attractor in the right well, x at t = 0", 1.210, float(np.median(at[~left])), 1e-3),
-        Row(source, PRINTED, "share of the left basin", 0.488, share, 0.04, grid),
-        Row(source, PRINTED, "share of the right basin", 0.512, 1.0 - share, 0.04, grid),
+        Row(source, PRINTED, "share of the left basin", 0.488, share, two_errors, grid),
+        Row(source, PRINTED, "share of the right basin", 0.512, 1.0 - share, two_errors, grid),
     ]
 
 
