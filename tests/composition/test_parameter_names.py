@@ -74,6 +74,7 @@ def test_every_tool_finds_every_number(name: str) -> None:
         spellings = {full, row.short} | ({split_name(full)[1]} if tails.count(split_name(full)[1]) == 1 else set())
         for spelling in spellings:
             assert system.parameter(spelling).name == full, spelling
+            assert system.get(spelling) == value, spelling
             if not full.startswith("initial_state"):
                 assert config.full_name(spelling) == full, spelling
         same = system.replace(**{full: value})

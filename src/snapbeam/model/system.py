@@ -189,8 +189,8 @@ class System:
         return told_as(found, self.as_given)
 
     def get(self, name: str) -> Any:
-        """The value of a parameter by its dotted name."""
-        found, name = self.parameters, resolved(instance("name", name, str, "text"), self.labels)
+        """The value of a parameter by a name as :meth:`parameter` takes it."""
+        found, name = self.parameters, self._full_name(resolved(instance("name", name, str, "text"), self.labels))
         if ratio_of(name) not in found:
             raise InputError(f"{name}: is not a parameter of this system; it has {', '.join(found)}")
         value = found[ratio_of(name)]
