@@ -9,6 +9,7 @@ import pytest
 from doubles import KnownMap, henon, table
 
 import snapbeam as sb
+from snapbeam.dynamics.manifolds import _continued
 from snapbeam.model import default_values
 from snapbeam.model.state import amplitude_scale
 from snapbeam.util.validation import InputError
@@ -95,6 +96,25 @@ def test_bounds_on_one_side_of_a_tangency_keep_what_was_found(bounds, crosses) -
         options = {"max_arclength": 3.0, "max_distance": 0.05, "tolerance": 0.5}
         found = sb.dynamics.homoclinic_tangency(saddle, "a", (1.0, 1.4), **options)
         assert found.attrs["termination_reason"] == "tolerance"
+
+
+def test_a_saddle_is_followed_to_a_value_from_which_newtons_method_would_not_find_it() -> None:
+    """The hilltop saddle of the two-well oscillator (multiplier 245), in steps of its amplitude."""
+    model = sb.ReducedModel.from_matrices(
+        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0],
+        damping_ratio=0.25 / (2.0 * np.sqrt(2.0)), reference_frequency=0.5 / np.pi,
+    )  # fmt: skip
+    force = sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=1.0, amplitude=0.2))
+    saddle = sb.dynamics.periodic_orbit(sb.System(model, forces=[force]), [0.0, -0.1])
+    alone = saddle.flow.changed({"force.amplitude": 0.15})
+    with pytest.raises(sb.dynamics.OrbitNotFoundError):
+        sb.dynamics.periodic_orbit(alone, saddle.coordinates)
+    found = sb.dynamics.homoclinic_tangency(saddle, "force.amplitude", (0.15, 0.23), max_seconds=1e-3)
+    assert found.attrs["termination_reason"] == "max_seconds"
+    there = _continued(saddle, "force.amplitude", 0.15)
+    assert there.flow.value("force.amplitude") == 0.15
+    assert abs(there.multipliers).max() > 100.0
+    assert np.abs(there.coordinates).max() < 0.2 and there.coordinates[1] == pytest.approx(-0.075, abs=0.02)
 
 
 def test_a_saddle_that_is_gone_keeps_what_was_found() -> None:

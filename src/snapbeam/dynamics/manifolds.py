@@ -447,6 +447,10 @@ def _chords(manifold: xr.Dataset) -> tuple[_Array, _Array, _Array]:
     return states[:-1][same], np.diff(states, axis=0)[same], manifold["arclength"].values[:-1][same]
 
 
+_SHORTEST_STEP = 1.0 / 256.0
+"""Part of the way to another value of a parameter in which an orbit is followed, at least."""
+
+
 @checked
 def homoclinic_tangency(
     orbit: PeriodicOrbit,
@@ -525,15 +529,16 @@ def homoclinic_tangency(
     total = 2 + int(np.ceil(np.log2((high - low) / width)))
     clock = _clock(max_seconds, progress, "homoclinic tangency")
     tried: dict[float, bool] = {}
+    saddles = [orbit]
 
     def crosses(value: float) -> bool | str:
         """Return whether the manifolds cross, which *tried* keeps, or the reason why that is not known."""
         if clock.is_over:
             return "max_seconds"
         part = clock._replace(begun=len(tried) / total, part=1.0 / total)
-        flow = orbit.flow.changed({name: value})
         try:
-            saddle = periodic_orbit(flow, orbit.coordinates, orbit.period)
+            saddle = _continued(min(saddles, key=lambda each: abs(each.flow.value(name) - value)), name, value)
+            saddles.append(saddle)
             both = [
                 _manifold(saddle, inverse, length, distance, turn, _POINTS, part.half(int(inverse)))
                 for inverse in (False, True)
@@ -585,3 +590,18 @@ def homoclinic_tangency(
             "max_arclength": length, "max_distance": distance, "max_turn": turn,
         },
     )  # fmt: skip
+
+
+def _continued(orbit: PeriodicOrbit, name: str, value: float) -> PeriodicOrbit:
+    """The orbit at another value of a parameter, in steps that Newton's method follows; its error where they become too short."""
+    start = at = orbit.flow.value(name)
+    step = value - start
+    while at != value:
+        to = value if abs(value - at) <= abs(step) else at + step
+        try:
+            orbit, at = periodic_orbit(orbit.flow.changed({name: to}), orbit.coordinates, orbit.period), to
+        except OrbitNotFoundError:
+            step *= 0.5
+            if abs(step) < _SHORTEST_STEP * abs(value - start):
+                raise
+    return orbit
