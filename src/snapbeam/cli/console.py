@@ -251,12 +251,12 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
 
 def _draws(signature: inspect.Signature) -> bool:
     """Return whether an option of a command names a figure."""
-    texts = (getattr(each, "help", "") for own in signature.parameters.values() for each in _metadata(own.annotation))
+    texts = (
+        getattr(each, "help", "")
+        for own in signature.parameters.values()
+        for each in getattr(own.annotation, "__metadata__", ())
+    )
     return any(str(text).startswith("Figure ") for text in texts)
-
-
-def _metadata(annotation: Any) -> tuple[Any, ...]:
-    return getattr(annotation, "__metadata__", ())
 
 
 @contextmanager

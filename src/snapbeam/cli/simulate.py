@@ -26,10 +26,11 @@ from snapbeam.cli.console import (
 )
 from snapbeam.cli.parameter_options import BEAM, CONTACT, DRIVE, MODEL, RUN, STRIKER, configured, with_parameters
 from snapbeam.util.files import check_writable, require_room_of
+from snapbeam.util.netcdf import read_netcdf
 from snapbeam.util.validation import InputError, choice, integer
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 
 @cli_command
@@ -115,7 +116,7 @@ def simulate(
         named = [name for name in ("frequency_ratio", "velocity_amplitude") if given[f"drive.{name}"] is not None]
         if named:
             raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
-        system = system.replace(drive=sb.RecordedMotion.from_dataset(_recorded(recorded_drive)))
+        system = system.replace(drive=sb.RecordedMotion.from_dataset(read_netcdf(recorded_drive, "drive")))
     if animate is not None and system.model.beam is None:
         raise sb.InputError("--animate: a structure given by matrices has no shape that moves; use --plot")
     start = time.monotonic()
@@ -238,12 +239,6 @@ def _require_striker(system: Any) -> None:
         else f"give the record in the parameter file: [{instead}] with type = {_OWN_RECORD[instead]!r} and its file"
     )
     raise InputError(f"recorded_drive (--recorded-drive): moves a striker, but the system does not have one; {way}")
-
-
-def _recorded(path: Path) -> xr.Dataset:
-    from snapbeam.util.netcdf import read_netcdf
-
-    return read_netcdf(path, "drive")
 
 
 def _animated(run: Any, path: Path, window: tuple[float, float] | None, kept: Path | None) -> Path:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,10 +15,9 @@ from snapbeam.cli.console import (
     check_outputs,
     cli_command,
     count_text,
+    draw_computed,
     duration,
-    kept_if_not_drawn,
     notes,
-    plot_command,
     print_written,
     progress,
     write_map,
@@ -121,17 +119,11 @@ def _compute(
     return dataset, time.monotonic() - begun
 
 
-def finish(dataset: xr.Dataset, output: Path, plot: Path | None, drawn: Any, lines: list[str]) -> None:
+def finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str], variable: str | None = None) -> None:
     """Write and plot the results and print a summary."""
     files = [write_map(dataset, output)]
     if plot is not None:
-        with kept_if_not_drawn(lambda file: plot_command(file, plot), output, functools.partial(write_map, dataset)):
-            import matplotlib
-
-            matplotlib.use("Agg")
-            from snapbeam.plot.style import save_figure
-
-            files.append(save_figure(drawn(dataset), plot))
+        files.append(draw_computed(dataset, plot, output, variable))
     add_json(summary=lines, files=files)
     print_written(lines, files)
 
@@ -158,7 +150,6 @@ def design(
 
     Example: snapbeam design switch.toml -o design.nc --plot design.png --checkpoint design.checkpoint
     """
-    from snapbeam.plot.uncertainty import plot_designs
     from snapbeam.uncertainty.optimization import optimize_design
 
     settings, uncertainty, asked = read(file, "design", law)
@@ -171,7 +162,7 @@ def design(
         return
     dataset, elapsed = found
     add_json(designs={str(name): each.values for name, each in dataset.data_vars.items() if "tried" not in each.dims})
-    finish(dataset, output, plot, plot_designs, _lines(dataset, elapsed))
+    finish(dataset, output, plot, _lines(dataset, elapsed))
 
 
 def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
@@ -275,7 +266,6 @@ def probability(
 
     Example: snapbeam probability switch.toml --outcome 'peak_force > 60 N' -o probability.nc --plot probability.png
     """
-    from snapbeam.plot.uncertainty import plot_probability
     from snapbeam.plot.units import in_units
     from snapbeam.uncertainty.monte_carlo import outcome_named
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
@@ -310,7 +300,7 @@ def probability(
     add_json(results=small, axes={str(dim): told[dim].values for dim in told["runs"].dims if dim in told.coords})
     asked_for = options.get("outcomes") if "outcome" not in asked else None
     drawn = outcome_named(asked_for[0])[0] if asked_for else str(dataset.attrs["watched_outcome"])
-    finish(dataset, output, plot, lambda ds: plot_probability(ds, drawn), _lines_probability(told, elapsed))
+    finish(dataset, output, plot, _lines_probability(told, elapsed), drawn)
 
 
 def _default_axes(system: System) -> dict[str, Any]:

@@ -218,7 +218,7 @@ def _lifetime_line(dataset: xr.Dataset, ax: Axes, x: Any, legend: bool) -> None:
     share = 100.0 * float(dataset.attrs.get("confidence", 0.95))
     label = f"lifetime, {share:g} % interval"
     if np.isfinite(value).any():
-        look = {"color": _BLUE, "markersize": marker_size(x.size), "linewidth": 0.7, "elinewidth": 0.7}
+        look: dict[str, Any] = {"color": _BLUE, "markersize": marker_size(x.size), "linewidth": 0.7, "elinewidth": 0.7}
         ax.errorbar(x, value, yerr=bars, fmt="o-", label=label, **look)
     ax.set(yscale="log", ylim=(0.5 * float(ends.min()) if ends.size else 0.1, top))
     ax.set_ylabel("Lifetime of snapping (cycles)")

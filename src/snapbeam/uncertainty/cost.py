@@ -115,7 +115,7 @@ def estimate_cost(question: Callable[..., Any], *arguments: Any, trial: float = 
     (32, True)
     """
     within("trial", trial, 0.0, _LONGEST, closed="right", unit="s")
-    known = {
+    known: dict[Any, Callable[..., CostEstimate]] = {
         sweep: _of_sweep, probability_map: _of_probability, quantile_threshold: _of_threshold, optimize_design: _of_design
     }  # fmt: skip
     if question not in known:

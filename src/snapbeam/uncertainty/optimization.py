@@ -356,9 +356,9 @@ def require_kinds(objectives: Any, constraints: Any) -> tuple[tuple[Objective, .
     for each in made:
         if not isinstance(each, Objective):
             raise InputError(f"objectives: {shown(each)} must be an Objective, or the name of a quantity")
-    for each in kept:
-        if not isinstance(each, Constraint):
-            raise InputError(f"constraints: {shown(each)} must be a Constraint")
+    for limit in kept:
+        if not isinstance(limit, Constraint):
+            raise InputError(f"constraints: {shown(limit)} must be a Constraint")
     if not 1 <= len(made) <= 3:
         raise InputError(f"objectives: {len(made)} of them; must be one to three")
     labels = [each.label for each in made]
@@ -955,8 +955,8 @@ def _improved(search: DifferentialEvolution, before: tuple[float, _Array]) -> bo
 
 def _early(objectives: Any, constraints: Any) -> bool:
     """Return whether early termination is allowed: not if a statistic of the runs is requested."""
-    made, kept = _listed(objectives, constraints)
-    return all(getattr(each, "quantity", None) is not None and each._quantity.kind != "run" for each in (*made, *kept))
+    parts: list[Any] = [part for parts in _listed(objectives, constraints) for part in parts]
+    return all(getattr(each, "quantity", None) is not None and each._quantity.kind != "run" for each in parts)
 
 
 def _front(objectives: _Array, violation: _Array) -> list[int]:
@@ -1150,8 +1150,8 @@ def _dataset(
         dataset[f"required_{constraint.label}"] = ((), required, {"units": "1", "long_name": "required fraction"})
         unit, about = constraint._quantity.unit, f"distance of {constraint.quantity} from its limit"
         if constraint._quantity.kind != "design":
-            words = f"distance of the fraction that satisfies the constraint of {constraint.quantity}"
-            unit, about = "1", f"{words} from the required one"
+            unit, about = "1", f"distance of the fraction that satisfies the constraint of {constraint.quantity}"
+            about = f"{about} from the required one"
         labels = {"units": unit, "long_name": f"{about}; negative: violated"}
         dataset[f"distance_{constraint.label}"] = (("design",), reported[:, k], labels)
         dataset[f"tried_distance_{constraint.label}"] = (("tried",), distances[:, k], labels)

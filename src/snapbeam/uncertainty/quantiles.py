@@ -516,10 +516,10 @@ def _labelled(
         long_name = f"{text}{row.quantity.long_name} at which the probability is passed"
         labels = {"units": row.quantity.unit, "long_name": long_name}
         dataset[f"threshold{ending}"] = ((*points.dims, LEVEL), points.arranged(table[:, k]), labels)
-    flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": _FOUND}
+    flags: dict[str, Any] = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": _FOUND}
     codes = points.arranged(np.array([column["codes"] for column in columns]))
-    labels = {"units": "1", "long_name": "status of the search"} | flags
-    dataset["outcome_of_search"] = ((*points.dims, LEVEL), codes, labels)
+    found = {"units": "1", "long_name": "status of the search"} | flags
+    dataset["outcome_of_search"] = ((*points.dims, LEVEL), codes, found)
     words = "whether the threshold is that of the fitted curve; else of the isotonic regression"
     fitted = points.arranged(np.array([column["curve"] for column in columns]))
     dataset["is_fitted"] = ((*points.dims, LEVEL), fitted, {"units": "1", "long_name": words})

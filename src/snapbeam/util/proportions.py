@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
@@ -57,7 +59,7 @@ def mean_interval(values: ArrayLike, confidence: float = 0.95, positive: bool = 
     return mean, np.where(good, low, 0.0 if positive else -np.inf), np.where(good, high, np.inf)
 
 
-def levels_of(name: str, given: ArrayLike) -> tuple[float, ...]:
+def levels_of(name: str, given: Any) -> tuple[float, ...]:
     """Return probabilities, increasing, each in (0, 1)."""
     found = tuple(within(name, each, 0.0, 1.0) for each in np.atleast_1d(finite_array(name, given)).ravel())
     if not found or (np.diff(found) <= 0.0).any():
@@ -65,7 +67,7 @@ def levels_of(name: str, given: ArrayLike) -> tuple[float, ...]:
     return found
 
 
-def weighted_quantiles(values: _Array, weights: _Array, shares: ArrayLike) -> _Array:
+def weighted_quantiles(values: _Array, weights: _Array, shares: tuple[float, ...]) -> _Array:
     """Return quantiles of samples whose weights add up to 1."""
     order = np.argsort(values, kind="stable")
     return np.interp(shares, np.cumsum(weights[order]) - 0.5 * weights[order], values[order])
