@@ -27,7 +27,7 @@ from rich.text import Text
 
 from snapbeam._version import __version__
 from snapbeam.cli.short_help import wants_all
-from snapbeam.util.files import VERSION, foreign_files_kept
+from snapbeam.util.files import VERSION, atomic_path, check_writable, foreign_files_kept, require_room
 from snapbeam.util.interrupts import WORDS, during_command
 from snapbeam.util.memory_limit import limit, not_sufficient, sufficient
 from snapbeam.util.packages import extra_of, needs
@@ -123,8 +123,6 @@ def write_json_now(**found: Any) -> None:
 
 def write_json(path: Path, found: Mapping[str, Any]) -> None:
     """Write plain values to a JSON file, atomically, or for ``-`` to standard output; what is not finite is null."""
-    from snapbeam.util.files import atomic_path, check_writable
-
     text = json.dumps({VERSION: __version__} | _plain(found), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     text = text.encode("utf-8", "backslashreplace").decode()  # a name that is not UTF-8: an escape of JSON
     if path == Path("-"):
@@ -199,8 +197,6 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
             with during_command(), warnings.catch_warnings(), kept:
                 warnings.showwarning = _show_warning  # type: ignore[assignment]
                 if asked.json is not None and asked.json != Path("-"):
-                    from snapbeam.util.files import check_writable
-
                     check_writable(asked.json, "json", (".json",))
                 _check_texts(kwargs)
                 try:
@@ -255,12 +251,12 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
 
 def _draws(signature: inspect.Signature) -> bool:
     """Return whether an option of a command names a figure."""
-    texts = (getattr(each, "help", "") for own in signature.parameters.values() for each in _metadata(own.annotation))
+    texts = (
+        getattr(each, "help", "")
+        for own in signature.parameters.values()
+        for each in getattr(own.annotation, "__metadata__", ())
+    )
     return any(str(text).startswith("Figure ") for text in texts)
-
-
-def _metadata(annotation: Any) -> tuple[Any, ...]:
-    return getattr(annotation, "__metadata__", ())
 
 
 @contextmanager
@@ -430,8 +426,6 @@ def open_result(file: Path) -> xr.Dataset:
 
 def check_pictures(*pictures: tuple[str, Path | None]) -> None:
     """Raise an error, before any computation, if a figure file cannot be written."""
-    from snapbeam.util.files import check_writable, require_room
-
     for name, path in pictures:
         if path is not None:
             from snapbeam.plot.style import FIGURE_SUFFIXES
@@ -442,8 +436,6 @@ def check_pictures(*pictures: tuple[str, Path | None]) -> None:
 
 def check_outputs(output: Path, plot: Path | None, suffixes: tuple[str, ...] = (".nc",), begin: str = "") -> None:
     """Refuse, before any computation, results and figures that cannot be written; *begin* begins such tables."""
-    from snapbeam.util.files import check_writable
-
     if output.suffix.lower() == ".csv" and ".csv" not in suffixes:
         name = shlex.quote(str(output.with_suffix(".nc")))
         raise InputError(

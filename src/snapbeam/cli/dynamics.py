@@ -16,7 +16,17 @@ import typer
 
 from snapbeam import dynamics as library
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import FAILED, add_json, check_outputs, cli_command, duration, print_written, progress
+from snapbeam.cli.console import (
+    FAILED,
+    add_json,
+    check_outputs,
+    cli_command,
+    draw_computed,
+    duration,
+    print_written,
+    progress,
+    write_map,
+)
 from snapbeam.cli.parameter_options import ALL, BEAM, MODEL, configured, with_parameters
 from snapbeam.cli.short_help import ShortHelpCommand, ShortHelpGroup
 from snapbeam.util.validation import InputError, choice
@@ -199,7 +209,6 @@ def _finish(
     dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str], statistic: str | None = None
 ) -> None:
     """Write, draw and print the results."""
-    from snapbeam.cli.console import draw_computed, write_map
     from snapbeam.cli.summary import initial_well_lines
 
     reason = dataset.attrs.get("termination_reason")

@@ -7,8 +7,6 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import (
     add_json,
@@ -21,6 +19,7 @@ from snapbeam.cli.console import (
     write_map,
 )
 from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, configured, with_parameters
+from snapbeam.util.validation import InputError, choice
 
 if TYPE_CHECKING:
     from snapbeam.model.potential import Potential
@@ -47,18 +46,18 @@ def equilibria(
     ] = None,
     identify: Annotated[
         str,
-        typer.Option(
-            "--identify-imperfection",
-            help="Imperfection to identify from them: midspan_amplitude, point_load or uniform_load.",
-            rich_help_panel="Identification",
+        opt.option(
+            "Imperfection to identify from them: midspan_amplitude, point_load or uniform_load.",
+            "Identification",
+            flags="--identify-imperfection",
         ),
     ] = "midspan_amplitude",
     with_force: Annotated[
         bool,
-        typer.Option(
-            "--force-displacement",
-            help="Compute the static force-displacement curve of a point force.",
-            rich_help_panel="Force-displacement",
+        opt.option(
+            "Compute the static force-displacement curve of a point force.",
+            "Force-displacement",
+            flags="--force-displacement",
         ),
     ] = False,
     location: Annotated[
@@ -66,38 +65,28 @@ def equilibria(
     ] = None,
     well: Annotated[
         str | None,
-        typer.Option(
-            "--well",
-            help="Well from which the force pushes: lower or upper; the as-fabricated one by default.",
-            rich_help_panel="Force-displacement",
+        opt.option(
+            "Well from which the force pushes: lower or upper; the as-fabricated one by default.", "Force-displacement"
         ),
     ] = None,
     over: Annotated[
         str | None,
-        typer.Option(
-            "--over",
-            help="Follow the equilibria over a parameter: force.voltage=0:40, beam.buckling_level=0.1mm:0.5mm.",
-            rich_help_panel="Branches over a parameter",
-            metavar="NAME=START:STOP",
+        opt.option(
+            "Follow the equilibria over a parameter: force.voltage=0:40, beam.buckling_level=0.1mm:0.5mm.",
+            "Branches over a parameter",
+            "NAME=START:STOP",
         ),
     ] = None,
     variable: Annotated[
         str | None,
-        typer.Option(
-            help="Variable that --plot draws over the parameter: midspan_displacement (default) or natural_frequency.",
-            rich_help_panel="Branches over a parameter",
-            metavar="NAME",
+        opt.option(
+            "Variable that --plot draws over the parameter: midspan_displacement (default) or natural_frequency.",
+            "Branches over a parameter",
+            "NAME",
         ),
     ] = None,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            help="NetCDF file of the curve or the branches to write.",
-            rich_help_panel="Output",
-            metavar="FILE",
-        ),
+        Path | None, opt.option("NetCDF file of the curve or the branches to write.", "Output", "FILE", "--output -o")
     ] = None,
     plot: opt.Plot = None,
 ) -> None:
@@ -115,7 +104,6 @@ def equilibria(
     from snapbeam.model.potential import Potential
     from snapbeam.model.system import System
     from snapbeam.util.si_prefixes import prefixed, scale_of
-    from snapbeam.util.validation import InputError
 
     asked = [
         name
@@ -213,7 +201,6 @@ def _branches(settings: Any, over: str, output: Path | None, plot: Path | None, 
     from snapbeam.model.equilibrium_branches import equilibrium_branches
     from snapbeam.model.parameters import lookup
     from snapbeam.util.si_prefixes import prefixed, with_unit
-    from snapbeam.util.validation import InputError, choice
 
     if variable is not None:
         from snapbeam.plot.force_displacement import BRANCH_FIGURES

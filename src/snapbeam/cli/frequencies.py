@@ -9,6 +9,8 @@ import numpy as np
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, cli_command, out
 from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, configured, with_parameters
+from snapbeam.model.quantity import numbered
+from snapbeam.util.validation import integer
 
 if TYPE_CHECKING:
     from snapbeam.model.parameter_file import Config
@@ -31,7 +33,6 @@ def frequencies(
     from snapbeam.model.modal_convergence import modal_error
     from snapbeam.model.natural_frequencies import exact_natural_frequencies
     from snapbeam.util.si_prefixes import prefixed
-    from snapbeam.util.validation import integer
 
     count = integer("count", count, 1, 200)
     settings = configured(given)
@@ -80,8 +81,6 @@ def modal_error_text(quantity: str, error: float, modes: int) -> str:
 def _print_circuits(settings: Config, count: int) -> None:
     """Print the frequencies about each well with open and with shorted loads, of a system with harvesters."""
     from rich.table import Table
-
-    from snapbeam.model.quantity import numbered
 
     if not any(numbered(name)[0] == "harvester" for name in settings.given):
         return

@@ -12,6 +12,7 @@ from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import add_json, check_outputs, cli_command, draw_computed, print_written, write_result
 from snapbeam.cli.parameter_options import ALL, configured, with_parameters
 from snapbeam.cli.summary import statistic_value, unit_words
+from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,23 +31,14 @@ def gradient(
         Path | None, typer.Argument(help="TOML parameter file, as --config; options override it.", metavar="FILE")
     ] = None,
     parameters: Annotated[
-        str | None,
-        typer.Option(
-            help="Parameters, of numbers that are not zero: name,name.", rich_help_panel=_PANEL, metavar="NAMES"
-        ),
+        str | None, opt.option("Parameters, of numbers that are not zero: name,name.", _PANEL, "NAMES")
     ] = None,
     statistic: Annotated[
         str, typer.Option(help="Statistics of a run: name,name.", rich_help_panel=_PANEL, metavar="NAMES")
     ] = "peak_midspan_displacement",
     output: Annotated[
         Path,
-        typer.Option(
-            "--output",
-            "-o",
-            help="File to write: NetCDF (.nc), a table (.csv) or JSON (.json).",
-            rich_help_panel="Output",
-            metavar="FILE",
-        ),
+        opt.option("File to write: NetCDF (.nc), a table (.csv) or JSON (.json).", "Output", "FILE", "--output -o"),
     ] = Path("gradient.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
@@ -62,7 +54,6 @@ def gradient(
     """  # fmt: skip
     from snapbeam.model.parameters import in_table
     from snapbeam.uncertainty.gradients import gradient as compute
-    from snapbeam.util.validation import InputError
 
     if file is not None and given["config"] is not None:
         raise InputError(f"FILE = {str(file)!r} with --config: give one of the two")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from snapbeam.cli.console import add_json, cli_command, file_line, notes, out
-from snapbeam.util.validation import printable
+from snapbeam.cli.console import add_json, cli_command, file_line, notes, open_result, out
+from snapbeam.util.validation import InputError, printable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,9 +31,7 @@ def info(
 
     Example: snapbeam info map.nc --export map.csv
     """
-    from snapbeam.cli.console import open_result
     from snapbeam.cli.summary import class_table, parameter_table, status_lines
-    from snapbeam.util.validation import InputError
 
     if file.suffix.lower() == ".toml":
         raise InputError(

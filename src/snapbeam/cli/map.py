@@ -9,8 +9,20 @@ from typing import Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import FAILED, add_json, cli_command, out
+from snapbeam.cli.console import (
+    FAILED,
+    add_json,
+    check_outputs,
+    cli_command,
+    draw_computed,
+    out,
+    read_overlay,
+    write_map,
+)
 from snapbeam.cli.parameter_options import ALL, AXES, configured, with_parameters
+from snapbeam.model.quantity import split_name
+from snapbeam.util.files import require_room, set_request
+from snapbeam.util.validation import InputError, choice
 
 
 @cli_command
@@ -23,11 +35,7 @@ def compute_map(
     plot: opt.Plot = None,
     variable: Annotated[
         str | None,
-        typer.Option(
-            help="Statistic that --plot draws, such as peak_force; the response class by default.",
-            rich_help_panel="Output",
-            metavar="NAME",
-        ),
+        opt.option("Statistic that --plot draws, such as peak_force; the response class by default.", "Output", "NAME"),
     ] = None,
     over: opt.CurvesOver = None,
     measurements: opt.Measurements = None,
@@ -42,9 +50,7 @@ def compute_map(
     Example: snapbeam map --modes 32 --cycles 200 --frequency-ratio 0.1:4:64 --velocity-amplitude
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
     """
-    from snapbeam.cli.console import check_outputs, draw_computed, read_overlay
     from snapbeam.cli.summary import map_facts, map_summary
-    from snapbeam.util.files import require_room, set_request
 
     settings = opt.resumed(given, keeping, configured(given, _axes_of))
     axes = _axes_of(settings, given)
@@ -87,8 +93,6 @@ def compute_map(
         raise typer.Exit(FAILED if counts.failed else 0)
     elapsed = time.monotonic() - start
     if not opt.is_long(keeping):
-        from snapbeam.cli.console import write_map
-
         write_map(dataset, output)
     files = [output]
     if plot is not None:
@@ -114,7 +118,6 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
     """
     from snapbeam.model.parameter_file import DEFAULT_AXES, parsed_axis, same_axis
     from snapbeam.model.parameters import ratio_of
-    from snapbeam.model.quantity import split_name
 
     named: dict[str, Any] = settings.axes()
     order = ("model.modes", "drive.frequency_ratio", "drive.velocity_amplitude", "contact.location")
@@ -138,7 +141,6 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
 def _checked_variable(variable: str | None, settings: Any, plot: Path | None, *, overlaid: bool) -> str | None:
     """Return the name in the map; refused, before any run, if the map will not have it or --plot cannot draw it."""
     from snapbeam.solver.statistics import name_in, rows_for
-    from snapbeam.util.validation import InputError, choice
 
     if variable is None:
         return None
@@ -157,7 +159,6 @@ def _checked_variable(variable: str | None, settings: Any, plot: Path | None, *,
 def _check_over(over: str | None, variable: str | None, settings: Any, axes: dict[str, Any]) -> None:
     """Refuse, before any run, curves of nothing or over no axis."""
     from snapbeam.model.parameter_file import same_axis
-    from snapbeam.util.validation import InputError
 
     if over is not None and variable in (None, "response_class"):
         raise InputError(f"over = {over!r}: curves are of a statistic; give --variable, such as peak_force, and --plot")
@@ -168,7 +169,6 @@ def _check_over(over: str | None, variable: str | None, settings: Any, axes: dic
 def _check_axes(path: Path, axes: dict[str, Any], variable: str | None) -> None:
     from snapbeam.model.parameters import lookup
     from snapbeam.solver.statistics import STATISTICS
-    from snapbeam.util.validation import InputError
 
     many = [lookup(name).short for name, values in axes.items() if len(values) > 1]
     real = variable is not None and STATISTICS[variable].dtype == "float64"

@@ -15,7 +15,10 @@ import numpy as np
 import typer
 from rich.markup import escape
 
-from snapbeam.cli.console import add_json, duration, notes, out, pace, progress
+from snapbeam.cli.console import add_json, duration, notes, open_result, out, pace, progress
+from snapbeam.model.quantity import split_name
+from snapbeam.util.files import check_writable
+from snapbeam.util.validation import InputError, integer, parsed_json
 from snapbeam.util.work_rate import WorkRate
 
 if TYPE_CHECKING:
@@ -69,23 +72,14 @@ _PANELS = {
 }
 # Options that differ from the name of the parameter, and help texts that the table does not contain.
 _OPTIONS = {
-    "contact.stiffness": "--contact-stiffness",
-    "contact.radius": "--contact-radius",
-    "contact.young_modulus": "--contact-young-modulus",
-    "contact.poisson_ratio": "--contact-poisson-ratio",
     "contact.coefficient": "--newton-restitution",
-    "contact.damping_factor": "--contact-damping-factor",
     "contact.restitution": "--hunt-crossley-restitution",
     "contact.speed": "--hunt-crossley-speed",
-    "drive.phase": "--drive-phase",
-    "boundary.left_rotational_stiffness": "--left-rotational-stiffness",
-    "boundary.right_rotational_stiffness": "--right-rotational-stiffness",
-    "boundary.axial_support_stiffness": "--axial-support-stiffness",
-    "drive.velocity_m_s": "--velocity-m-s",
-    "contact.location_m": "--location-m",
-    "contact.mass": "--striker-mass",
-    "contact.suspension_stiffness": "--striker-suspension-stiffness",
-    "contact.suspension_damping": "--striker-suspension-damping",
+    **{
+        name: f"--{name.replace('.', '-').replace('_', '-')}"
+        for name in (*CONTACT[:4], "contact.damping_factor", "drive.phase")
+    },
+    **{name: f"--striker-{split_name(name)[1].replace('_', '-')}" for name in STRIKER[4:]},
 }
 _WORDS = {
     "initial_state.initial_well": "well that runs begin in, by name or by its index; by default the one that the first striker or stop "
@@ -118,12 +112,8 @@ def with_parameters(*names: str, axes: tuple[str, ...] = ()) -> Callable[[Callab
     """
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        own = {
-            name: parameter
-            for name, parameter in inspect.signature(function, eval_str=True).parameters.items()
-            if name != "given"
-        }
-        added = {_identifier(name): (name, _option(name, name in axes)) for name in names}
+        own = inspect.signature(function, eval_str=True).parameters
+        added = {name.replace(".", "__"): (name, _option(name, name in axes)) for name in names}
         general = {key: each for key, each in _general(bool(axes)).items() if key not in own}
 
         def command(**arguments: Any) -> Any:
@@ -131,21 +121,22 @@ def with_parameters(*names: str, axes: tuple[str, ...] = ()) -> Callable[[Callab
             given |= {key: arguments.pop(key) for key in general if key in arguments}
             return function(given=given, **arguments)
 
-        command.__name__, command.__doc__ = function.__name__, function.__doc__
-        command.__module__ = function.__module__
-        parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.values()]
-        parameters += [
-            inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-            for key, (default, kind) in general.items()
-        ]
-        parameters += [
-            inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
-            for key, (_, kind) in added.items()
-        ]
-        command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        return command
+        return _as(command, function, "given", general | {key: (None, kind) for key, (_, kind) in added.items()})
 
     return decorate
+
+
+def _as(
+    command: Callable[..., Any], function: Callable[..., Any], without: str, options: Mapping[str, tuple[Any, Any]]
+) -> Callable[..., Any]:
+    """Give a command the name and the parameters of a function, with *options* in place of the parameter *without*."""
+    command.__name__, command.__doc__, command.__module__ = function.__name__, function.__doc__, function.__module__
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    own = inspect.signature(function, eval_str=True).parameters
+    kept = [parameter.replace(kind=keyword) for name, parameter in own.items() if name != without]
+    kept += [inspect.Parameter(name, keyword, default=each, annotation=kind) for name, (each, kind) in options.items()]
+    command.__signature__ = inspect.Signature(kept)  # type: ignore[attr-defined]
+    return command
 
 
 Law = Annotated[
@@ -163,8 +154,6 @@ def import_laws(given: Sequence[str] | None) -> None:
     """Execute Python files of the user's own, which register the laws that they define."""
     import importlib.util
     import sys
-
-    from snapbeam.util.validation import InputError
 
     for text in given or ():
         file, _, name = text.partition(".py:")
@@ -189,10 +178,6 @@ def import_laws(given: Sequence[str] | None) -> None:
                 raise InputError(f"{where}: cannot be executed: {type(error).__name__}: {error}") from error
         if name and not isinstance(getattr(module, name, None), type):
             raise InputError(f"{where}: the file does not define a class {name!r}")
-
-
-def _identifier(name: str) -> str:
-    return name.replace(".", "__")
 
 
 def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
@@ -220,12 +205,12 @@ def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
         "law": (None, Law),
     }
     if with_axes:
-        sweep = typer.Option(
-            "--sweep",
-            help="Sweep any parameter: beam.thickness=3e-4:5e-4:20, model.modes=1,8; repeat for further axes. "
+        sweep = option(
+            "Sweep any parameter: beam.thickness=3e-4:5e-4:20, model.modes=1,8; repeat for further axes. "
             "Without this option the map is over frequency ratio and velocity amplitude.",
-            metavar="NAME=VALUES",
-            rich_help_panel="Axes",
+            "Axes",
+            "NAME=VALUES",
+            "--sweep",
         )
         found["sweep"] = (None, Annotated[list[str] | None, sweep])
     return found
@@ -234,7 +219,6 @@ def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
 def _option(name: str, is_axis: bool) -> Any:
     """The type of an option, with its words."""
     from snapbeam.model.parameters import PHYSICAL, parameters
-    from snapbeam.model.quantity import split_name
 
     section, field = split_name(name)
     row, physical = parameters().get(name), PHYSICAL.get(name)
@@ -274,7 +258,6 @@ def _parser(unit: str) -> Callable[[str], float]:
 
     def parse(text: str) -> float:
         from snapbeam.model.parameter_axes import parse_axis
-        from snapbeam.util.validation import InputError
 
         try:
             return float(parse_axis("", text, unit=unit or "1"))
@@ -318,8 +301,6 @@ def configured(
     *axes_of* returns the axes of a command, its own ones included, for ``--print-config``.
     """
     from snapbeam.model.parameter_file import Config, load_config, override, same_axis
-    from snapbeam.model.quantity import split_name
-    from snapbeam.util.validation import InputError
 
     import_laws(given.get("law"))
     file = given.get("config")
@@ -366,7 +347,8 @@ def configured(
         out().print(config_text(printed), markup=False, end="")
         add_json(**printed.to_mapping())
         raise typer.Exit
-    if config.defaulted and (config.extends_paper or _needs_drive(given)):
+    runs_one_drive = "drive.frequency_ratio" in given and "sweep" not in given
+    if config.defaulted and (config.extends_paper or runs_one_drive):
         whole = config.whole().to_mapping()
         taken = [name for name in config.defaulted if split_name(name)[0] in whole]
         values = ", ".join(f"{name} = {_shown(whole, name)}" for name in taken)
@@ -376,16 +358,8 @@ def configured(
     return config
 
 
-def _needs_drive(given: Mapping[str, Any]) -> bool:
-    """Return whether a command runs one drive, and has no axes of its own."""
-    return "drive.frequency_ratio" in given and "sweep" not in given
-
-
 def _require_striker(config: Config, sections: Mapping[str, Any], axes: Mapping[str, Any]) -> None:
     """Raise an error for a striker without a drive next to another excitation of the file."""
-    from snapbeam.model.quantity import split_name
-    from snapbeam.util.validation import InputError
-
     moved = [name for name in ("base_excitation", "axial_load") if config.section(name) or sections.get(name)]
     given = [f"drive.{field}" for field in sections.get("drive", {})]
     given += [name for name in axes if name.startswith("drive.")]
@@ -400,7 +374,6 @@ def _require_striker(config: Config, sections: Mapping[str, Any], axes: Mapping[
 def _shown(sections: Mapping[str, Mapping[str, Any]], name: str) -> str:
     """A value with its unit."""
     from snapbeam.model.parameters import lookup
-    from snapbeam.model.quantity import split_name
 
     section, field = split_name(name)
     value, unit = sections[section][field], lookup(name).quantity.unit
@@ -417,8 +390,6 @@ def _is_axis(name: str, value: str) -> bool:
 
 
 def _assignment(text: str, option: str) -> tuple[str, str]:
-    from snapbeam.util.validation import InputError
-
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
         raise InputError(f"{option} = {text!r}: must be name=value, such as contact.stiffness=2e8")
@@ -429,7 +400,6 @@ def _value(name: str, value: Any) -> Any:
     """The text of an option as what its parameter holds."""
     from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.model.parameters import PHYSICAL, lookup, row_of
-    from snapbeam.util.validation import InputError
 
     if not isinstance(value, str):
         return value
@@ -462,6 +432,11 @@ def _value(name: str, value: Any) -> Any:
 _OUTPUT = "Output"
 
 
+def option(about: str, panel: str, metavar: str | None = None, flags: str = "") -> Any:
+    """An option, with the flags that its parameter does not name."""
+    return typer.Option(*flags.split(), help=about, rich_help_panel=panel, metavar=metavar)
+
+
 def number_option(about: str, panel: str) -> Any:
     """An option that takes a number."""
     return typer.Option(help=about, rich_help_panel=panel, parser=parse_number, metavar="NUMBER")
@@ -479,12 +454,7 @@ Plot = Annotated[
 ]
 CurvesOver = Annotated[
     str | None,
-    typer.Option(
-        "--over",
-        help="Axis of a map to draw a statistic over, as a curve for each value of the other axis.",
-        rich_help_panel=_OUTPUT,
-        metavar="NAME",
-    ),
+    option("Axis of a map to draw a statistic over, as a curve for each value of the other axis.", _OUTPUT, "NAME"),
 ]
 Output = Annotated[
     Path, typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel=_OUTPUT, metavar="FILE")
@@ -495,18 +465,15 @@ CheckpointFolder = Annotated[
 ]
 Measurements = Annotated[
     Path | None,
-    typer.Option(
-        help="CSV file of measured responses to plot on the map: columns frequency_ratio or frequency_hz, "
+    option(
+        "CSV file of measured responses to plot on the map: columns frequency_ratio or frequency_hz, "
         "velocity_amplitude or velocity_m_s, location (optional), response_class.",
-        rich_help_panel=_OUTPUT,
-        metavar="FILE",
+        _OUTPUT,
+        "FILE",
     ),
 ]
 QuasiStaticLine = Annotated[
-    bool,
-    typer.Option(
-        "--quasi-static-line", help="Draw the quasi-static threshold V_QS1 (Eq. 21).", rich_help_panel=_OUTPUT
-    ),
+    bool, option("Draw the quasi-static threshold V_QS1 (Eq. 21).", _OUTPUT, flags="--quasi-static-line")
 ]
 Window = Annotated[
     str | None, typer.Option(help="Cycles to draw, first:last.", rich_help_panel=_OUTPUT, metavar="FIRST:LAST")
@@ -521,7 +488,6 @@ def parse_window(text: str | None) -> tuple[float, float] | None:
 def parse_range(name: str, text: str, unit: str = "1") -> tuple[float, float]:
     """Return ``first:last`` as two numbers in *unit*, the first less than the last."""
     from snapbeam.model.parameter_axes import parse_axis
-    from snapbeam.util.validation import InputError
 
     try:
         if "," in text:
@@ -542,28 +508,13 @@ def parse_range(name: str, text: str, unit: str = "1") -> tuple[float, float]:
 _LONG = "Long maps"
 
 CheckpointOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--checkpoint",
-        help="Checkpoint folder; an existing one is resumed, and extended for longer axes.",
-        rich_help_panel=_LONG,
-        metavar="DIR",
-    ),
+    Path | None, option("Checkpoint folder; an existing one is resumed, and extended for longer axes.", _LONG, "DIR")
 ]
 CheckCheckpoint = Annotated[
-    bool,
-    typer.Option(
-        "--check-checkpoint", help="Check the checkpoint and compute damaged tasks again.", rich_help_panel=_LONG
-    ),
+    bool, option("Check the checkpoint and compute damaged tasks again.", _LONG, flags="--check-checkpoint")
 ]
 ClusterOption = Annotated[
-    str | None,
-    typer.Option(
-        "--cluster",
-        help="Dask cluster: local:N, tcp://host:port, or slurm.toml; needs --checkpoint.",
-        rich_help_panel=_LONG,
-        metavar="WHERE",
-    ),
+    str | None, option("Dask cluster: local:N, tcp://host:port, or slurm.toml; needs --checkpoint.", _LONG, "WHERE")
 ]
 RefineLevels = Annotated[
     int | None,
@@ -606,24 +557,12 @@ _OPTIONS_LONG: dict[str, tuple[Any, Any]] = {
 
 def with_checkpoint(function: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command the options of sweeps that take long; it gets them as a mapping ``keeping``."""
-    own = {
-        name: parameter
-        for name, parameter in inspect.signature(function, eval_str=True).parameters.items()
-        if name != "keeping"
-    }
 
     def command(**arguments: Any) -> Any:
         keeping = {name: arguments.pop(name) for name in _OPTIONS_LONG}
         return function(keeping=keeping, **arguments)
 
-    added = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-        for name, (default, kind) in _OPTIONS_LONG.items()
-    ]
-    kept = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.values()]
-    command.__name__, command.__doc__, command.__module__ = (function.__name__, function.__doc__, function.__module__)
-    command.__signature__ = inspect.Signature(kept + added)  # type: ignore[attr-defined]
-    return command
+    return _as(command, function, "keeping", _OPTIONS_LONG)
 
 
 def is_long(keeping: Mapping[str, Any]) -> bool:
@@ -634,7 +573,6 @@ def is_long(keeping: Mapping[str, Any]) -> bool:
 def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of the sweep apart from its checkpoint."""
     from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates
-    from snapbeam.util.validation import integer
 
     repeats = None
     count = 0 if keeping["replicates"] is None else integer("replicates", keeping["replicates"], 0, 10_000)
@@ -652,7 +590,6 @@ def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config)
     """
     from snapbeam.model.parameter_file import config_from_mapping, override
     from snapbeam.sweeps.checkpoint.store import read_stored_config
-    from snapbeam.util.validation import InputError
 
     if keeping["checkpoint"] is None:
         return settings
@@ -729,8 +666,6 @@ class LongReport:
 @contextmanager
 def report(total: int, log: Path | None, store: Path | None) -> Iterator[LongReport]:
     """Give a report of a map of *total* points; refuse, before any work, a log that cannot be written."""
-    from snapbeam.util.files import check_writable
-
     if log is not None:
         check_writable(log, "log", appended=True)
     with progress(total) as bar:
@@ -768,11 +703,8 @@ def sweep_report_lines(counts: SweepReport, store: Path | None, elapsed: float) 
 
 def config_of_file(path: Path, point: str | None) -> Config:
     """The parameters of a file of results; of a map, at the point nearest to ``name=value,...``, its values exact."""
-    from snapbeam.cli.console import open_result
     from snapbeam.model.parameter_file import config_from_mapping
     from snapbeam.model.parameters import PHYSICAL
-    from snapbeam.model.quantity import split_name
-    from snapbeam.util.validation import InputError, parsed_json
 
     dataset = open_result(path)
     text = dataset.attrs.get("system")
@@ -803,8 +735,6 @@ def config_of_file(path: Path, point: str | None) -> Config:
 
 def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, Any]:
     """Values of the parameters at the nearest point, by dotted name."""
-    from snapbeam.util.validation import InputError
-
     axes = {name: dataset[name] for name in map(str, dataset.dims) if "parameter" in dataset[name].attrs}
     if point is None:
         return {}
@@ -829,8 +759,6 @@ def coordinate_on_axis(dataset: xr.Dataset, option: str, text: str) -> tuple[str
     """The axis of a map and the value on it that ``name=value`` names, in the axis' own unit or as a physical value."""
     from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.model.parameters import PHYSICAL, lookup, named_in, ratio_of
-    from snapbeam.model.quantity import split_name
-    from snapbeam.util.validation import InputError
 
     name, value = _assignment(text, option)
     axes = {str(dim): dataset[dim].attrs["parameter"] for dim in dataset.dims if "parameter" in dataset[dim].attrs}
@@ -866,7 +794,6 @@ def coordinate_on_axis(dataset: xr.Dataset, option: str, text: str) -> tuple[str
 def _of_list(dataset: xr.Dataset, point: str, path: Path) -> dict[str, Any]:
     """Values of all parameters of the point of a list that is nearest to what is given, by dotted name."""
     from snapbeam.model.parameters import lookup
-    from snapbeam.util.validation import InputError
 
     columns = {
         str(name): item.values

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, cli_command, file_line, out
+from snapbeam.cli.console import add_json, check_pictures, cli_command, draw, file_line, open_result, out, read_overlay
+from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,11 +39,7 @@ def plot(
     location: Annotated[float | None, opt.number_option("Location x_s.", _SLICE)] = None,
     at: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Value of any axis, such as beam.thickness=4e-4; repeat for further axes.",
-            rich_help_panel=_SLICE,
-            metavar="NAME=VALUE",
-        ),
+        opt.option("Value of any axis, such as beam.thickness=4e-4; repeat for further axes.", _SLICE, "NAME=VALUE"),
     ] = None,
     over: opt.CurvesOver = None,
     measurements: opt.Measurements = None,
@@ -50,9 +47,7 @@ def plot(
     window: opt.Window = None,
 ) -> None:
     """Plot a stored result: in another format, another variable, with measured responses, or a slice of a map."""
-    from snapbeam.cli.console import check_pictures, draw, open_result, read_overlay
     from snapbeam.plot.dataset import figures_of
-    from snapbeam.util.validation import InputError
 
     check_pictures(("output", output))
     dataset = open_result(file)
@@ -87,8 +82,6 @@ def plot(
 
 def _sliced(dataset: xr.Dataset, wanted: dict[str, float | None], at: list[str]) -> xr.Dataset:
     """The map at the points that were named, the nearest there are."""
-    from snapbeam.util.validation import InputError
-
     chosen = {name: value for name, value in wanted.items() if value is not None}
     chosen |= dict(opt.coordinate_on_axis(dataset, "at", text) for text in at)
     over = next((dataset[name].dims for name in _OVER if name in dataset), ())

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli.console import add_json, cli_command, file_line, out
+from snapbeam.cli.console import add_json, check_pictures, cli_command, file_line, out
 from snapbeam.cli.parameter_options import (
     BEAM,
     BOUNDARY,
@@ -30,8 +30,6 @@ def schematic(
     ],
 ) -> None:
     """Draw a schematic of the system: beam, wells, boundary conditions, strikers and excitation."""
-    from snapbeam.cli.console import check_pictures
-
     check_pictures(("output", output))
     from snapbeam.plot.schematic import plot_system
     from snapbeam.plot.style import save_figure

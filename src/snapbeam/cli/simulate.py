@@ -13,7 +13,9 @@ from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import (
     FAILED,
     add_json,
+    check_pictures,
     cli_command,
+    draw_computed,
     duration,
     errors,
     file_line,
@@ -23,9 +25,12 @@ from snapbeam.cli.console import (
     out,
 )
 from snapbeam.cli.parameter_options import BEAM, CONTACT, DRIVE, MODEL, RUN, STRIKER, configured, with_parameters
+from snapbeam.util.files import check_writable, require_room_of
+from snapbeam.util.netcdf import read_netcdf
+from snapbeam.util.validation import InputError, choice, integer
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 
 @cli_command
@@ -34,10 +39,10 @@ def simulate(
     given: Any,
     recorded_drive: Annotated[
         Path | None,
-        typer.Option(
-            help="Recorded motion instead of the sinusoidal one: a file that snapbeam vibrometer --drive-output wrote.",
-            rich_help_panel="Striker and drive",
-            metavar="FILE",
+        opt.option(
+            "Recorded motion instead of the sinusoidal one: a file that snapbeam vibrometer --drive-output wrote.",
+            "Striker and drive",
+            "FILE",
         ),
     ] = None,
     output: Annotated[
@@ -47,11 +52,11 @@ def simulate(
     plot: opt.Plot = None,
     animate: Annotated[
         Path | None,
-        typer.Option(
-            help="Animation to write, .mp4 or .gif: the moving beam and the waveform, in slow motion near "
+        opt.option(
+            "Animation to write, .mp4 or .gif: the moving beam and the waveform, in slow motion near "
             "the impact with the highest force.",
-            rich_help_panel="Output",
-            metavar="FILE",
+            "Output",
+            "FILE",
         ),
     ] = None,
     window: opt.Window = None,
@@ -61,21 +66,19 @@ def simulate(
     ] = None,
     save: Annotated[
         str,
-        typer.Option(
-            "--save",
-            help="Samples in the file of --output: samples (all, default), waveforms (without those of the modes), states "
+        opt.option(
+            "Samples in the file of --output: samples (all, default), waveforms (without those of the modes), states "
             "(one each cycle) or statistics (none, for long runs).",
-            rich_help_panel="Output",
-            metavar="CONTENT",
+            "Output",
+            "CONTENT",
         ),
     ] = "samples",
     stream: Annotated[
         bool,
-        typer.Option(
-            "--stream",
-            help="Write the file during the run, for runs whose samples do not fit in memory; "
-            "such runs are not plotted.",
-            rich_help_panel="Output",
+        opt.option(
+            "Write the file during the run, for runs whose samples do not fit in memory; such runs are not plotted.",
+            "Output",
+            flags="--stream",
         ),
     ] = False,
 ) -> None:
@@ -84,9 +87,7 @@ def simulate(
     Example: snapbeam simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 -o run.nc --plot run.png
     --window 0:20
     """
-    from snapbeam.cli.console import check_pictures, draw_computed
     from snapbeam.simulation.simulate import least_file_size
-    from snapbeam.util.files import check_writable, require_room_of
 
     settings = configured(given)
     if output is not None:
@@ -103,7 +104,6 @@ def simulate(
 
     import snapbeam as sb
     from snapbeam.simulation.save import CONTENTS
-    from snapbeam.util.validation import choice
 
     if choice("save", save, CONTENTS) != "samples" and (output is None or stream):
         raise sb.InputError(f"save = {save!r}: is of the file of --output, without --stream")
@@ -116,7 +116,7 @@ def simulate(
         named = [name for name in ("frequency_ratio", "velocity_amplitude") if given[f"drive.{name}"] is not None]
         if named:
             raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
-        system = system.replace(drive=sb.RecordedMotion.from_dataset(_recorded(recorded_drive)))
+        system = system.replace(drive=sb.RecordedMotion.from_dataset(read_netcdf(recorded_drive, "drive")))
     if animate is not None and system.model.beam is None:
         raise sb.InputError("--animate: a structure given by matrices has no shape that moves; use --plot")
     start = time.monotonic()
@@ -178,7 +178,6 @@ def _even(system: Any, integration: Any, samples: int | None) -> Any:
         return None
     from snapbeam.simulation.request import cycle_of
     from snapbeam.simulation.simulate import even_instants
-    from snapbeam.util.validation import integer
 
     integer("samples", samples, 1, 100_000)
     drive = system.primary_excitation[1]
@@ -231,7 +230,6 @@ def _require_striker(system: Any) -> None:
     """Refuse a recorded drive of a system without a striker; name the section that takes a record."""
     if system.striker is not None:
         return
-    from snapbeam.util.validation import InputError
 
     moving = [section for section, _ in system.moving]
     instead = next((section for section in moving if section in _OWN_RECORD), None)
@@ -241,12 +239,6 @@ def _require_striker(system: Any) -> None:
         else f"give the record in the parameter file: [{instead}] with type = {_OWN_RECORD[instead]!r} and its file"
     )
     raise InputError(f"recorded_drive (--recorded-drive): moves a striker, but the system does not have one; {way}")
-
-
-def _recorded(path: Path) -> xr.Dataset:
-    from snapbeam.util.netcdf import read_netcdf
-
-    return read_netcdf(path, "drive")
 
 
 def _animated(run: Any, path: Path, window: tuple[float, float] | None, kept: Path | None) -> Path:

@@ -10,10 +10,20 @@ import numpy as np
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, check_outputs, cli_command, duration, print_written, progress
+from snapbeam.cli.console import (
+    add_json,
+    check_outputs,
+    cli_command,
+    draw_computed,
+    duration,
+    print_written,
+    progress,
+    write_map,
+)
 from snapbeam.cli.parameter_options import ALL, AXES, configured, with_parameters
 from snapbeam.cli.summary import coordinate_text, initial_well_lines, status_lines, value_text
 from snapbeam.util.status_codes import wells_of
+from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,12 +41,7 @@ def threshold(
         str, typer.Option(help="Parameter to raise (velocity_amplitude).", rich_help_panel="Threshold")
     ] = "velocity_amplitude",
     values: Annotated[
-        str | None,
-        typer.Option(
-            help="Values of the parameter to choose from, start:stop:count.",
-            rich_help_panel="Threshold",
-            metavar="VALUES",
-        ),
+        str | None, opt.option("Values of the parameter to choose from, start:stop:count.", "Threshold", "VALUES")
     ] = None,
     output: opt.Output = Path("threshold.nc"),
     plot: opt.Plot = None,
@@ -50,8 +55,6 @@ def threshold(
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png
     """
-    from snapbeam.cli.console import draw_computed, write_map
-
     settings = configured(given, lambda config, _: _axes_of(config, parameter, values))
     check_outputs(output, plot)
     axes = _axes_of(settings, parameter, values)
@@ -88,7 +91,6 @@ def _axes_of(settings: Config, parameter: str, text: str | None) -> dict[str, An
     """The axes of a search, those of the structure first, and the values to choose from."""
     from snapbeam.model.parameter_file import parsed_axis, same_axis
     from snapbeam.model.parameters import lookup, ratio_of
-    from snapbeam.util.validation import InputError
 
     axes: dict[str, Any] = settings.axes()
     name = settings.full_name(parameter)

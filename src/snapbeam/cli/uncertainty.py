@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,12 +15,15 @@ from snapbeam.cli.console import (
     check_outputs,
     cli_command,
     count_text,
+    draw_computed,
     duration,
     notes,
     print_written,
     progress,
+    write_map,
 )
-from snapbeam.cli.summary import initial_well_lines
+from snapbeam.cli.summary import coordinate_text, initial_well_lines, statistic_text, value_text
+from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,11 +41,7 @@ Yes = Annotated[
 ]
 EstimateCost = Annotated[
     bool,
-    typer.Option(
-        "--estimate-cost",
-        help="Print the estimated cost, from a trial of ten seconds, and stop.",
-        rich_help_panel="Cost",
-    ),
+    opt.option("Print the estimated cost, from a trial of ten seconds, and stop.", "Cost", flags="--estimate-cost"),
 ]
 
 
@@ -57,7 +55,6 @@ def read(file: Path, section: str, law: list[str] | None = None) -> tuple[Config
     """
     from snapbeam.model.parameter_file import config_from_mapping, read_parameter_file
     from snapbeam.uncertainty.distributions import uncertainty_from_mapping
-    from snapbeam.util.validation import InputError
 
     opt.import_laws(law)
     sections = read_parameter_file("file", file)
@@ -76,8 +73,6 @@ def read(file: Path, section: str, law: list[str] | None = None) -> tuple[Config
 def taken(kind: Any, table: dict[str, Any], where: str, further: str = "") -> Any:
     """An instance of a dataclass from a table of its fields; unknown names raise an error, which names *further* ones."""
     import dataclasses
-
-    from snapbeam.util.validation import InputError
 
     known = [each.name for each in dataclasses.fields(kind) if each.init]
     for name in table:
@@ -124,19 +119,11 @@ def _compute(
     return dataset, time.monotonic() - begun
 
 
-def finish(dataset: xr.Dataset, output: Path, plot: Path | None, drawn: Any, lines: list[str]) -> None:
+def finish(dataset: xr.Dataset, output: Path, plot: Path | None, lines: list[str], variable: str | None = None) -> None:
     """Write and plot the results and print a summary."""
-    from snapbeam.cli.console import kept_if_not_drawn, plot_command, write_map
-
     files = [write_map(dataset, output)]
     if plot is not None:
-        with kept_if_not_drawn(lambda file: plot_command(file, plot), output, functools.partial(write_map, dataset)):
-            import matplotlib
-
-            matplotlib.use("Agg")
-            from snapbeam.plot.style import save_figure
-
-            files.append(save_figure(drawn(dataset), plot))
+        files.append(draw_computed(dataset, plot, output, variable))
     add_json(summary=lines, files=files)
     print_written(lines, files)
 
@@ -163,7 +150,6 @@ def design(
 
     Example: snapbeam design switch.toml -o design.nc --plot design.png --checkpoint design.checkpoint
     """
-    from snapbeam.plot.uncertainty import plot_designs
     from snapbeam.uncertainty.optimization import optimize_design
 
     settings, uncertainty, asked = read(file, "design", law)
@@ -176,13 +162,12 @@ def design(
         return
     dataset, elapsed = found
     add_json(designs={str(name): each.values for name, each in dataset.data_vars.items() if "tried" not in each.dims})
-    finish(dataset, output, plot, plot_designs, _lines(dataset, elapsed))
+    finish(dataset, output, plot, _lines(dataset, elapsed))
 
 
 def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
     """Variables, objectives, constraints and settings of the section."""
     from snapbeam.uncertainty.optimization import Constraint, Objective, OptimizerSettings
-    from snapbeam.util.validation import InputError
 
     known = ("objectives", "variables", "constraints", "settings")
     for name in asked:
@@ -209,7 +194,6 @@ def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
 def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
     runs, count = int(dataset.attrs["runs_made"]), dataset.sizes["design"]
     lines = [f"{runs} runs of {dataset.sizes['tried']} designs in {duration(elapsed)}", *initial_well_lines(dataset)]
-    from snapbeam.cli.summary import coordinate_text, statistic_text, value_text
 
     words = str(dataset["constraints_satisfied"].attrs["flag_meanings"]).split()
     share = 100.0 * float(dataset.attrs["confidence"])
@@ -259,19 +243,19 @@ def probability(
     threads: opt.Threads = None,
     outcome: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Statistic beyond a value, such as 'peak_force > 60 N', whose probability is wanted too; the first is drawn. "
+        opt.option(
+            "Statistic beyond a value, such as 'peak_force > 60 N', whose probability is wanted too; the first is drawn. "
             "Repeat for further ones.",
-            rich_help_panel="Output",
-            metavar="TEXT",
+            "Output",
+            "TEXT",
         ),
     ] = None,
     statistic: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Statistic whose mean and quantiles are wanted, such as harvested_power; repeat for further ones.",
-            rich_help_panel="Output",
-            metavar="NAME",
+        opt.option(
+            "Statistic whose mean and quantiles are wanted, such as harvested_power; repeat for further ones.",
+            "Output",
+            "NAME",
         ),
     ] = None,
 ) -> None:
@@ -282,11 +266,9 @@ def probability(
 
     Example: snapbeam probability switch.toml --outcome 'peak_force > 60 N' -o probability.nc --plot probability.png
     """
-    from snapbeam.plot.uncertainty import plot_probability
     from snapbeam.plot.units import in_units
     from snapbeam.uncertainty.monte_carlo import outcome_named
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
-    from snapbeam.util.validation import InputError
 
     settings, uncertainty, asked = read(file, "probability", law)
     check_outputs(output, plot)
@@ -318,14 +300,13 @@ def probability(
     add_json(results=small, axes={str(dim): told[dim].values for dim in told["runs"].dims if dim in told.coords})
     asked_for = options.get("outcomes") if "outcome" not in asked else None
     drawn = outcome_named(asked_for[0])[0] if asked_for else str(dataset.attrs["watched_outcome"])
-    finish(dataset, output, plot, lambda ds: plot_probability(ds, drawn), _lines_probability(told, elapsed))
+    finish(dataset, output, plot, _lines_probability(told, elapsed), drawn)
 
 
 def _default_axes(system: System) -> dict[str, Any]:
     """Axes of a map if none is named: the paper's plane of a struck beam; the one point of another system."""
     from snapbeam.model.parameter_file import DEFAULT_AXES, parsed_axis
     from snapbeam.model.parameters import in_table, lookup
-    from snapbeam.util.validation import InputError
 
     if DEFAULT_AXES.keys() <= system.parameters.keys():
         return {name: parsed_axis(name, text) for name, text in DEFAULT_AXES.items()}
@@ -343,8 +324,6 @@ _MOST_PRINTED = 24
 
 def _intervals(one: xr.Dataset, name: str = "probability") -> list[str]:
     """Value and interval of a variable at each point; the range of all, where there are many points."""
-    from snapbeam.cli.summary import coordinate_text, value_text
-
     found = one[name]
     if found.size > _MOST_PRINTED:
         low, high = (value_text(one, name, float(each)) for each in (found.min(), found.max()))

@@ -86,7 +86,8 @@ class Address:
     def write(self) -> str:
         """The part of the address after the question mark."""
         parts = {name: getattr(self, name) for name in _NAMES}
-        parts |= {name: _pairs_text(getattr(self, name)) for name in ("cut", "at", "b")}
+        for name in ("cut", "at", "b"):
+            parts[name] = ",".join(f"{each}:{value}" for each, value in getattr(self, name).items())
         parts["set"] = ",".join(f"{name}:{_written(value)}" for name, value in self.changes.items())
         if self.view is not None:
             parts["view"] = ",".join(repr(float(value)) for value in self.view)
@@ -149,10 +150,6 @@ def _pairs(text: str) -> dict[str, Any]:
     if len(parts) > _MOST:
         raise InputError(f"at most {_MOST} of them")
     return {lookup(name).name: typed(name, value) for name, _, value in parts}
-
-
-def _pairs_text(pairs: Mapping[str, Any]) -> str:
-    return ",".join(f"{name}:{value}" for name, value in pairs.items())
 
 
 def typed(name: str, text: str) -> Any:

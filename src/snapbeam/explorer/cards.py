@@ -320,12 +320,10 @@ class MapCard:
         """Fields of a point."""
 
     def _slider(self, name: str, address: Address) -> Any:
-        points = self.source.coordinate(name)
-        labels = {
-            f"{value:.6g}" if isinstance(value, float) else str(value): at for at, value in enumerate(points.tolist())
-        }
-        if len(labels) < points.size:
-            labels = {repr(value): at for at, value in enumerate(points.tolist())}
+        points = self.source.coordinate(name).tolist()
+        labels = {f"{value:.6g}" if isinstance(value, float) else str(value): at for at, value in enumerate(points)}
+        if len(labels) < len(points):
+            labels = {repr(value): at for at, value in enumerate(points)}
         value = self._place(name, address) or 0
         # this one of Panel's widgets shows its name and its labels as HTML
         options = {str(escape(label)): at for label, at in labels.items()}
@@ -408,9 +406,7 @@ class MapCard:
         self.view.on_view(self.control.view_moved)
         for edge in ("inner_width", "inner_height"):
             self.view.plot.on_change(edge, lambda attr, old, new: self.control.resized())
-        self.slider_box.objects = [
-            slider for name, slider in self.sliders.items() if name not in (self.x.value, self.y.value)
-        ]  # fmt: skip
+        self.slider_box.objects = [self.sliders[name] for name in self._fixed()]
         self.holder.objects = [style.framed_plot(self.view.plot, margin=0)]
         self.redraw()
         self.control.view_moved()
@@ -468,7 +464,7 @@ class MapCard:
         except InputError as error:
             values = None
             words.append(str(error))
-        limits = self._limits(name, values)
+        limits = (0.0, 1.0) if values is None or name == "response_class" else _span(values)
         title = "" if name == "response_class" else self.source.title(name)
         if self.source.is_list and values is not None:
             self.view.show_list(self.plane.x.at, self.plane.y.at, name, values, limits, title)
@@ -476,7 +472,7 @@ class MapCard:
             self.view.show(name, values, limits, title)
         self.view.fade(self.changed)
         self.show_windows()
-        fixed = self.source.scalars() | self._fixed_short()
+        fixed = self.source.scalars() | {lookup(full).short: each for full, each in self.plane.fixed_values().items()}
         words.append(self.view.show_quasi_static("quasi" in layers, self.source.attrs, fixed))
         if "threshold" in layers and self.source.is_list:
             words.append("the threshold is that of the columns of a grid; these are points")
@@ -535,12 +531,6 @@ class MapCard:
         """The cut through the map; None if it has no numbers, or those of another system."""
         held = bool(self.source.skeleton.data_vars) and not self.changed and not self.source.is_list
         return self.plane if held else None
-
-    def _limits(self, name: str, values: NDArray[Any] | None) -> tuple[float, float]:
-        return (0.0, 1.0) if values is None or name == "response_class" else _span(values)
-
-    def _fixed_short(self) -> dict[str, Any]:
-        return {lookup(name).short: value for name, value in self.plane.fixed_values().items()}
 
     def _draw_dots(self, wanted: bool, words: list[str]) -> None:
         dots = self.dots
@@ -936,12 +926,8 @@ class SystemCard:
     def _open(self, config: Config) -> None:
         given = {f"{section}.{name}" for section, values in config.given.items() for name in values}
         given |= {PHYSICAL[name].parameter for name in given & PHYSICAL.keys()}
-        of_run = {
-            name: value
-            for name, value in config.given.get("integration", {}).items()
-            if hasattr(config.integration, name)
-        }
-        how = self.page.shared.integration.replace(**{name: getattr(config.integration, name) for name in of_run})
+        own, named = config.integration, config.given.get("integration", {})
+        how = self.page.shared.integration.replace(**{name: getattr(own, name) for name in named if hasattr(own, name)})
         try:
             self.page.use(config.system, how, given)
         except InputError as error:
@@ -1108,11 +1094,8 @@ class TakeCard:
             command = maps.map_command(card.windows()[-1], card.plane.fixed_values())
             texts.append(part.format(f"The command that makes the finest window{beside}", "map-command", command))
         old = page.runs[page.which].old
-        none = (
-            "The run is old: that of the present system is not computed."
-            if old
-            else "Click on a point of the map first."
-        )
+        why = "The run is old: that of the present system is not computed."
+        none = why if old else "Click on a point of the map first."
         self.text.object = Markup("").join(
             ([] if run or not old else [style.REFUSED.format(none)]) + texts
         ) or style.NOTE.format(none)

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from snapbeam.cli.console import INTERRUPTED, cli_command, out, write_json_now
+from snapbeam.util.validation import InputError
 
 COMMANDS = {"explore": "snapbeam.explorer.cli:explore"}
 """Module and function of each command, by name."""
@@ -51,7 +52,6 @@ def explore(
     """
     from snapbeam.util.hdf5 import open_hdf5
     from snapbeam.util.netcdf import split_group
-    from snapbeam.util.validation import InputError
 
     if file is not None and config is not None:
         raise InputError(f"config = {str(config)!r}: a map holds its own system; give one of the two")

@@ -56,16 +56,8 @@ def plain(label: str) -> str:
 
 _ACCENTS = {"dot": "\u0307", "ddot": "\u0308", "bar": "\u0304", "hat": "\u0302"}
 _SYMBOLS = {
-    "leq": "≤",
-    "le": "≤",
-    "geq": "≥",
-    "ge": "≥",
-    "times": "×",
-    "cdot": "·",
-    "pm": "±",
-    "infty": "∞",
-    "partial": "∂",
-}
+    "leq": "≤", "le": "≤", "geq": "≥", "ge": "≥", "times": "×", "cdot": "·", "pm": "±", "infty": "∞", "partial": "∂"
+}  # fmt: skip
 
 
 def _symbol(found: re.Match[str]) -> str:
@@ -82,11 +74,9 @@ def _script(found: re.Match[str]) -> str:
     words = found[2] or found[3] or ""
     table = _SUPERSCRIPT if found[1] == "^" else _SUBSCRIPT
     small = words.strip("{}")
-    return (
-        small.translate(table)
-        if all(ord(each) in table for each in small)
-        else f"{'^' if found[1] == '^' else ' '}{small}"
-    )
+    if all(ord(each) in table for each in small):
+        return small.translate(table)
+    return f"{'^' if found[1] == '^' else ' '}{small}"
 
 
 def lines_of(label: str) -> str:
@@ -148,11 +138,8 @@ class Drawn:
             y_axis_type="log" if axes.get_yscale() == "log" else "linear", name=f"result-plot{len(self.plots) + 1 if self.plots else ''}",
             x_axis_label=lines_of(axes.get_xlabel()), y_axis_label=lines_of(axes.get_ylabel()), title=plain(axes.get_title()),
         )  # fmt: skip
-        plot.add_tools(
-            models.CrosshairTool(
-                visible=False, overlay=[line, models.Span(dimension="width", line_color=self.look.faint)]
-            )
-        )
+        overlay = [line, models.Span(dimension="width", line_color=self.look.faint)]
+        plot.add_tools(models.CrosshairTool(visible=False, overlay=overlay))
         plot.title.visible = bool(plot.title.text)
         for mine, theirs in ((plot.xaxis, axes.xaxis), (plot.yaxis, axes.yaxis)):
             if isinstance(theirs.get_major_locator(), ticker.FixedLocator):
@@ -267,9 +254,7 @@ class Drawn:
 
     def _paths(self, plot: Any, art: Any, placed: Any, columns: Any) -> list[Any]:
         """Draw lines or areas."""
-        faces, edges = (
-            [self._color(each) for each in found] for found in (art.get_facecolors(), art.get_edgecolors())
-        )  # fmt: skip
+        faces, edges = (list(map(self._color, each)) for each in (art.get_facecolors(), art.get_edgecolors()))
         made = []
         groups = [[path] for path in art.get_paths()]
         if max(map(len, (faces, edges, art.get_linewidths(), art.get_linestyles()))) <= 1:  # all look the same

@@ -158,10 +158,8 @@ class MapView:
         """Show a variable, an array of shape (y, x)."""
         self._scale(name, limits, title)
         seen = None if values is None else picture(values, self.x, self.y, self.view, self.pixels)
-        columns = (
-            [] if seen is None else [colors_of(name, seen.values, limits), seen.x, seen.y, seen.width, seen.height]
-        )
-        self.base.data = {each: columns[at : at + 1] for at, each in enumerate(_IMAGE)}
+        held = () if seen is None else (colors_of(name, seen.values, limits), seen.x, seen.y, seen.width, seen.height)
+        self.base.data = {each: list(held[at : at + 1]) for at, each in enumerate(_IMAGE)}
 
     def _scale(self, name: str, limits: tuple[float, float], title: str) -> None:
         """Take the limits of the colours of a variable, and its title."""
@@ -216,12 +214,8 @@ class MapView:
     def mark_selected(self, points: models.ColumnDataSource) -> None:
         """Mark the selected ones of some points, and let a box in the map select."""
         unseen = {f"{kind}{part}_alpha": 0.0 for kind in ("", "nonselection_") for part in ("fill", "line")}
-        ring = {
-            "selection_line_color": "#000000",
-            "selection_line_alpha": 1.0,
-            "selection_fill_color": "#ffffff",
-            "selection_fill_alpha": 1.0,
-        }
+        ring: dict[str, Any] = {"selection_line_color": "#000000", "selection_fill_color": "#ffffff"}
+        ring |= {"selection_line_alpha": 1.0, "selection_fill_alpha": 1.0}
         marks = self.plot.scatter("x", "y", source=points, size=6, **unseen, **ring)
         self.plot.add_tools(models.BoxSelectTool(renderers=[marks]))
 

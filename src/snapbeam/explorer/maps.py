@@ -123,11 +123,8 @@ def chances(layers: dict[str, MapLayer], held: dict[str, Any]) -> str:
             continue
         parts.append(f"{layer.words} {_number(value)} ({_number(low)} to {_number(high)})")
     shares = {name: layer for name, layer in layers.items() if layer.variable == "class_fraction"}
-    some = [
-        f"{layer.words.rpartition(': ')[2]} {100.0 * held[name]:.0f} %"
-        for name, layer in shares.items()
-        if held.get(name, 0.0) > 0.0
-    ]
+    there = {layer.words.rpartition(": ")[2]: held.get(name, 0.0) for name, layer in shares.items()}
+    some = [f"{words} {100.0 * share:.0f} %" for words, share in there.items() if share > 0.0]
     if some:
         parts.append(f"of its replicas: {', '.join(some)}")
     return "; ".join(parts)
@@ -353,10 +350,8 @@ def default_axes(system: sb.System) -> dict[str, Any]:
 
     if DEFAULT_AXES.keys() <= system.parameters.keys():
         return {name: parse_axis(name, text) for name, text in DEFAULT_AXES.items()}
-    held, order = (
-        system.parameters,
-        ("frequency_ratio", "amplitude", "rms", "stop_ratio", "high_ratio", "peak", "change"),
-    )
+    held = system.parameters
+    order = ("frequency_ratio", "amplitude", "rms", "stop_ratio", "high_ratio", "peak", "change")
     rows = [row for row in rows_of(system) if row.name in held and row.is_run and row.quantity.kind is float]
     rows = [row for row in rows if "phase" not in row.name]
     rows.sort(key=lambda row: next((at for at, word in enumerate(order) if word in row.name), len(order)))
@@ -752,17 +747,12 @@ class Plane(_Cut):
 
     def fixed_values(self) -> dict[str, Any]:
         """The values of the other axes, by dotted name, and of axes of one point."""
-        found = {
-            parameter_of(self.source.skeleton, name): plain(self.source.coordinate(name)[at])
-            for name, at in self.fixed.items()
-        }
-        for name in map(str, self.source.skeleton.dims):
-            if (
-                self.source.skeleton.sizes[name] == 1
-                and name not in (self.x.name, self.y.name)
-                and parameter_name(self.source.skeleton, name) is not None
-            ):
-                found[parameter_of(self.source.skeleton, name)] = plain(self.source.coordinate(name)[0])
+        source, skeleton = self.source, self.source.skeleton
+        found = {parameter_of(skeleton, name): plain(source.coordinate(name)[at]) for name, at in self.fixed.items()}
+        for name in map(str, skeleton.dims):
+            other = skeleton.sizes[name] == 1 and name not in (self.x.name, self.y.name)
+            if other and parameter_name(skeleton, name) is not None:
+                found[parameter_of(skeleton, name)] = plain(source.coordinate(name)[0])
         return found
 
     def at(self, row: int, column: int) -> Point:
@@ -850,11 +840,7 @@ class Scatter(_Cut):
 
     def _away(self, x: float, y: float) -> NDArray[np.float64]:
         """Distances of the points across and upward from a place, in shares of the axes; shape (2, points)."""
-        sides = []
-        for axis, value in ((self.x, x), (self.y, y)):
-            low, high = axis.span
-            sides.append((axis.at - value) / (high - low))
-        return np.array(sides)
+        return np.array([(axis.at - value) / np.ptp(axis.span) for axis, value in ((self.x, x), (self.y, y))])
 
     def fixed_values(self) -> dict[str, Any]:
         """Fixed values: none for a list of points."""
@@ -1053,13 +1039,9 @@ _GAIN = 0.7
 
 def _finer(sides: tuple[_Array, _Array], below: tuple[_Array, _Array]) -> NDArray[np.bool_]:
     """Mask of the cells that are neither wider nor taller than those below, and clearly smaller."""
-    slack = 1.0 + 1e-9
-    found: NDArray[np.bool_] = (
-        (sides[0] <= slack * below[0])
-        & (sides[1] <= slack * below[1])
-        & (sides[0] * sides[1] < _GAIN * below[0] * below[1])
-    )
-    return found
+    (wide, tall), slack = sides, 1.0 + 1e-9
+    inside = (wide <= slack * below[0]) & (tall <= slack * below[1])
+    return np.asarray(inside & (wide * tall < _GAIN * below[0] * below[1]))
 
 
 def _scaled(values: Any, log: bool) -> _Array:
@@ -1320,7 +1302,7 @@ def compute(
 
 def _filled(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None], seconds: float) -> Window:
     window.waits = False
-    structural = [not _is_run(name) for name in window.names]
+    structural = [not lookup(name).is_run for name in window.names]
     paced, spent = (2, 0.0) if window.seconds else (0, 0.0)
     for stride in _STRIDES:
         (row0, rows), (column0, columns) = _blocks(window.y.size, stride), _blocks(window.x.size, stride)
@@ -1383,10 +1365,6 @@ def _structure_order(todo: list[tuple[int, int, int, int]], structural: list[boo
     if structural[1]:
         return sorted(todo, key=lambda item: item[2])
     return [todo[i] for i in sorted(range(len(todo)), key=lambda i: i * 0.6180339887498949 % 1.0)]
-
-
-def _is_run(name: str) -> bool:
-    return lookup(name).is_run
 
 
 def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) -> dict[str, NDArray[Any]]:

@@ -67,13 +67,8 @@ class ScatterView:
         colors = style.hexes(packed.reshape(-1, 1).view(np.uint8)[::step])
         a, b, x, y = (np.ravel(each)[::step].astype(np.float64) for each in (*values, x, y))
         self.points.selected.indices = []
-        self.points.data = {
-            "a": a,
-            "b": b,
-            "x": x,
-            "y": y,
-            "color": colors if kinds is not None else [card.look.accent] * a.size,
-        }
+        color = colors if kinds is not None else [card.look.accent] * a.size
+        self.points.data = {"a": a, "b": b, "x": x, "y": y, "color": color}
         for axis, each in zip(self.plot.axis, self.choice, strict=True):
             name, unit = each.value.replace("_", " "), card.source.label(each.value)[1]
             axis.axis_label = name if unit == "1" else f"{name} ({unit})"

@@ -7,6 +7,7 @@ import ipaddress
 import logging
 import os
 import secrets
+import socket
 import threading
 from collections.abc import Callable
 from hashlib import sha256
@@ -214,8 +215,6 @@ def make_server(
     token = token or secrets.token_urlsafe(24)
     names: tuple[str, ...] = ("127.0.0.1", "localhost") if is_loopback(address) else (address,)
     if address == "0.0.0.0":
-        import socket
-
         names = ("127.0.0.1", "localhost", socket.gethostname(), socket.getfqdn(), *_own_addresses())
     taken = (_next_port(address) if port is None else port) or _free_port(address)
     names = tuple(name.lower() for name in names if ":" not in name)
@@ -288,8 +287,6 @@ def kept_token() -> str | None:
 
 def _next_port(address: str) -> int:
     """The first free port from the fixed one on; 0 if all of them are in use."""
-    import socket
-
     for port in range(_PORT, _PORT + _PORTS):
         with socket.socket() as probe:
             if os.name == "posix":  # as the server does: a port whose last connections are ending is free
@@ -303,16 +300,12 @@ def _next_port(address: str) -> int:
 
 
 def _free_port(address: str) -> int:
-    import socket
-
     with socket.socket() as probe:
         probe.bind((address, 0))
         return int(probe.getsockname()[1])
 
 
 def _own_addresses() -> tuple[str, ...]:
-    import socket
-
     try:
         return tuple({str(item[4][0]) for item in socket.getaddrinfo(socket.gethostname(), None)})
     except OSError:

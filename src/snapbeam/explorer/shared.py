@@ -7,6 +7,8 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from snapbeam import InputError, Integration, System, simulate
 from snapbeam.explorer.jobs import RUN_SECONDS, Jobs, Token
 from snapbeam.explorer.maps import Source, Window, integration_of, system_of
@@ -56,13 +58,8 @@ class Shared:
         """Windows over one plane that have one of *keys*, the widest first; *plane* begins their keys."""
         with self._lock:
             found = [window for key, window in self._windows.items() if key[0] == plane and key in keys]
-        return sorted(found, key=_area, reverse=True)
+        return sorted(found, key=lambda each: np.ptp(each.bounds[:2]) * np.ptp(each.bounds[2:]), reverse=True)
 
     def close(self) -> None:
         """Compute no more."""
         self.jobs.close()
-
-
-def _area(window: Window) -> float:
-    left, right, low, high = window.bounds
-    return (right - left) * (high - low)

@@ -27,37 +27,11 @@ from snapbeam.paper.recipe import Recipe, Results, shared_results
 from snapbeam.paper.system import struck_beam
 
 __all__ = [
-    "BEAM",
-    "CONTACT",
-    "CYCLES",
-    "DAMPING_RATIO",
-    "FIGURES",
-    "LOCATION",
-    "LONG_CYCLES",
-    "MODES",
-    "STRAIGHT_BEAM",
-    "Recipe",
-    "Results",
-    "disturbances",
-    "fig2",
-    "fig3",
-    "fig4",
-    "fig5",
-    "fig6",
-    "fig7",
-    "fig8",
-    "figA9",
-    "figB10",
-    "low_frequency",
-    "resonance",
-    "sensitivity",
-    "shared_results",
-    "si5",
-    "struck_beam",
-    "transients",
-    "waveforms",
+    "BEAM", "CONTACT", "CYCLES", "DAMPING_RATIO", "FIGURES", "LOCATION", "LONG_CYCLES", "MODES", "STRAIGHT_BEAM",
+    "Recipe", "Results", "disturbances", "fig2", "fig3", "fig4", "fig5", "fig6", "fig7", "fig8", "figA9", "figB10",
+    "low_frequency", "resonance", "sensitivity", "shared_results", "si5", "struck_beam", "transients", "waveforms",
     "windows",
-]
+]  # fmt: skip
 
 
 fig2 = Recipe("fig2", "the beam and the shaker, with their symbols")

@@ -9,7 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import add_json, cli_command, duration, file_line, notes, out
+from snapbeam.cli.console import add_json, cli_command, duration, file_line, notes, out, read_overlay
+from snapbeam.util.files import check_writable
+from snapbeam.util.validation import InputError, choice
 
 COMMANDS = {"reproduce": "snapbeam.paper.cli:reproduce"}
 """Module and function of each command, by name."""
@@ -67,7 +69,6 @@ def reproduce(
     from snapbeam.paper.claims import write_claims
     from snapbeam.paper.claims.table import summary
     from snapbeam.paper.recipe import Results
-    from snapbeam.util.validation import InputError, choice
 
     choice("figure", figure, (*FIGURES, "claims", "all"))
     try:
@@ -123,11 +124,9 @@ def _computed(results: Any, name: str) -> str:
 
 def _check_measured(figure: str, names: list[str], measurements: Path | None, measured: list[Path] | None) -> None:
     """Refuse, before anything is computed, measured responses and runs that cannot be shown."""
-    from snapbeam.cli.console import read_overlay
     from snapbeam.model.default_values import BEAM
     from snapbeam.paper.recipes.fig4 import read_measured
     from snapbeam.paper.system import paper_model
-    from snapbeam.util.validation import InputError
 
     if measurements is not None:
         if not {"fig6", "fig7", "fig8"} & set(names):
@@ -145,7 +144,6 @@ def _check_measured(figure: str, names: list[str], measurements: Path | None, me
 def _check_targets(folder: Path, names: list[str], claims: bool) -> None:
     """Refuse, before anything is computed, files that cannot be written or are not to be replaced."""
     from snapbeam.paper.claims.table import BEGINS
-    from snapbeam.util.files import check_writable
 
     for name in names:
         for suffix in (".pdf", ".png", ".nc"):

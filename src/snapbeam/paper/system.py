@@ -62,9 +62,8 @@ def paper_run(modes: int, frequency_ratio: float, velocity_amplitude: float, cyc
     model = replace(paper_model(modes), given_reference_frequency=more.pop("reference_frequency", None))
     shaker = sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location)
     integration = sb.Integration(cycles=cycles, **more)
-    return sb.simulate(
-        sb.System(model, contacts=[sb.Contact(CONTACT, shaker.striker())]), integration, sample_times=sample_times
-    )
+    system = sb.System(model, contacts=[sb.Contact(CONTACT, shaker.striker())])
+    return sb.simulate(system, integration, sample_times=sample_times)
 
 
 def paper_map(
@@ -84,11 +83,8 @@ def paper_map(
     """
     if reference_frequency is not None:
         model = replace(model, given_reference_frequency=reference_frequency)
-    given = {
-        "drive.frequency_ratio": frequency_ratio,
-        "drive.velocity_amplitude": velocity_amplitude,
-        "contact.location": location,
-    }
+    given = {"drive.frequency_ratio": frequency_ratio, "drive.velocity_amplitude": velocity_amplitude}
+    given["contact.location"] = location
     axes = {name: value for name, value in given.items() if np.ndim(value)}
     ratio, amplitude, place = (float(np.ravel(value)[0]) for value in given.values())
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=amplitude, location=place)
@@ -116,14 +112,12 @@ def relative_map(
     columns, made = [], []
     for at, x in enumerate(locations):
         static = float(sb.model.quasi_static_threshold(x, frequency_ratio))
-        ds = paper_map(
-            model,
-            frequency_ratio=frequency_ratio,
-            velocity_amplitude=relative * static,
-            location=float(x),
-            cycles=cycles,
-            early_termination=True,
-        )
+        place: dict[str, Any] = {
+            "frequency_ratio": frequency_ratio,
+            "velocity_amplitude": relative * static,
+            "location": float(x),
+        }
+        ds = paper_map(model, **place, cycles=cycles, early_termination=True)
         amplitude = ds["velocity_amplitude"].values
         made.append(ds.attrs["created"])
         ds = ds[list(KEPT)].rename(velocity_amplitude="relative_amplitude")

@@ -1,4 +1,4 @@
-"""Plots of runs, maps, thresholds and the results of dynamics and uncertainty."""
+"""Plots of runs, maps, thresholds and the results of dynamics and uncertainty, in the axes *ax*, or in new ones."""
 
 import lazy_loader
 

@@ -63,10 +63,6 @@ def _of_state(dataset: xr.Dataset, state: xr.DataArray, parameters: dict[str, fl
     return Start(parameters, dict(zip(names, state.values.tolist(), strict=True)), int(dataset.attrs["period"]))
 
 
-def _orbit_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start:
-    return _of_state(dataset, dataset["state"][0], {})
-
-
 def _branch_start(dataset: xr.Dataset, place: tuple[float, float] | None) -> Start | None:
     """Start of the orbit nearest to a place over the parameter and mid-span displacement, or of the middle one."""
     name = str(dataset.attrs["parameter"])
@@ -228,7 +224,8 @@ _KINDS = (
         lambda ds: {str(list(ds.attrs["parameters"])[1]): dynamics.plot_bifurcation_curve},
     ),
     _Kind(
-        "periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": dynamics.plot_multipliers}, _orbit_start
+        "periodic orbit", {"multiplier_real", "state"}, set(), lambda _: {"multipliers": dynamics.plot_multipliers},
+        lambda ds, _: _of_state(ds, ds["state"][0], {}),
     ),
     _Kind(
         "backbone curve", {"participation", "initial_amplitude"}, {"point"}, lambda _: {"frequency_ratio": dynamics.plot_backbone},

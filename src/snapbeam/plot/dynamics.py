@@ -130,9 +130,7 @@ def _close_gap(ax: Axes) -> None:
 def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Line2D]:
     """Draw the points, those swept down smaller and over those swept up, so that both are seen where they agree."""
     handles = []
-    looks = {
-        "up": (_BLUE, "swept up", 2.4), "down": (_RED, "swept down", 1.5)
-    }  # fmt: skip
+    looks = {"up": (_BLUE, "swept up", 2.4), "down": (_RED, "swept down", 1.5)}
     sweeps = [str(name) for name in dataset["sweep"].values]
     for name in sorted(sweeps, key=list(looks).index if set(sweeps) <= set(looks) else str):
         part = dataset[variable].isel(sweep=sweeps.index(name)).transpose(along, "period")
@@ -220,17 +218,8 @@ def _lifetime_line(dataset: xr.Dataset, ax: Axes, x: Any, legend: bool) -> None:
     share = 100.0 * float(dataset.attrs.get("confidence", 0.95))
     label = f"lifetime, {share:g} % interval"
     if np.isfinite(value).any():
-        ax.errorbar(
-            x,
-            value,
-            yerr=bars,
-            fmt="o-",
-            color=_BLUE,
-            markersize=marker_size(x.size),
-            linewidth=0.7,
-            elinewidth=0.7,
-            label=label,
-        )
+        look: dict[str, Any] = {"color": _BLUE, "markersize": marker_size(x.size), "linewidth": 0.7, "elinewidth": 0.7}
+        ax.errorbar(x, value, yerr=bars, fmt="o-", label=label, **look)
     ax.set(yscale="log", ylim=(0.5 * float(ends.min()) if ends.size else 0.1, top))
     ax.set_ylabel("Lifetime of snapping (cycles)")
     none, going = np.isnan(value), dataset["runs_snapping"].values > 0
@@ -286,11 +275,7 @@ def plot_survival(dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequen
     >>> import snapbeam as sb
     >>> from snapbeam import paper
     >>> damped = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
-    >>> axes = {"drive.velocity_amplitude": [0.1, 0.2]}
-    >>> settings = sb.dynamics.LifetimeSettings(settling_cycles=5)
-    >>> lifetimes = sb.dynamics.lifetime_map(
-    ...     damped, axes, sb.Integration(cycles=20), initial_conditions=4, settings=settings
-    ... )
+    >>> lifetimes = sb.dynamics.lifetime_map(damped, None, sb.Integration(cycles=60), initial_conditions=4)
     >>> ax = sb.plot.plot_survival(lifetimes)
     """
     if "last_snap" not in dataset:
@@ -336,11 +321,8 @@ def plot_survival(dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequen
         if (np.isfinite(tau) & np.isfinite(delay)).any():
             handles.append(Line2D([], [], color=own, dashes=(4, 2), linewidth=0.7, label="fitted"))
         if open_ends:
-            ring = Line2D(
-                [], [], linestyle="none", marker="o", color=own, markerfacecolor="white", markersize=4.0,
-                label="right-censored",
-            )  # fmt: skip
-            handles.append(ring)
+            ring: dict[str, Any] = {"marker": "o", "color": own, "markerfacecolor": "white", "markersize": 4.0}
+            handles.append(Line2D([], [], linestyle="none", label="right-censored", **ring))
         legend_below(ax, handles)
     return ax
 
@@ -363,8 +345,6 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     ----------
     dataset : xarray.Dataset
         Of :func:`snapbeam.dynamics.lyapunov_spectrum` or :func:`snapbeam.dynamics.largest_lyapunov`.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; new ones by default.
     per : {"second", "period"}
         Unit of time: 1 s, or one period of the excitation.
 
@@ -472,8 +452,6 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     ----------
     dataset : xarray.Dataset
         Of ``to_dataset`` of a :class:`snapbeam.dynamics.PeriodicOrbit` or a :class:`snapbeam.dynamics.Branch`.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; new ones by default.
 
     Examples
     --------
@@ -505,6 +483,28 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def _listed(given: xr.Dataset | Sequence[xr.Dataset], kind: str, *needed: str) -> list[xr.Dataset]:
+    """One or several datasets of a kind as a list."""
+    from snapbeam.util.datasets import xr
+
+    found: list[xr.Dataset] = []
+    for each in [given] if isinstance(given, xr.Dataset) else given:  # one by one: there may be very many
+        found.append(instance("datasets", each, xr.Dataset, f"a dataset of a {kind}, or several"))
+        if not set(needed) <= set(map(str, each.variables)):
+            raise InputError(f"datasets: no {kind} among {list(map(str, each.variables))}")
+    if not found:
+        raise InputError(f"datasets = []: must hold at least one {kind}")
+    return found
+
+
+def _labels(given: Sequence[str] | None, default: list[str]) -> Sequence[str]:
+    """The labels of curves, checked."""
+    labels = default if given is None else given
+    if len(labels) != len(default) or not all(isinstance(label, str) for label in labels):
+        raise InputError(f"labels = {shown(list(labels))}: must be one text for each of {len(default)} curves")
+    return labels
+
+
 @checked
 def plot_backbone(
     datasets: xr.Dataset | Sequence[xr.Dataset], ax: Axes | None = None, *, labels: Sequence[str] | None = None
@@ -517,8 +517,6 @@ def plot_backbone(
     ----------
     datasets : xarray.Dataset or sequence of xarray.Dataset
         Of :func:`snapbeam.dynamics.backbone_curve`.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; new ones by default.
     labels : sequence of str, optional
         Of the curves, in a legend; the wells by default if there are several.
 
@@ -529,20 +527,9 @@ def plot_backbone(
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
     >>> ax = sb.plot.plot_backbone(sb.dynamics.backbone_curve(sb.System(model), max_points=5))
     """
-    from snapbeam.util.datasets import xr
-
-    curves = [datasets] if isinstance(datasets, xr.Dataset) else list(datasets)
-    for curve in curves:
-        instance("datasets", curve, xr.Dataset, "datasets of backbone_curve")
-        if not {"frequency_ratio", "max_midspan", "stable"} <= set(map(str, curve.variables)):
-            raise InputError(f"datasets: no backbone curve among {list(map(str, curve.variables))}")
-    if not curves:
-        raise InputError("datasets = []: must hold at least one backbone curve")
+    curves = _listed(datasets, "backbone curve", "frequency_ratio", "max_midspan", "stable")
     words = {"lower": "about the lower well", "upper": "about the upper well", "both": "across both wells"}
-    if labels is None:
-        labels = [words[curve.attrs["well"]] for curve in curves]
-    if len(labels) != len(curves) or not all(isinstance(label, str) for label in labels):
-        raise InputError(f"labels = {shown(list(labels))}: must be one text for each of {len(curves)} curves")
+    labels = _labels(labels, [words[curve.attrs["well"]] for curve in curves])
     one_model = len({curve.attrs["modes"] for curve in curves}) == 1
     with frame(ax, curves[0] if one_model else None, height=84.0) as ax:
         handles: list[Line2D] = []
@@ -551,10 +538,8 @@ def plot_backbone(
             frequency = curve["frequency_ratio"].values
             height = 0.5 * (curve["max_midspan"] - curve["min_midspan"]).values
             stable = curve["stable"].values
-            look: dict[str, Any] = {
-                "color": SERIES_COLORS[number % len(SERIES_COLORS)],
-                "linewidth": 1.2 + 0.7 * (len(curves) - 1 - number),
-            }
+            color = SERIES_COLORS[number % len(SERIES_COLORS)]
+            look: dict[str, Any] = {"color": color, "linewidth": 1.2 + 0.7 * (len(curves) - 1 - number)}
             for kind in (True, False):
                 # a segment is drawn as its first point is
                 segments = (stable == kind) | np.append(False, (stable == kind)[:-1])
@@ -611,24 +596,14 @@ def plot_bifurcation_curve(
     >>> curve = sb.dynamics.bifurcation_curve(branch.special_points[0], names, bounds, max_points=5)
     >>> ax = sb.plot.plot_bifurcation_curve(curve)
     """
-    from snapbeam.util.datasets import xr
-
-    curves: list[xr.Dataset] = []
-    for each in [datasets] if isinstance(datasets, xr.Dataset) else datasets:  # one by one: there may be very many
-        curves.append(instance("datasets", each, xr.Dataset, "a dataset, or several"))
-    if not curves:
-        raise InputError("datasets = []: must hold at least one bifurcation curve")
+    curves = _listed(datasets, "bifurcation curve", "special_point_kind")
     for curve in curves:
-        instance("datasets", curve, xr.Dataset, "datasets of bifurcation_curve")
-        if curve.attrs.get("kind") not in _CURVE_LINES or "special_point_kind" not in curve:
+        if curve.attrs.get("kind") not in _CURVE_LINES:
             raise InputError(f"datasets: no bifurcation curve among {list(map(str, curve.variables))}")
     names = list(curves[0].attrs["parameters"])
     if any(list(curve.attrs["parameters"]) != names for curve in curves):
         raise InputError("datasets: curves over different parameters")
-    if labels is None:
-        labels = [curve.attrs["kind"] for curve in curves]
-    if len(labels) != len(curves) or not all(isinstance(label, str) for label in labels):
-        raise InputError(f"labels = {shown(list(labels))}: must be one text for each of {len(curves)} curves")
+    labels = _labels(labels, [curve.attrs["kind"] for curve in curves])
     new = ax is None
     with frame(ax, curves[0], height=70.0) as ax:
         for number, (curve, label) in enumerate(zip(curves, labels, strict=True)):
@@ -682,8 +657,6 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     ----------
     dataset : xarray.Dataset
         Of :meth:`snapbeam.dynamics.Attractors.to_dataset`.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; new ones by default.
 
     Examples
     --------
@@ -693,8 +666,7 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     >>> attractors = sb.dynamics.find_attractors(damped, 12)
     >>> ax = sb.plot.plot_attractors(attractors.to_dataset())
     """
-    if "points" not in dataset or "attractor" not in dataset["points"].dims:
-        raise InputError(f"no attractors among {list(map(str, dataset.variables))}")
+    contains(dataset, "attractors", "points", "share")
     names = [str(name) for name in dataset["coordinate"].values]
     modes = sum(name.startswith("amplitude[") for name in names)
     pair = (0, modes if 0 < modes < len(names) else min(1, len(names) - 1))
@@ -724,8 +696,6 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str | None = No
     ----------
     dataset : xarray.Dataset
         Of :func:`snapbeam.dynamics.poincare_section`.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; new ones by default.
     x : {"midspan_displacement", "displacement_at_striker", "drive_phase"}, optional
         By default the displacement of mid-span, once a period; the phase of the drive, at impacts or a level.
 

@@ -78,8 +78,6 @@ def plot_response_map(
     dataset : xarray.Dataset
         Map with ``response_class`` over one or two axes of more than one point, or a list of points
         (:func:`plot_points`).
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; new ones by default.
     measurements : MeasuredPoints, optional
         Measured responses, drawn as dots in the colours of their classes. Those at another value of the map's fixed
         coordinate (by more than 2 %) are left out, with a warning.
@@ -107,11 +105,8 @@ def plot_response_map(
     across, upward, kinds = _two_axes(dataset)
     ratios = [ratio_along(dataset, name)[0] for name in (across, upward)]
     edges = tuple(edges_of(dataset, name) for name in (across, upward))
-    fixed = {
-        name: fixed_value(dataset, name)
-        for name in ("frequency_ratio", "location", "velocity_amplitude")
-        if name not in ratios
-    }
+    names = ("frequency_ratio", "location", "velocity_amplitude")
+    fixed = {name: fixed_value(dataset, name) for name in names if name not in ratios}
     with frame(ax, height=92.0 if legend else 70.0) as ax:
         class_cells(ax, edges[0], edges[1], kinds)
         dress(ax.xaxis, dataset, across)
@@ -224,14 +219,11 @@ def class_handles(kinds: NDArray[np.int8] | None = None, wells: int = 2) -> list
         count = 0 if kinds is None else int((kinds == kind).sum())
         if count or (kinds is None and kind is not ResponseClass.UNKNOWN):
             name = kind.label_of(wells)
-            label = name if kinds is None else f"{name}, {_percent(count, kinds.size)}"
+            percent = 0.0 if kinds is None else 100.0 * count / max(kinds.size, 1)
+            share = "<0.1 %" if 0.0 < percent < 0.1 else f"{percent:.1f} %"
+            label = name if kinds is None else f"{name}, {share}"
             handles.append(Patch(facecolor=CLASS_COLORS[kind], edgecolor="black", linewidth=0.4, label=label))
     return handles
-
-
-def _percent(count: int, total: int) -> str:
-    share = 100.0 * count / max(total, 1)
-    return "<0.1 %" if 0.0 < share < 0.1 else f"{share:.1f} %"
 
 
 def draw_quasi_static_line(
@@ -286,12 +278,7 @@ def _given(fixed: Mapping[str, Any], name: str) -> float:
 
 
 def draw_measurements(
-    ax: Axes,
-    measurements: MeasuredPoints,
-    dataset: xr.Dataset,
-    across: str,
-    upward: str,
-    fixed: dict[str, float | None],
+    ax: Axes, measurements: MeasuredPoints, dataset: xr.Dataset, across: str, upward: str, fixed: dict[str, Any]
 ) -> Line2D:
     """Draw measured responses over a map, those at other values of its fixed coordinates left out with a warning."""
     (across, wide), (upward, high) = (ratio_along(dataset, name) for name in (across, upward))
@@ -344,8 +331,6 @@ def plot_statistic(
         Map, or a result of :func:`snapbeam.dynamics.hysteresis`, drawn as two lines.
     name : str
         Name of a variable over the axes; over an axis of seeds its mean, with the interval over one other axis.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; new ones by default.
     log : bool, optional
         True for powers of ten; by default where the values span more than two.
     over : str, optional
@@ -389,9 +374,8 @@ def plot_statistic(
                 _swept(ax, dataset, data, dims[1])
             else:
                 points, _ = positions(dataset, dims[0])
-                ax.plot(
-                    points, data.values, ".-", color=BEAM_COLOR, markersize=1.5 * marker_size(points.size), label="mean"
-                )
+                size = 1.5 * marker_size(points.size)
+                ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=size, label="mean")
                 if f"{name}_low" in dataset:
                     _band(ax, dataset.squeeze(), name, points)
                 if float(np.ptp(data.values)) < 1e-6 * abs(middle := float(np.mean(data.values))):
@@ -421,11 +405,8 @@ def _axis_named(dataset: xr.Dataset, dims: list[str], over: str) -> str:
     """The axis that a parameter names, as a ratio or in its physical unit."""
     full = {each: str(dataset[each].attrs.get("parameter", each)) for each in dims}
     labels = labels_of(json.loads(dataset.attrs.get("system", "{}")))
-    row = (
-        None
-        if over in dims
-        else lookup(named_in(resolved(over, labels), {split_name(each)[0]: {} for each in full.values()}))
-    )
+    sections: dict[str, Any] = {split_name(each)[0]: {} for each in full.values()}
+    row = None if over in dims else lookup(named_in(resolved(over, labels), sections))
     for each, name in full.items():
         if over == each or (row is not None and ratio_of(row.name) == ratio_of(lookup(name).name)):
             return each
@@ -446,9 +427,8 @@ def _curves(ax: Axes, dataset: xr.Dataset, data: xr.DataArray, along: str) -> No
         values = data.isel({other: at}).values
         ax.plot(points, values, f"{mark}-", color=color, markersize=1.2 * marker_size(points.size), label=text)
         if f"{name}_low" in dataset:
-            low, high = (
-                dataset[f"{name}{end}"].isel({other: at}).squeeze().values / factor for end in ("_low", "_high")
-            )
+            part = dataset.isel({other: at}).squeeze()
+            low, high = (part[f"{name}{end}"].values / factor for end in ("_low", "_high"))
             ax.fill_between(points, low, high, where=np.isfinite(high - low), color=color, alpha=0.2, linewidth=0.0)
     handles = ax.get_legend_handles_labels()[0]
     if f"{name}_low" in dataset:
@@ -557,8 +537,6 @@ def plot_points(
         Result of :func:`snapbeam.sweep` over a list of points.
     name : str
         Name of a variable over the points.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; new ones by default.
     across, upward : str, optional
         Parameters along the axes; by default two of those that differ.
     measurements, quasi_static_line
@@ -572,12 +550,8 @@ def plot_points(
     >>> import xarray as xr
     >>> from snapbeam import paper
     >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> points = xr.Dataset(
-    ...     {
-    ...         "drive.frequency_ratio": ("point", [0.7, 0.75, 0.8]),
-    ...         "drive.velocity_amplitude": ("point", [0.1, 0.2, 0.3]),
-    ...     }
-    ... )
+    >>> values = {"drive.frequency_ratio": [0.7, 0.75, 0.8], "drive.velocity_amplitude": [0.1, 0.2, 0.3]}
+    >>> points = xr.Dataset({name: ("point", each) for name, each in values.items()})
     >>> dataset = sb.sweep(system, points, sb.Integration(cycles=20))
     >>> ax = sb.plot.plot_points(dataset, "peak_force")
     """

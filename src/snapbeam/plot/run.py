@@ -74,13 +74,6 @@ def across(dataset: xr.Dataset) -> tuple[str, str]:
 def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, modes: int = 5) -> Axes:
     """Draw the amplitudes of the first *modes* buckling modes, over that of the well.
 
-    Parameters
-    ----------
-    run : Run or xarray.Dataset
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; new ones by default.
-    modes : int
-
     Examples
     --------
     >>> import snapbeam as sb
@@ -245,7 +238,6 @@ def plot_spectrogram(
 
     Parameters
     ----------
-    run : Run or xarray.Dataset
     variable : str, optional
         A variable over time, by name; the displacement of mid-span, or at the striker, by default.
     window : pair of float, optional

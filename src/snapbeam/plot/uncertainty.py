@@ -32,6 +32,7 @@ from snapbeam.plot.style import (
 )
 from snapbeam.plot.units import in_symbols, in_units, ratio_along, ratio_name, scale_text
 from snapbeam.solver.statistics import STATISTICS
+from snapbeam.util.proportions import weighted_quantiles
 from snapbeam.util.si_prefixes import prefixed, scale_of
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError, checked, shown
@@ -65,7 +66,6 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
 
     Parameters
     ----------
-    dataset : xarray.Dataset
     over : str, optional
         A variable, such as ``"location"``, or a distance to a constraint, such as ``"distance_snap"``; by default the second
         objective, or the first variable that is not the objective.
@@ -181,7 +181,6 @@ def plot_probability(
     ----------
     dataset : xarray.Dataset
         Of :func:`snapbeam.uncertainty.probability_map` over one or two parameters.
-    outcome : str
     measurements : MeasuredPoints, optional
         Measured responses to lay over it, in the colours of their classes.
     levels : tuple of float
@@ -274,7 +273,6 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
 
     Parameters
     ----------
-    dataset : xarray.Dataset
     quasi_static : bool
         Whether to draw V_QS1 (Eq. 21) too, over frequency ratio or location.
     """
@@ -486,9 +484,7 @@ def plot_posterior(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     weight = dataset["weight"].values
     labels, ends = [], []
     for name in names:
-        order = np.argsort(dataset[name].values)
-        share = np.cumsum(weight[order]) - 0.5 * weight[order]
-        found = np.interp((0.025, 0.25, 0.5, 0.75, 0.975), share, dataset[name].values[order])
+        found = weighted_quantiles(dataset[name].values, weight, (0.025, 0.25, 0.5, 0.75, 0.975))
         row = lookup(str(dataset[name].attrs["parameter"]))
         labels.append(f"{_words(row.name)}\nmedian {_with_unit(found[2], row.quantity.unit, 4)}")
         ends.append(100.0 * (found / found[2] - 1.0))

@@ -125,11 +125,6 @@ class CheckpointOptions:
             raise InputError(f"checkpoint = {str(self.path)!r}: is not the folder of a sweep, so it cannot be checked")
 
 
-def _scattered(task: int) -> float:
-    """Return a key that spreads consecutive tasks over the sweep, so that the estimated remaining time is good."""
-    return task * 0.6180339887498949 % 1.0
-
-
 class CheckpointRunner:
     """Computes the damaged and missing tasks of a sweep with a checkpoint."""
 
@@ -163,7 +158,8 @@ class CheckpointRunner:
         counts.damaged += [(stage.name, task) for task in damaged]
         if damaged:
             self.note(f"{stage.name}: {len(damaged)} of {stage.tasks} tasks are damaged; they are computed again")
-        todo = sorted(damaged if self.only_damaged else pending, key=_scattered)
+        # consecutive tasks are spread over the sweep, so that the estimated remaining time is good
+        todo = sorted(damaged if self.only_damaged else pending, key=lambda task: task * 0.6180339887498949 % 1.0)
         if todo and store.read_only:
             raise CheckpointError(
                 f"checkpoint = {str(store.path)!r}: is read-only, and {len(todo)} of {stage.tasks} tasks are not finished; "
@@ -172,11 +168,8 @@ class CheckpointRunner:
         sizes = {task: int(np.diff(stage.bounds(task))[0]) for task in todo}
         total, done = sum(sizes.values()), 0
         if total < stage.size and not self.only_damaged:
-            self.note(
-                f"checkpoint: {stage.size - total} of {stage.size} points are finished, {total} remain"
-                if stage.name == "base"
-                else f"{stage.name}: {stage.size - total} of {stage.size} points are finished, {total} remain"
-            )
+            name = "checkpoint" if stage.name == BASE else stage.name
+            self.note(f"{name}: {stage.size - total} of {stage.size} points are finished, {total} remain")
 
         def report(inside: int) -> None:
             if progress is not None:
@@ -276,10 +269,8 @@ def _result(work: PointWork, points: Points, rows: ResultRows, more: dict[str, A
         attrs["points_computed"] = int(rows.computed.sum())
         attrs["points_filled"] = int(points.size - rows.computed.sum())
         dataset = to_dataset(work, points, rows, attrs)
-        labels = {
-            "units": "1",
-            "long_name": "whether the point was run; if not, its class was filled from its neighbours",
-        }
+        words = "whether the point was run; if not, its class was filled from its neighbours"
+        labels = {"units": "1", "long_name": words}
         dataset["computed"] = (points.dims, points.arranged(rows.computed.ravel()), labels)
         if target is None:
             return dataset

@@ -320,16 +320,11 @@ def _answered() -> Iterator[None]:
 _FORMS = "local:N, tcp://host:port, tls://host:port or a TOML file such as slurm.toml"
 _LOOPBACK = "127.0.0.1"
 _SLURM: dict[str, type] = {
-    "account": str,
-    "cores": int,
-    "interface": str,
-    "jobs": int,
-    "memory": str,
-    "prologue": list,
-    "queue": str,
-    "walltime": str,
-}
-_NEEDED = ("cores", "interface", "memory")
+    "account": str, "cores": int, "interface": str, "jobs": int, "memory": str, "prologue": list, "queue": str, "walltime": str
+}  # fmt: skip
+_NEEDED = {
+    "cores": "", "interface": ": the network interface through which the workers reach the scheduler", "memory": ""
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -369,16 +364,9 @@ def _read_slurm(path: Path) -> dict[str, Any]:
             raise InputError(f"{path.name}: [slurm] {name}: unknown key; must be one of {', '.join(_SLURM)}")
         if not isinstance(value, _SLURM[name]) or isinstance(value, bool):
             raise InputError(f"{path.name}: [slurm] {name} = {shown(value)}: must be of type {_SLURM[name].__name__}")
-    for name in _NEEDED:
+    for name, words in _NEEDED.items():
         if name not in given:
-            raise InputError(
-                f"{path.name}: [slurm] {name} is missing"
-                + (
-                    ": the network interface through which the workers reach the scheduler"
-                    if name == "interface"
-                    else ""
-                )
-            )
+            raise InputError(f"{path.name}: [slurm] {name} is missing{words}")
     for name in ("cores", "jobs"):
         if name in given:
             integer(f"{path.name}: [slurm] {name}", given[name], 1, 100_000)

@@ -121,7 +121,10 @@ def read_measured_points(
     file = file_path("path", path)
     text = decoded(input_bytes("measurements", file), file.name)
     mark, header, rows = rows_of_table(text, file.name, _COLUMNS, _BESIDE)
-    _check_header(file.name, header)
+    for pair in (_FREQUENCY, _VELOCITY, ("response_class",)):
+        there = [column for column in pair if column in header]
+        if len(there) != 1:
+            raise InputError(f"{file.name}: must have one column {' or '.join(pair)}, not {there}")
     frequency_scale, velocity_scale = 1.0, 1.0
     if "frequency_hz" in header:
         frequency_scale = 1.0 / _wanted(file.name, "frequency_hz", "reference_frequency", reference_frequency, "Hz")
@@ -141,23 +144,12 @@ def read_measured_points(
         location = math.nan
         if place is not None and cells[place]:
             location = _number(file.name, number, "location", cells[place], 1.0)
-        points.append(
-            (
-                frequency_scale * _number(file.name, number, header[frequency], cells[frequency]),
-                velocity_scale * _number(file.name, number, header[velocity], cells[velocity]),
-                location,
-            )
-        )
+        omega = frequency_scale * _number(file.name, number, header[frequency], cells[frequency])
+        speed = velocity_scale * _number(file.name, number, header[velocity], cells[velocity])
+        points.append((omega, speed, location))
         kinds.append(_kind(file.name, number, cells[header.index("response_class")]))
     columns = np.array(points, dtype=np.float64).reshape(-1, 3).T
     return MeasuredPoints(columns[0], columns[1], columns[2], np.array(kinds, dtype=np.int8))
-
-
-def _check_header(name: str, header: list[str]) -> None:
-    for pair in (_FREQUENCY, _VELOCITY, ("response_class",)):
-        found = [column for column in pair if column in header]
-        if len(found) != 1:
-            raise InputError(f"{name}: must have one column {' or '.join(pair)}, not {found}")
 
 
 def _wanted(name: str, column: str, parameter: str, value: float | None, unit: str) -> float:

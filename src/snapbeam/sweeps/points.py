@@ -88,7 +88,8 @@ class Grid:
 
     def coordinates(self) -> dict[str, Any]:
         """Return dimensions, values and attributes of the axes, by name."""
-        found = {row.short: _coordinate(row, self.axes[row.name]) for row in map(lookup, self.axes)}
+        rows = map(lookup, self.axes)
+        found: dict[str, Any] = {row.short: ((row.short,), self.axes[row.name], labels_of(row)) for row in rows}
         for ratio, (name, unit) in self.units.items():
             row, dim = lookup(name), lookup(ratio).short
             values = [float(f"{value:.14g}") for value in self.axes[ratio] * unit]  # as they were given
@@ -264,11 +265,10 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
     for name, values in columns.items():
         require_texts(shown(name), name)
         require_texts(name, values)
+        if values.ndim == 0:
+            values = np.full(max((each.size for each in columns.values() if each.ndim == 1), default=1), values)
         if values.ndim != 1:
-            if values.ndim == 0:
-                values = np.full(_length(columns), values)
-            else:
-                raise InputError(f"{name} of shape {values.shape}: a list of points must have one dimension")
+            raise InputError(f"{name} of shape {values.shape}: a list of points must have one dimension")
         if _is_label(name):
             labels[name] = values
             continue
@@ -307,14 +307,6 @@ def _is_label(name: str) -> bool:
     return False
 
 
-def _length(columns: Mapping[str, NDArray[Any]]) -> int:
-    return max((values.size for values in columns.values() if values.ndim == 1), default=1)
-
-
 def labels_of(row: Parameter) -> dict[str, Any]:
     """Attributes of a coordinate that holds values of a parameter."""
     return {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
-
-
-def _coordinate(row: Parameter, values: NDArray[Any]) -> tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]:
-    return (row.short,), values, labels_of(row)

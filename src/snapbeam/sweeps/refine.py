@@ -7,6 +7,7 @@ get the class of the corners, with the status FILLED.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -27,17 +28,17 @@ _Index = NDArray[np.int64]
 _Split = tuple[bool, ...]
 
 
+@dataclass(frozen=True, eq=False)
 class RefinedRows:
     """Rows of a refined map, computed and filled."""
 
-    def __init__(self, columns: ResultTable, computed: _Mask) -> None:
-        self.columns = columns
-        self.computed = computed
-        """True for each point that was run, shape of the grid."""
+    columns: ResultTable
+    computed: _Mask
+    """True for each point that was run, shape of the grid."""
 
     def read(self, start: int, stop: int) -> ResultTable:
         """Return the rows *start* to *stop*."""
-        return ResultTable(self.columns.integers[start:stop], self.columns.numbers[start:stop])
+        return self.columns.read(start, stop)
 
 
 def refined_grid(grid: Grid) -> Grid:
@@ -122,14 +123,9 @@ def _finer_index(index: _Index, grid: Grid, finer: Grid) -> _Index:
     return np.ravel_multi_index(doubled, finer.shape).astype(np.int64)
 
 
-def _every(split: _Split) -> tuple[slice, ...]:
-    """Return the slices of a fine grid that are the points of the coarse one."""
-    return tuple(slice(None, None, 2) if halved else slice(None) for halved in split)
-
-
 def _embed(coarse: NDArray, shape: tuple[int, ...], split: _Split, fill: int) -> NDArray:
     fine = np.full(shape, fill, dtype=coarse.dtype)
-    fine[_every(split)] = coarse
+    fine[tuple(slice(None, None, 2) if halved else slice(None) for halved in split)] = coarse
     return fine
 
 

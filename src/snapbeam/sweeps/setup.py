@@ -41,11 +41,8 @@ def require_parameters(system: System, points: Points) -> None:
     """Refuse axes of parameters that the system does not have, at its first point."""
     first = {name: values[0] for name, values in points.take(np.zeros(1, dtype=np.int64)).items()}
     for name in first:
-        if (
-            name.startswith(("integration.", "initial_state."))
-            or not lookup(name).is_run
-            or ratio_of(name) in system.parameters
-        ):
+        of_run = not name.startswith(("integration.", "initial_state.")) and lookup(name).is_run
+        if not of_run or ratio_of(name) in system.parameters:
             continue
         section, field = split_name(name)
         if field != "gap" or section not in {split_name(each)[0] for each in system.parameters}:
@@ -74,11 +71,8 @@ def diagnostics_of(system: System, points: Points) -> Iterator[Diagnostic]:
 def _ends(points: Points) -> list[int]:
     """Return the points at which a parameter is minimum or maximum."""
     if isinstance(points, Grid):
-        corners = [(0,) * len(points.shape)]
-        corners += [
-            tuple(size - 1 if i == at else 0 for i in range(len(points.shape))) for at, size in enumerate(points.shape)
-        ]
-        return [int(np.ravel_multi_index(corner, points.shape)) for corner in dict.fromkeys(corners)]
+        edges = np.diag(np.array(points.shape) - 1)  # the last value of one axis, the first of the others
+        return list(dict.fromkeys([0, *np.ravel_multi_index(tuple(edges), points.shape).tolist()]))
     numbers = [values for values in points.columns.values() if values.dtype.kind in "if"]
     return sorted({int(at) for values in numbers for at in (values.argmin(), values.argmax())})
 
@@ -154,9 +148,8 @@ class SweepSetup:
                 ensemble = make_ensemble(system, integration, columns_of_part, start=begun, step_factor=step_factor)
                 if endless:
                     ensemble.runs["decide_crossings"] = -1
-                ensemble = replace(
-                    ensemble, on_gpu=integration.engine == "cuda"
-                )  # else the CPU: few runs, or one after the other
+                # else the CPU: few runs, or one after the other
+                ensemble = replace(ensemble, on_gpu=integration.engine == "cuda")
 
                 def report(inside: int, _: int, before: int = done) -> None:
                     if progress is not None:
@@ -196,14 +189,13 @@ class SweepSetup:
 
     def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
         """Return the system and the integration with other model-level parameters."""
-        of_run = {
-            name.removeprefix("integration."): value
-            for name, value in changes.items()
-            if name.startswith("integration.")
-        }
-        of_system = {name: value for name, value in changes.items() if not name.startswith("integration.")}
+        of_run = {name: value for name, value in changes.items() if name.startswith("integration.")}
+        of_system = {name: value for name, value in changes.items() if name not in of_run}
         system = self.system.replace(**of_system) if of_system else self.system
-        return system, self.integration.replace(**of_run) if of_run else self.integration
+        if of_run:
+            own = {split_name(name)[1]: value for name, value in of_run.items()}
+            return system, self.integration.replace(**own)
+        return system, self.integration
 
     @staticmethod
     def start_of(system: System, points: dict[str, NDArray[np.float64]]) -> State | None:
@@ -220,23 +212,14 @@ class SweepSetup:
     @property
     def fixed(self) -> dict[str, float]:
         """Parameters of drive and striker that every dataset contains and that are not swept, by dotted name."""
-        parameters = self.system.parameters
-        return {
-            name: parameters[name]
-            for name in _ALWAYS
-            if name in parameters and name not in map(ratio_of, self.points.names)
-        }
+        own, swept = self.system.parameters, {ratio_of(name) for name in self.points.names}
+        return {name: own[name] for name in _ALWAYS if name in own and name not in swept}
 
     @property
     def structural(self) -> list[str]:
         """Swept parameters that change the frequencies, the length scale or the steps."""
-        return [
-            name
-            for name in self.points.names
-            if name.startswith(
-                ("beam.", "model.", "boundary.", "imperfection.", "integration.step", "integration.accuracy")
-            )
-        ]
+        begin = ("beam.", "model.", "boundary.", "imperfection.", "integration.step", "integration.accuracy")
+        return [name for name in self.points.names if name.startswith(begin)]
 
     @cached_property
     def _outermost(self) -> list[System]:
@@ -278,12 +261,8 @@ class SweepSetup:
     def identity(self) -> dict[str, Any]:
         """Return plain values of everything that the results depend on; sweeps with equal values have equal results."""
         integration = {name: getattr(self.integration, name) for name in quantities(Integration) if name != "threads"}
-        return {
-            "system": self.system.to_mapping(),
-            "integration": integration,
-            "points": self.points.describe(),
-            "step": self.plan.step,
-        }
+        own = {"system": self.system.to_mapping(), "integration": integration}
+        return own | {"points": self.points.describe(), "step": self.plan.step}
 
     def attributes(self, title: str = TITLE, more: dict[str, Any] | None = None) -> dict[str, Any]:
         """Return the attributes of a dataset: title, all parameters and provenance."""
@@ -299,16 +278,8 @@ class SweepSetup:
         attrs = attributes_of(title, self.system, self.integration, self.plan, more, self.points.describe())
         varied = {lookup(ratio_of(name)).short for name in self.points.names}
         if self.structural:
-            varied |= {
-                "reference_frequency",
-                "step",
-                "longest_contact_step",
-                "shortest_contact_step",
-                "length_scale",
-                "reference_well",
-                "initial_well",
-                "initial_well_reason",
-            }
+            varied |= {"reference_frequency", "step", "longest_contact_step", "shortest_contact_step", "length_scale"}
+            varied |= {"reference_well", "initial_well", "initial_well_reason"}
             if any(system.model.is_bistable for system in self._outermost):
                 varied.add("wells")
         if any(name == "contact.side" or name.startswith("initial_state.") for name in self.points.names):

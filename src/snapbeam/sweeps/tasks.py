@@ -6,7 +6,7 @@ import hashlib
 import inspect
 import platform
 from collections.abc import Iterable
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import asdict, astuple, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -43,6 +43,10 @@ class ResultTable(NamedTuple):
 
     integers: NDArray[np.int32]
     numbers: NDArray[np.float64]
+
+    def read(self, start: int, stop: int) -> ResultTable:
+        """Return the rows *start* to *stop*."""
+        return ResultTable(self.integers[start:stop], self.numbers[start:stop])
 
     def content_hash(self) -> str:
         """SHA-256 of the contents of the tables."""
@@ -93,12 +97,7 @@ class PointWork:
         if self.metres:
             found["displacements"] = "m"
         if self.replicates is not None:
-            found["replicates"] = {
-                "count": self.replicates.count,
-                "perturbation_rms": self.replicates.perturbation_rms,
-                "seed": self.replicates.seed,
-                "check_half_step": self.replicates.check_half_step,
-            }
+            found["replicates"] = asdict(self.replicates)
         return found
 
     @cached_property
@@ -257,14 +256,6 @@ def chunk_size(points: int) -> int:
     return int(np.clip(-(-points // 200), 64, 4096))
 
 
-class _Rows:
-    def __init__(self, columns: ResultTable) -> None:
-        self.columns = columns
-
-    def read(self, start: int, stop: int) -> ResultTable:
-        return ResultTable(self.columns.integers[start:stop], self.columns.numbers[start:stop])
-
-
 class MemoryRunner:
     """Computes a sweep in memory."""
 
@@ -276,7 +267,7 @@ class MemoryRunner:
     def complete(self, stage: Stage, progress: Progress | None = None) -> ResultRows:
         """Compute all points of the stage."""
         points = stage.points.take(np.arange(stage.size) if stage.which is None else stage.which)
-        return _Rows(self.work.compute(points, self.threads, progress))
+        return self.work.compute(points, self.threads, progress)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -305,7 +296,8 @@ class Provenance:
 
 def provenance_of(system: System) -> Provenance:
     """Return the provenance of this process, for a system with its contact law and its drive."""
-    return Provenance(__version__, _code(system), _libraries(), arithmetic_hash(), processor_name())
+    libraries = f"numpy {np.__version__}, python {platform.python_version()}"
+    return Provenance(__version__, _code(system), libraries, arithmetic_hash(), processor_name())
 
 
 def _code(system: System) -> str:
@@ -322,10 +314,6 @@ def _code(system: System) -> str:
         except (TypeError, OSError):  # of a class typed at a prompt
             return f"{code_hash()}+?"
     return f"{code_hash()}+{digest.hexdigest()[:8]}"
-
-
-def _libraries() -> str:
-    return f"numpy {np.__version__}, python {platform.python_version()}"
 
 
 def differences(provenances: Iterable[Provenance]) -> list[str]:

@@ -25,15 +25,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "Difference",
-    "Notch",
-    "class_fraction",
-    "compare_maps",
-    "interwell_threshold",
-    "is_interwell",
-    "threshold",
+    "Difference", "Notch", "class_fraction", "compare_maps", "interwell_threshold", "is_interwell", "threshold",
     "threshold_notch",
-]
+]  # fmt: skip
 
 
 _OUTCOMES = (
@@ -175,13 +169,9 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
         dataset[name] = (dims, padded[rows[name]], {"units": row.quantity.unit, "long_name": text})
     failed = {"units": "1", "long_name": "runs without a response class"}
     dataset["failed_runs"] = (dims, rows["failed_runs"], failed)
-    flags = {
-        "units": "1",
-        "long_name": "kind of result",
-        "flag_values": np.arange(len(_OUTCOMES), dtype=np.int8),
-        "flag_meanings": " ".join(_OUTCOMES),
-    }
-    dataset["outcome"] = (dims, rows["outcome"].astype(np.int8), flags)
+    flags = {"flag_values": np.arange(len(_OUTCOMES), dtype=np.int8), "flag_meanings": " ".join(_OUTCOMES)}
+    labels = {"units": "1", "long_name": "kind of result"} | flags
+    dataset["outcome"] = (dims, rows["outcome"].astype(np.int8), labels)
     dataset["pull_in"] = (whole, pulled_in, {"units": "1", "long_name": "run that leaves the displacements of a force"})
     extremes = () if dims else ("min_midspan_displacement", "max_midspan_displacement")
     for name in ("response_class", "status", *extremes):

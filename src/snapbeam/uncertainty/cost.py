@@ -14,7 +14,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.sweeps.points import Columns, PointList, points_of
 from snapbeam.sweeps.sweep import sweep
 from snapbeam.uncertainty.monte_carlo import Trials, outcome_named, trials_of
-from snapbeam.uncertainty.optimization import OptimizerSettings, optimize_design
+from snapbeam.uncertainty.optimization import OptimizerSettings, design_problem, optimize_design
 from snapbeam.uncertainty.probability import SamplingPlan, allocation_of, outcomes_of, probability_map, statistics_of
 from snapbeam.uncertainty.quantiles import QuantileSearchSettings, quantile_threshold
 from snapbeam.util.proportions import proportion
@@ -55,17 +55,8 @@ class CostEstimate:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
-    >>> uncertainty = sb.uncertainty.ParameterUncertainty(
-    ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
-    ... )
-    >>> estimate = sb.uncertainty.estimate_cost(
-    ...     sb.uncertainty.probability_map, system, {"velocity_amplitude": [0.1, 0.2]}, uncertainty, 16,
-    ...     integration=sb.Integration(cycles=5), trial=0.1,
-    ... )
-    >>> estimate.runs
-    32
+    >>> print(sb.uncertainty.CostEstimate(6400, 20_000, 90.0, 4.4e6, 2e6, trial_runs=512))
+    about 6400 runs (at most 20000), 1 min 30 s on this machine, 4 MiB of memory, 1.9 MiB in a checkpoint; estimated from 512 runs
     """
 
     runs: int
@@ -124,15 +115,12 @@ def estimate_cost(question: Callable[..., Any], *arguments: Any, trial: float = 
     (32, True)
     """
     within("trial", trial, 0.0, _LONGEST, closed="right", unit="s")
-    if question is sweep:
-        return _of_sweep(trial, *arguments, **options)
-    if question is probability_map:
-        return _of_probability(trial, *arguments, **options)
-    if question is quantile_threshold:
-        return _of_threshold(trial, *arguments, **options)
-    if question is optimize_design:
-        return _of_design(trial, *arguments, **options)
-    raise InputError("question: must be sweep, probability_map, quantile_threshold or optimize_design")
+    known: dict[Any, Callable[..., CostEstimate]] = {
+        sweep: _of_sweep, probability_map: _of_probability, quantile_threshold: _of_threshold, optimize_design: _of_design
+    }  # fmt: skip
+    if question not in known:
+        raise InputError("question: must be sweep, probability_map, quantile_threshold or optimize_design")
+    return known[question](trial, *arguments, **options)
 
 
 def _of_sweep(
@@ -190,12 +178,8 @@ def _expected(allocation: SamplingPlan, where: NDArray[np.int64], happened: NDAr
     if allocation.half_width is None:
         return points * allocation.initial_runs
     sure, unsure = _needed(0.01, allocation), _needed(0.3, allocation)
-    mixed = []
-    for one in np.unique(where):
-        hits = happened[where == one]
-        if hits.size > 1:
-            mixed.append(0.0 < hits.mean() < 1.0)
-    share = float(np.mean(mixed)) if mixed else 1.0
+    several = [hits for hits in (happened[where == one] for one in np.unique(where)) if hits.size > 1]
+    share = float(np.mean([0.0 < hits.mean() < 1.0 for hits in several])) if several else 1.0
     return round(points * ((1.0 - share) * sure + share * unsure))
 
 
@@ -229,21 +213,11 @@ def _column(parameter: str, values: NDArray[np.float64]) -> Columns:
 
 def _of_design(
     trial: float, system: Any, variables: Any, objectives: Any, constraints: Any, uncertainty: Any,
-    settings: Any = None,
-    **options: Any,
+    settings: Any = None, **options: Any,
 ) -> CostEstimate:  # fmt: skip
-    from snapbeam.uncertainty.optimization import design_problem
-
     settings = OptimizerSettings() if settings is None else settings
-    problem = design_problem(
-        system,
-        variables,
-        objectives,
-        constraints,
-        uncertainty,
-        samples=settings.samples,
-        integration=options.get("integration"),
-    )
+    parts = system, variables, objectives, constraints, uncertainty
+    problem = design_problem(*parts, samples=settings.samples, integration=options.get("integration"))
     bounds = np.array(list(problem.bounds.values()))
 
     def point(ranks: NDArray[np.float64]) -> Columns:

@@ -83,8 +83,7 @@ class Normal(Distribution):
 
     def at(self, nominal: _Array, normal: _Array) -> _Array:
         """Nominal value plus the standard deviation times *normal*."""
-        size = self.standard_deviation * np.abs(nominal) if self.relative else self.standard_deviation
-        return np.asarray(nominal + size * normal)
+        return np.asarray(nominal + self.standard_deviation * (np.abs(nominal) if self.relative else 1.0) * normal)
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,7 @@ class UniformTolerance(Distribution):
 
     def at(self, nominal: _Array, normal: _Array) -> _Array:
         """Nominal value plus the half width times 2 Phi(*normal*) - 1."""
-        size = self.half_width * np.abs(nominal) if self.relative else self.half_width
+        size = self.half_width * (np.abs(nominal) if self.relative else 1.0)
         return np.asarray(nominal + size * (2.0 * ndtr(normal) - 1.0))
 
 
@@ -328,16 +327,12 @@ class ParameterUncertainty:
             raise InputError(
                 f"calibration: {', '.join(calibration.undetermined)} not determined by the data, so its uncertainty is unknown; leave it out of the fit"
             )
-        of: dict[str, Distribution] = {
-            f"beam.{name}": Normal(error) for name, error in calibration.standard_errors.items()
-        }
-        matrix = np.eye(len(of) + 2)
-        matrix[: len(of), : len(of)] = calibration.correlation
-        beside = (
-            ("model.damping_ratio", calibration.damping_ratio_se),
-            ("contact.stiffness", calibration.contact_stiffness_se),
-        )
-        of |= {name: Normal(error) for name, error in beside if error}
+        errors = {f"beam.{name}": error for name, error in calibration.standard_errors.items()}
+        matrix = np.eye(len(errors) + 2)
+        matrix[: len(errors), : len(errors)] = calibration.correlation
+        errors["model.damping_ratio"] = calibration.damping_ratio_se
+        errors["contact.stiffness"] = calibration.contact_stiffness_se
+        of = {name: Normal(error) for name, error in errors.items() if error or name.startswith("beam.")}
         return cls(of=of, correlation=matrix[: len(of), : len(of)], **more)
 
     @property

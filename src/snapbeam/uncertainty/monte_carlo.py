@@ -45,11 +45,7 @@ Statistics = dict[str, NDArray[Any]]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 _FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)
 _Array = NDArray[np.float64]
-
-
 _Numbers = NDArray[np.int64]
-
-
 _Made = dict[tuple[Any, ...], System]
 _KEPT = 4096
 """Maximum number of cached systems."""
@@ -135,12 +131,10 @@ class Trials:
         """Run the samples and return every statistic of the table, arrays of shape (runs,)."""
         columns = self.columns(points, numbers, scores)
         if not columns:  # nothing is sampled and nothing varies: the system as it stands
-            columns = {name: np.full(numbers.size, self._nominal(name)) for name in self._any_parameter()}
+            own = in_table(self.system.parameters)
+            named = [name for name in own if isinstance(own[name], float) and lookup(name).is_run][:1]
+            columns = {name: np.full(numbers.size, self._nominal(name)) for name in named}
         return self.of_columns(columns, progress)
-
-    def _any_parameter(self) -> tuple[str, ...]:
-        own = in_table(self.system.parameters)
-        return tuple(name for name in own if isinstance(own[name], float) and lookup(name).is_run)[:1]
 
     def of_columns(self, columns: Columns, progress: Progress | None = None) -> dict[str, NDArray[Any]]:
         """Run points as they are, without sampling."""
@@ -184,17 +178,15 @@ class Trials:
 
     def _hold(self, points: Columns, found: Columns, size: int, known: set[str]) -> None:
         """Keep Hz, m/s and m where the beam differs from the one that the ratios were given for, but for those *known*."""
-        ratios = [ratio for ratio in self.system.parameters if self._is_held(ratio) and ratio not in known]
-        names = physical_names(ratios)
+        kept = "beam.length" in self.uncertainty.of
+        ratios = [name for name in self.system.parameters if kept or not name.endswith(".location")]
+        names = physical_names([name for name in ratios if name not in known])
         nominal, drawn = self._units(points, names, size), self._units(found, names, size)
         for j, physical in enumerate(names):
             ratio = PHYSICAL[physical].parameter
             value = found[ratio] if ratio in found else np.full(size, self._nominal(ratio))
             found[ratio] = value * (nominal[:, j] / drawn[:, j])
             _require_allowed(ratio, found[ratio])
-
-    def _is_held(self, ratio: str) -> bool:
-        return not ratio.endswith(".location") or "beam.length" in self.uncertainty.of
 
     def in_hz(self, points: Columns) -> Columns:
         """Points whose Omega and V are those of the nominal system, in the ratios of their own structure."""
@@ -451,12 +443,8 @@ def outcome_named(given: Any, name: str = "outcome") -> tuple[str, Event]:
 
     words = row.long_name.removesuffix(f", over {row.normalised_by}") if key else row.long_name
     limit_text = value if unit_in_text(value) or unit == "1" else f"{value} {unit}"
-    return f"{statistic} {sign} {value}", Event(f"{words} {sign} {_micro(limit_text)}", happened, statistic)
-
-
-def _micro(words: str) -> str:
-    """A value with its unit as it is printed, µ for u."""
-    return re.sub(r"(?<=[\d ])u(?=[a-zA-Z])", "µ", words)
+    printed = re.sub(r"(?<=[\d ])u(?=[a-zA-Z])", "µ", limit_text)
+    return f"{statistic} {sign} {value}", Event(f"{words} {sign} {printed}", happened, statistic)
 
 
 def scale_key(statistic: str, unit: str, value: str) -> tuple[str, str]:

@@ -37,7 +37,6 @@ from snapbeam.util.validation import (
     instance,
     integer,
     or_default,
-    positive,
     shown,
     within,
 )
@@ -78,16 +77,12 @@ def _speed(system: System, values: Values) -> _Array:
 
 
 def _stroke(system: System, values: Values) -> _Array:
-    return np.asarray(
-        _own("drive.velocity_amplitude", values, system)
-        * system.scale.length
-        / _own("drive.frequency_ratio", values, system)
-    )
+    ratio = _own("drive.frequency_ratio", values, system)
+    return _own("drive.velocity_amplitude", values, system) * system.scale.length / ratio
 
 
 def _acceleration(system: System, values: Values) -> _Array:
-    omega = _own("drive.frequency_ratio", values, system) * system.scale.omega
-    return np.asarray(_speed(system, values) * omega)
+    return _speed(system, values) * (_own("drive.frequency_ratio", values, system) * system.scale.omega)
 
 
 def _settled(_: System, values: Values) -> _Array:
@@ -319,42 +314,51 @@ class Constraint:
         """Required fraction of the runs that satisfy it."""
         return float(self.lower) if self._quantity.kind == "outcome" else self.probability  # type: ignore[arg-type]
 
+    @property
+    def _limits(self) -> tuple[float, float, float]:
+        """Limits, infinite where there is none, and their size."""
+        low, high = (-np.inf if self.lower is None else self.lower), (np.inf if self.upper is None else self.upper)
+        return low, high, max(abs(self.lower or 0.0), abs(self.upper or 0.0), 1e-300)
+
+    def room(self, values: _Array) -> _Array:
+        """Distance from the nearest limit, negative beyond it."""
+        low, high, _ = self._limits
+        return np.asarray(np.minimum(values - low, high - values))
+
     def kept(self, values: NDArray[Any]) -> NDArray[np.bool_]:
         """Mask of the runs that satisfy it."""
         if self._quantity.kind == "outcome":
             return np.asarray(values, dtype=bool)
-        low = -np.inf if self.lower is None else self.lower
-        high = np.inf if self.upper is None else self.upper
+        low, high, _ = self._limits
         return np.asarray((values >= low) & (values <= high))
 
     def followed(self, values: _Array, changes: _Array, needed: int) -> tuple[float, _Array]:
         """Distance of the last of the *needed* runs from its limit, over its size, and its change."""
-        low, high = (-np.inf if self.lower is None else self.lower), (np.inf if self.upper is None else self.upper)
-        inside = np.minimum(values - low, high - values)
+        (low, high, size), inside = self._limits, self.room(values)
         one = np.argsort(-inside, kind="stable")[min(needed, values.size) - 1]
         sign = 1.0 if values[one] - low < high - values[one] else -1.0
-        size = max(abs(self.lower or 0.0), abs(self.upper or 0.0), 1e-300)
         return float(inside[one]) / size, sign * changes[:, one] / size
 
     def excess(self, values: _Array) -> _Array:
         """Constraint violation of designs, over its size; 0 if satisfied."""
-        size = positive("size", max(abs(self.lower or 0.0), abs(self.upper or 0.0), 1e-300))
-        low = -np.inf if self.lower is None else self.lower
-        high = np.inf if self.upper is None else self.upper
-        return np.asarray(np.maximum(np.maximum(low - values, values - high), 0.0) / size)
+        return np.asarray(np.maximum(-self.room(values), 0.0) / self._limits[2])
+
+
+def _listed(objectives: Any, constraints: Any) -> tuple[tuple[Objective, ...], tuple[Constraint, ...]]:
+    listed = (objectives,) if isinstance(objectives, (str, Objective)) else tuple(objectives)
+    made = tuple(Objective(quantity=each) if isinstance(each, str) else each for each in listed)
+    return made, (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
 
 
 def require_kinds(objectives: Any, constraints: Any) -> tuple[tuple[Objective, ...], tuple[Constraint, ...]]:
     """Objectives and constraints as tuples."""
-    listed = (objectives,) if isinstance(objectives, (str, Objective)) else tuple(objectives)
-    made = tuple(Objective(quantity=each) if isinstance(each, str) else each for each in listed)
-    kept = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
+    made, kept = _listed(objectives, constraints)
     for each in made:
         if not isinstance(each, Objective):
             raise InputError(f"objectives: {shown(each)} must be an Objective, or the name of a quantity")
-    for each in kept:
-        if not isinstance(each, Constraint):
-            raise InputError(f"constraints: {shown(each)} must be a Constraint")
+    for limit in kept:
+        if not isinstance(limit, Constraint):
+            raise InputError(f"constraints: {shown(limit)} must be a Constraint")
     if not 1 <= len(made) <= 3:
         raise InputError(f"objectives: {len(made)} of them; must be one to three")
     labels = [each.label for each in made]
@@ -454,7 +458,8 @@ class DesignProblem:
                 distances[:, k] = self.room(constraint, x)
         alive = np.flatnonzero(violation == 0.0)
         if not self._needs_runs:
-            objectives[alive] = self._own_objectives(x[alive])
+            for k, objective in enumerate(self.objectives):
+                objectives[alive, k] = self._sign(objective) * self._own(objective, x[alive])
             return Worth(objectives, violation, runs), distances
         first = max(4, self.samples // 4)
         parts: dict[int, list[dict[str, NDArray[Any]]]] = {int(i): [] for i in alive}
@@ -464,7 +469,9 @@ class DesignProblem:
             for i, found in zip(alive.tolist(), self.runs_of(x[alive], np.arange(begin, end)), strict=True):
                 parts[i].append(found)
                 runs[i] = end
-            joined = {i: _joined(parts[i]) for i in alive.tolist()}
+            joined = {
+                i: {n: np.concatenate([part[n] for part in parts[i]]) for n in parts[i][0]} for i in alive.tolist()
+            }
             last = end == self.samples
             for i in alive.tolist():
                 for k, constraint in enumerate(self.constraints):
@@ -508,11 +515,8 @@ class DesignProblem:
         points: Columns = {name: x[each, j] for j, name in enumerate(self.bounds)}
         columns = self.trials.columns(points, np.tile(numbers, len(x)))
         found = self.trials.of_columns(columns)
-        fixed = {
-            name: np.full(each.size, value)
-            for name, value in self.trials.system.parameters.items()
-            if isinstance(value, float)
-        }
+        own = self.trials.system.parameters
+        fixed = {name: np.full(each.size, value) for name, value in own.items() if isinstance(value, float)}
         whole = fixed | columns | found
         if "cycles_to_settle" in {each.quantity for each in self._parts}:
             whole[CYCLE] = self.trials.cycles(columns)
@@ -595,21 +599,15 @@ class DesignProblem:
 
     def room(self, constraint: Constraint, x: _Array) -> _Array:
         """Distance of a quantity of designs themselves from the nearest limit of a constraint, negative beyond it."""
-        values = self._own(constraint, x)
-        low = -np.inf if constraint.lower is None else constraint.lower
-        high = np.inf if constraint.upper is None else constraint.upper
-        return np.asarray(np.minimum(values - low, high - values))
+        return constraint.room(self._own(constraint, x))
 
     def _own_excess(self, x: _Array) -> _Array:
-        own = [constraint for constraint in self.constraints if constraint._quantity.kind == "design"]
         found = np.zeros(len(x))
-        for constraint in own:
-            found += constraint.excess(self._own(constraint, x))
+        for constraint in self.constraints:
+            if constraint._quantity.kind == "design":
+                found += constraint.excess(self._own(constraint, x))
         # beyond what any share of runs can break: such a design is never run
         return np.where(found > 0.0, found + len(self.constraints), 0.0)
-
-    def _own_objectives(self, x: _Array) -> _Array:
-        return np.stack([self._sign(objective) * self._own(objective, x) for objective in self.objectives], axis=1)
 
     @staticmethod
     def _sign(objective: Objective) -> float:
@@ -624,9 +622,7 @@ class DesignProblem:
             else:
                 runs = objective._quantity.of(self.trials.system, found)[good]
                 values.append(objective.estimate(runs, 0, 0.95)[0] if runs.size else np.inf)
-        signed = np.array(
-            [self._sign(objective) * value for objective, value in zip(self.objectives, values, strict=True)]
-        )
+        signed = np.multiply([self._sign(objective) for objective in self.objectives], values)
         return np.where(np.isfinite(signed), signed, np.inf)
 
     def _kept(self, constraint: Constraint, found: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
@@ -658,10 +654,6 @@ def _share_for(required: float, runs: int, confidence: float = 0.95) -> float:
     low = np.asarray(proportion(np.arange(runs + 1), np.full(runs + 1, runs), confidence)[1])
     enough = np.flatnonzero(low >= required)
     return float(enough[0] / runs) if enough.size else 1.0
-
-
-def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def problem_of(
@@ -811,13 +803,8 @@ def design_problem(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
     >>> problem = sb.uncertainty.design_problem(
-    ...     system,
-    ...     {"velocity_amplitude": (0.05, 0.4)},
-    ...     "speed",
-    ...     sb.uncertainty.Constraint(quantity="snap", lower=0.8),
-    ...     uncertainty,
-    ...     samples=8,
-    ...     integration=sb.Integration(cycles=5),
+    ...     system, {"velocity_amplitude": (0.05, 0.4)}, "speed", sb.uncertainty.Constraint(quantity="snap", lower=0.8),
+    ...     uncertainty, samples=8, integration=sb.Integration(cycles=5),
     ... )
     >>> objectives, violation, runs = problem.evaluate([[0.1], [0.3]])
     >>> objectives.shape
@@ -895,14 +882,8 @@ def optimize_design(
     ...     of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(0.005)}
     ... )
     >>> best = sb.uncertainty.optimize_design(
-    ...     system,
-    ...     {"velocity_amplitude": (0.05, 0.4)},
-    ...     "speed",
-    ...     [sb.uncertainty.Constraint(quantity="snap", lower=0.8)],
-    ...     uncertainty,
-    ...     sb.uncertainty.OptimizerSettings(
-    ...         generations=3, population=6, samples=12, validation_samples=40, candidates=2
-    ...     ),
+    ...     system, {"velocity_amplitude": (0.05, 0.4)}, "speed", sb.uncertainty.Constraint(quantity="snap", lower=0.8),
+    ...     uncertainty, sb.uncertainty.OptimizerSettings(generations=3, population=6, samples=12, validation_samples=40),
     ...     integration=sb.Integration(cycles=5),
     ... )
     >>> best.velocity_amplitude.dims
@@ -910,16 +891,9 @@ def optimize_design(
     """
     settings = or_default("settings", settings, OptimizerSettings, "an OptimizerSettings")
     problem = design_problem(
-        system,
-        variables,
-        objectives,
-        constraints,
-        uncertainty,
-        samples=settings.samples,
-        validation_samples=settings.validation_samples,
-        integration=integration,
-        checkpoint=checkpoint,
-    )
+        system, variables, objectives, constraints, uncertainty, samples=settings.samples,
+        validation_samples=settings.validation_samples, integration=integration, checkpoint=checkpoint,
+    )  # fmt: skip
     report = counting(progress, "design", "generations")
     search = DifferentialEvolution(list(problem.bounds.values()), settings.population, settings.seed)
     tried: list[tuple[_Array, _Array, _Array, _Array]] = []
@@ -981,10 +955,8 @@ def _improved(search: DifferentialEvolution, before: tuple[float, _Array]) -> bo
 
 def _early(objectives: Any, constraints: Any) -> bool:
     """Return whether early termination is allowed: not if a statistic of the runs is requested."""
-    listed = [*([objectives] if isinstance(objectives, (str, Objective)) else objectives)]
-    listed += [constraints] if isinstance(constraints, Constraint) else list(constraints)
-    made = [Objective(quantity=each) if isinstance(each, str) else each for each in listed]
-    return all(getattr(each, "quantity", None) is not None and each._quantity.kind != "run" for each in made)
+    parts: list[Any] = [part for parts in _listed(objectives, constraints) for part in parts]
+    return all(getattr(each, "quantity", None) is not None and each._quantity.kind != "run" for each in parts)
 
 
 def _front(objectives: _Array, violation: _Array) -> list[int]:
@@ -1176,14 +1148,10 @@ def _dataset(
             dataset[f"satisfied_{constraint.label}{end}"] = (("design",), values, own)
         required = 1.0 if constraint._quantity.kind == "design" else constraint.required
         dataset[f"required_{constraint.label}"] = ((), required, {"units": "1", "long_name": "required fraction"})
-        if constraint._quantity.kind == "design":
-            unit = constraint._quantity.unit
-            about = f"distance of {constraint.quantity} from its limit"
-        else:
-            unit = "1"
-            about = (
-                f"distance of the fraction that satisfies the constraint of {constraint.quantity} from the required one"
-            )
+        unit, about = constraint._quantity.unit, f"distance of {constraint.quantity} from its limit"
+        if constraint._quantity.kind != "design":
+            unit, about = "1", f"distance of the fraction that satisfies the constraint of {constraint.quantity}"
+            about = f"{about} from the required one"
         labels = {"units": unit, "long_name": f"{about}; negative: violated"}
         dataset[f"distance_{constraint.label}"] = (("design",), reported[:, k], labels)
         dataset[f"tried_distance_{constraint.label}"] = (("tried",), distances[:, k], labels)
@@ -1192,11 +1160,8 @@ def _dataset(
     words = {"units": "1", "long_name": "whether the constraints are satisfied"}
     dataset["constraints_satisfied"] = (("design",), states, words | flags)
     failed = np.array([each.failed for each in found])
-    dataset["runs_failed"] = (
-        ("design",),
-        failed,
-        {"units": "1", "long_name": "runs that failed; they satisfy no constraint"},
-    )
+    labels = {"units": "1", "long_name": "runs that failed; they satisfy no constraint"}
+    dataset["runs_failed"] = (("design",), failed, labels)
     labels = {"units": "1", "long_name": "violation of the constraints; 0 where they are satisfied"}
     dataset["violation"] = (("tried",), violation, labels)
     return dataset

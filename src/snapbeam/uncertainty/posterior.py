@@ -30,6 +30,7 @@ from snapbeam.uncertainty.measurements import Measurements
 from snapbeam.uncertainty.monte_carlo import reached, trials_of
 from snapbeam.util.diagnostics import Diagnostic, DiagnosticWarning, counting, tell
 from snapbeam.util.display import plotter
+from snapbeam.util.proportions import weighted_quantiles
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -314,12 +315,8 @@ class Posterior:
     --------
     >>> import numpy as np
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> from snapbeam.lab import Measurements
-    >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
-    >>> posterior = sb.uncertainty.estimate_posterior(
-    ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
-    ... )
+    >>> levels = np.linspace(3e-4, 5e-4, 200)[:, None]  # m
+    >>> posterior = sb.uncertainty.Posterior(("beam.buckling_level",), levels, np.full(200, 1 / 200))
     >>> posterior.parameters, posterior.is_doubtful
     (('beam.buckling_level',), False)
     """
@@ -357,7 +354,7 @@ class Posterior:
             )
         shares = (0.5, 0.5 * (1.0 - confidence), 0.5 * (1.0 + confidence))
         return {
-            name: tuple(_quantiles(column, self.weights, shares).tolist())
+            name: tuple(weighted_quantiles(column, self.weights, shares).tolist())
             for name, column in zip(self.parameters, self.values.T, strict=True)
         }
 
@@ -492,7 +489,9 @@ def estimate_posterior(
     if measured is not None and not isinstance(measured, Measurements):
         raise InputTypeError(f"measured = {shown(measured)}: must be Measurements")
     instance("beam", beam, Beam, "a Beam")
-    tracked = _checked_waveforms(waveforms)
+    tracked = (waveforms,) if isinstance(waveforms, Waveform) else waveforms
+    if not isinstance(tracked, Sequence) or not all(isinstance(each, Waveform) for each in tracked):
+        raise InputTypeError(f"waveforms = {shown(waveforms)}: must be a Waveform, or a list of them")
     if measured is None and not tracked:
         raise InputError("measured = None: give measurements, waveforms, or both")
     names = _checked_prior(prior, measured, tracked)
@@ -500,7 +499,7 @@ def estimate_posterior(
     integer("samples", samples, 200, 10**6)
     seed = seed_of(rng)
     forward = None
-    if measured is not None and (not tracked or _has_frequencies(measured)):
+    if measured is not None and (not tracked or any(getattr(measured, f"{state}_frequencies") for state in _STATES)):
         forward = Forward(measured, integer("modes", modes, 1, 256))
     begin = np.log([_nominal(name, beam, tracked) for name in names])
 
@@ -534,10 +533,6 @@ def _known_by_themselves(measured: Measurements) -> list[tuple[str, Any, Any]]:
     ]
 
 
-def _has_frequencies(measured: Measurements) -> bool:
-    return bool(measured.straight_frequencies or measured.lower_well_frequencies or measured.upper_well_frequencies)
-
-
 def _dotted(name: str) -> str:
     return _BESIDE.get(name, f"beam.{name}")
 
@@ -549,13 +544,6 @@ def _nominal(name: str, beam: Beam, tracked: Sequence[Waveform]) -> float:
     if name == "damping_ratio":
         return float(np.mean(system.model.damping_ratio))
     return float(getattr(system.contact_law, "stiffness"))  # noqa: B009
-
-
-def _checked_waveforms(given: Sequence[Waveform] | Waveform) -> tuple[Waveform, ...]:
-    listed = (given,) if isinstance(given, Waveform) else given
-    if not isinstance(listed, Sequence) or not all(isinstance(each, Waveform) for each in listed):
-        raise InputTypeError(f"waveforms = {shown(given)}: must be a Waveform, or a list of them")
-    return tuple(listed)
 
 
 def _checked_prior(prior: Mapping[str, float], measured: Measurements | None, tracked: Sequence[Waveform]) -> list[str]:
@@ -632,12 +620,6 @@ def _positive(name: str, given: Any, errors: Any, draws: int, generator: np.rand
     return np.asarray(np.exp(middle + generator.standard_normal(draws) / math.sqrt(float(weight.sum()))))
 
 
-def _quantiles(values: _Array, weights: _Array, shares: tuple[float, ...]) -> _Array:
-    order = np.argsort(values, kind="stable")
-    ranks = np.cumsum(weights[order]) - 0.5 * weights[order]
-    return np.interp(shares, ranks, values[order])
-
-
 # What measured response classes say of a beam: how likely each sample of it makes them.
 
 
@@ -687,18 +669,15 @@ def class_likelihood(
     >>> import numpy as np
     >>> import snapbeam as sb
     >>> from snapbeam import paper
-    >>> from snapbeam.lab import Measurements
-    >>> measured = Measurements(lower_well_frequencies=[46.0], lower_well_frequencies_se=[0.2])  # Hz
-    >>> posterior = sb.uncertainty.estimate_posterior(
-    ...     measured, paper.BEAM, {"buckling_level": 0.05}, modes=2, samples=200
-    ... )
+    >>> levels = np.linspace(3e-4, 5e-4, 4)[:, None]  # m
+    >>> posterior = sb.uncertainty.Posterior(("beam.buckling_level",), levels, np.full(4, 0.25))
     >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18, modes=2)
     >>> measurements = sb.MeasuredPoints(
     ...     frequency_ratio=[1.2], velocity_amplitude=[0.2], location=[0.4762], response_class=[3]
     ... )
     >>> uncertainty = sb.uncertainty.ParameterUncertainty(of={"location": sb.uncertainty.Normal(0.005)})
     >>> likelihood = sb.uncertainty.class_likelihood(
-    ...     posterior.resampled(4), system, measurements, uncertainty, runs=4, integration=sb.Integration(cycles=5)
+    ...     posterior, system, measurements, uncertainty, runs=4, integration=sb.Integration(cycles=5)
     ... )
     >>> likelihood.shape
     (4,)

@@ -28,9 +28,9 @@ from snapbeam.uncertainty.monte_carlo import (
 )
 from snapbeam.uncertainty.optimization import Objective
 from snapbeam.util.diagnostics import counting
-from snapbeam.util.proportions import proportion
+from snapbeam.util.proportions import levels_of, proportion
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, shown, within
+from snapbeam.util.validation import InputError, InputTypeError, checked, integer, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -279,7 +279,7 @@ def probability_map(
     """
     allocation = allocation_of(runs)
     asked, wanted = outcomes_of(outcomes, allocation), statistics_of(statistics)
-    levels = levels_of(quantiles)
+    levels = levels_of("quantiles", quantiles)
     needed = [*(each.statistic for each in asked.values()), *wanted]
     trials = trials_of(
         system, uncertainty, integration, checkpoint=checkpoint, cluster=cluster, statistics=needed
@@ -306,16 +306,6 @@ def outcomes_of(given: Any, allocation: SamplingPlan) -> dict[str, Event]:
 def statistics_of(given: Any) -> list[str]:
     """Names of statistics that are numbers, each once."""
     return list(dict.fromkeys(number_statistic("statistics", each).name for each in _several(given)))
-
-
-def levels_of(given: Any) -> tuple[float, ...]:
-    """Probabilities of quantiles, increasing, each in (0, 1)."""
-    found = tuple(
-        within("quantiles", each, 0.0, 1.0) for each in np.atleast_1d(finite_array("quantiles", given)).ravel()
-    )
-    if not found or (np.diff(found) <= 0.0).any():
-        raise InputError(f"quantiles = {shown(given)}: must be increasing numbers, at least one")
-    return found
 
 
 def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
@@ -376,21 +366,14 @@ def _with_statistics(
 ) -> xr.Dataset:
     """Add the mean and the quantiles of statistics with their intervals; displacements and velocities in m and m/s."""
     if found:
-        dataset["quantile"] = (
-            ("quantile",),
-            list(levels),
-            {"units": "1", "long_name": "probability of not being more"},
-        )
+        words = {"units": "1", "long_name": "probability of not being more"}
+        dataset["quantile"] = (("quantile",), list(levels), words)
     for name, runs in found.items():
         labels = variable_attributes(name, metres=True)
-        for ending, dims, words, wanted in (
+        each_level = [Objective(quantity=name, quantile=level) for level in levels]
+        for ending, dims, what, wanted in (
             ("", points.dims, "mean", [Objective(quantity=name)]),
-            (
-                "_quantile",
-                (*points.dims, "quantile"),
-                "quantile",
-                [Objective(quantity=name, quantile=q) for q in levels],
-            ),
+            ("_quantile", (*points.dims, "quantile"), "quantile", each_level),
         ):
             table = []
             for own, made in zip(runs, counts.runs + counts.failed, strict=True):
@@ -399,11 +382,8 @@ def _with_statistics(
             numbers = np.array(table)  # points, quantiles, value and limits
             for k, (limit, text) in enumerate((("", ""), ("_low", "lower limit: "), ("_high", "upper limit: "))):
                 own = points.arranged(numbers[..., k] if ending else numbers[:, 0, k])
-                dataset[f"{name}{ending}{limit}"] = (
-                    dims,
-                    own,
-                    labels | {"long_name": f"{text}{words} of {labels['long_name']}"},
-                )
+                said = labels | {"long_name": f"{text}{what} of {labels['long_name']}"}
+                dataset[f"{name}{ending}{limit}"] = (dims, own, said)
     return dataset
 
 
@@ -428,9 +408,8 @@ def _dataset(
     from snapbeam.util.datasets import xr
 
     points = setup.points
-    drawn = dict(trials.uncertainty.describe())
     more: dict[str, Any] = {
-        "uncertainty": canonical_json(drawn),
+        "uncertainty": canonical_json(trials.uncertainty.describe()),
         "seed": trials.uncertainty.seed,
         "confidence": allocation.confidence,
         "watched_outcome": allocation.outcome,

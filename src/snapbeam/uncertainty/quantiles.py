@@ -20,18 +20,9 @@ from snapbeam.sweeps.setup import sweep_setup
 from snapbeam.uncertainty.distributions import ParameterUncertainty
 from snapbeam.uncertainty.monte_carlo import Trials, outcome_named, trials_of
 from snapbeam.util.diagnostics import counting
-from snapbeam.util.proportions import proportion
+from snapbeam.util.proportions import levels_of, proportion
 from snapbeam.util.provenance import canonical_json
-from snapbeam.util.validation import (
-    InputError,
-    InputTypeError,
-    checked,
-    finite_array,
-    integer,
-    or_default,
-    shown,
-    within,
-)
+from snapbeam.util.validation import InputError, InputTypeError, checked, integer, or_default, shown, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,10 +120,9 @@ def crossing(values: ArrayLike, hits: ArrayLike, probability: float, confidence:
 def _constrained(hits: _Array, at: int, q: float) -> float:
     """Minus the maximum log likelihood if the probability passes *q* before coin *at*."""
     total = 0.0
-    if at > 0:
-        total += float(np.sum(_losses(hits[:at], np.minimum(isotonic(hits[:at]), q))))
-    if at < hits.size:
-        total += float(np.sum(_losses(hits[at:], np.maximum(isotonic(hits[at:]), q))))
+    for part, cut in ((hits[:at], np.minimum), (hits[at:], np.maximum)):
+        if part.size:
+            total += float(np.sum(_losses(part, cut(isotonic(part), q))))
     return total
 
 
@@ -268,10 +258,7 @@ class QuantileSearchSettings:
     outcome: str = "snap"
 
     def __post_init__(self) -> None:
-        given = np.atleast_1d(finite_array("probabilities", self.probabilities))
-        chosen = tuple(within("probabilities", each, 0.0, 1.0) for each in given.ravel())
-        if not chosen or (np.diff(chosen) <= 0.0).any():
-            raise InputError(f"probabilities = {chosen}: must be increasing")
+        chosen = levels_of("probabilities", self.probabilities)
         object.__setattr__(self, "probabilities", chosen)
         integer("runs", self.runs, 40 * len(chosen), 10**7)
         integer("rounds", self.rounds, 1, 50)
@@ -491,6 +478,8 @@ def _column(runs: Runs, options: QuantileSearchSettings, bounds: tuple[float, fl
     codes, curve = np.zeros(size, dtype=np.int8), np.zeros(size, dtype=bool)
     p = rises(runs.values, runs.hits, seed=options.seed) if runs.values.size else np.nan
     monotone = not p < _FALLS
+    # every hit is above every miss
+    stepped = runs.values[~runs.hits].max(initial=-np.inf) < runs.values[runs.hits].min(initial=np.inf)
     for i, probability in enumerate(options.probabilities):
         if not runs.values.size:
             table[1:, i], codes[i] = (-np.inf, np.inf), 1
@@ -503,15 +492,10 @@ def _column(runs: Runs, options: QuantileSearchSettings, bounds: tuple[float, fl
         if codes[i] == 0:
             ends = max(low, bounds[0]), min(high, bounds[1])
             near = local_crossing(runs.values, runs.hits, probability, *ends, _REACH)
-            curve[i] = monotone and not _is_step(runs) and low <= near <= high
+            curve[i] = monotone and not stepped and low <= near <= high
             value = near if curve[i] else value
         table[:, i] = value if np.isfinite(value) else np.nan, low, high
     return {"table": table, "codes": codes, "curve": curve, "p": p, "monotone": monotone, "runs": runs}
-
-
-def _is_step(runs: Runs) -> bool:
-    """Return whether every hit is above every miss."""
-    return bool(runs.values[~runs.hits].max(initial=-np.inf) < runs.values[runs.hits].min(initial=np.inf))
 
 
 def _labelled(
@@ -532,21 +516,13 @@ def _labelled(
         long_name = f"{text}{row.quantity.long_name} at which the probability is passed"
         labels = {"units": row.quantity.unit, "long_name": long_name}
         dataset[f"threshold{ending}"] = ((*points.dims, LEVEL), points.arranged(table[:, k]), labels)
-    flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": _FOUND}
+    flags: dict[str, Any] = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": _FOUND}
     codes = points.arranged(np.array([column["codes"] for column in columns]))
-    dataset["outcome_of_search"] = (
-        (*points.dims, LEVEL),
-        codes,
-        {"units": "1", "long_name": "status of the search"} | flags,
-    )
-    dataset["is_fitted"] = (
-        (*points.dims, LEVEL),
-        points.arranged(np.array([column["curve"] for column in columns])),
-        {
-            "units": "1",
-            "long_name": "whether the threshold is that of the fitted curve; else of the isotonic regression",
-        },
-    )
+    found = {"units": "1", "long_name": "status of the search"} | flags
+    dataset["outcome_of_search"] = ((*points.dims, LEVEL), codes, found)
+    words = "whether the threshold is that of the fitted curve; else of the isotonic regression"
+    fitted = points.arranged(np.array([column["curve"] for column in columns]))
+    dataset["is_fitted"] = ((*points.dims, LEVEL), fitted, {"units": "1", "long_name": words})
     plain = {
         "is_monotonic": (
             np.array([bool(column["monotone"]) for column in columns]), "whether the probability is not seen to fall"

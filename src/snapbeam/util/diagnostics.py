@@ -252,20 +252,22 @@ def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -
     """
     if (line := _line(progress, what)) is not None:
         return lambda done, total: line.say(done / max(total, 1), f"{done} of {total} {noun}")
-    if progress is None or progress is False:
-        return None
-    if not callable(progress):
-        raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress(done, total)")
-    return progress
+    own: _Counts | None = _given(progress, "done, total")
+    return own
 
 
 def sharing(progress: _Shares | bool | None, what: str) -> _Shares | None:
     """Progress function as :func:`counting`, for progress as a fraction."""
     if (line := _line(progress, what)) is not None:
         return lambda share: line.say(share, f"{100.0 * share:.0f} %")
+    own: _Shares | None = _given(progress, "share")
+    return own
+
+
+def _given(progress: Any, arguments: str) -> Any:
+    """The function that was given; None for None and False."""
     if progress is None or progress is False:
         return None
     if not callable(progress):
-        raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress(share)")
-    own: _Shares = progress
-    return own
+        raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress({arguments})")
+    return progress

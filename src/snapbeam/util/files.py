@@ -22,22 +22,10 @@ from snapbeam.util.packages import needing
 from snapbeam.util.validation import InputError, file_path
 
 __all__ = [
-    "MADE_BY",
-    "REQUEST",
-    "VERSION",
-    "NoRoomError",
-    "atomic_path",
-    "check_writable",
-    "foreign_files_kept",
-    "is_ours",
-    "lives",
-    "missing_room",
-    "refuse_foreign",
-    "request_hash",
-    "require_room",
-    "require_room_of",
+    "MADE_BY", "REQUEST", "VERSION", "NoRoomError", "atomic_path", "check_writable", "foreign_files_kept",
+    "is_ours", "lives", "missing_room", "refuse_foreign", "request_hash", "require_room", "require_room_of",
     "set_request",
-]
+]  # fmt: skip
 
 VERSION = "snapbeam_version"
 """Name of the attribute of NetCDF files and of the key of JSON files."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from snapbeam.util.validation import InputError, within
+from snapbeam.util.validation import InputError, finite_array, shown, within
 
 _Array = NDArray[np.float64]
 
@@ -55,6 +57,20 @@ def mean_interval(values: ArrayLike, confidence: float = 0.95, positive: bool = 
         factor = np.exp(np.divide(half, mean, where=as_said, out=np.zeros(mean.shape)))
         low, high = np.where(as_said, mean / factor, low), np.where(as_said, mean * factor, high)
     return mean, np.where(good, low, 0.0 if positive else -np.inf), np.where(good, high, np.inf)
+
+
+def levels_of(name: str, given: Any) -> tuple[float, ...]:
+    """Return probabilities, increasing, each in (0, 1)."""
+    found = tuple(within(name, each, 0.0, 1.0) for each in np.atleast_1d(finite_array(name, given)).ravel())
+    if not found or (np.diff(found) <= 0.0).any():
+        raise InputError(f"{name} = {shown(given)}: must be increasing numbers, at least one")
+    return found
+
+
+def weighted_quantiles(values: _Array, weights: _Array, shares: tuple[float, ...]) -> _Array:
+    """Return quantiles of samples whose weights add up to 1."""
+    order = np.argsort(values, kind="stable")
+    return np.interp(shares, np.cumsum(weights[order]) - 0.5 * weights[order], values[order])
 
 
 def _limits(good: _Array, total: _Array, z: float) -> tuple[_Array, _Array]:

@@ -26,19 +26,9 @@ from snapbeam.util.cores import instruction_set
 from snapbeam.util.validation import InputError, InputTypeError, shown
 
 __all__ = [
-    "__version__",
-    "arithmetic_hash",
-    "array_hash",
-    "canonical_json",
-    "code_hash",
-    "command_line",
-    "created_now",
-    "encodable",
-    "made_by",
-    "parameter_hash",
-    "platform_name",
-    "processor_name",
-]
+    "__version__", "arithmetic_hash", "array_hash", "canonical_json", "code_hash", "command_line", "created_now",
+    "encodable", "made_by", "parameter_hash", "platform_name", "processor_name",
+]  # fmt: skip
 
 
 def platform_name() -> str:

@@ -24,11 +24,9 @@ def with_unit(value: Any, unit: str, digits: int = 6) -> str:
     """A value as text: a number with its unit, with a prefix where the unit takes one."""
     if not isinstance(value, float):
         return str(value)
-    return (
-        prefixed(value, unit, digits)
-        if unit in WITH_PREFIX
-        else f"{value:.{digits}g} {'' if unit == '1' else unit}".rstrip()
-    )
+    if unit in WITH_PREFIX:
+        return prefixed(value, unit, digits)
+    return f"{value:.{digits}g} {'' if unit == '1' else unit}".rstrip()
 
 
 def scale_of(values: Any, unit: str) -> tuple[float, str]:

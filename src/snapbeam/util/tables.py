@@ -216,12 +216,8 @@ def _universal_records(dataset: xr.Dataset) -> tuple[list[dict[str, Any]], list[
         return records, [name for name in names if name not in ("magnitude", "phase", "coherence")]
     for name in names:
         variable = dataset[name]
-        if (
-            variable.dims[:1] != ("time",)
-            or variable.ndim > 2
-            or variable.dtype.kind not in "fiub"
-            or len(variable) < 2
-        ):
+        over_time = variable.dims[:1] == ("time",) and variable.ndim <= 2 and len(variable) > 1
+        if not over_time or variable.dtype.kind not in "fiub":
             left_out.append(name)
             continue
         time, values = dataset["time"].values, variable.values.reshape(len(variable), -1).astype(np.float64)

@@ -60,14 +60,10 @@ def conversion_factor(given: str, unit: str) -> float | None:
             one, two = (registry.Quantity(Decimal(count), own).to(target).magnitude for count in (1, 2))
         except Exception:  # text of a user: pint has errors of many kinds, Python's own among them
             continue
-        angles, wanted = (dict(each._units).get(_ANGLE, 0) for each in map(_in_roots, (own, target)))
+        angles, wanted = (dict(registry.get_root_units(each)[1]._units).get(_ANGLE, 0) for each in (own, target))
         if two == 2 * one and (angles == wanted or angles == 0):
             return float(one)
     return None
-
-
-def _in_roots(unit: Any) -> Any:
-    return _registry().get_root_units(unit)[1]
 
 
 def number_in_unit(text: str, unit: str) -> float | None:

@@ -408,10 +408,6 @@ def _suits(value: Any, kind: Any) -> bool:
     return isinstance(value, origin)
 
 
-def _is_path(kind: Any) -> bool:
-    return (typing.get_origin(kind) or kind) in (os.PathLike, Path)
-
-
 def _words(kinds: list[Any]) -> str:
     names = []
     for kind in kinds:
@@ -459,7 +455,7 @@ def checked(function: _F) -> _F:
             return function(*args, **named)  # which says so in Python's words
         for name, value in given.items():
             kinds = known.get(name)
-            if kinds is None or not any(_is_path(kind) for kind in kinds):
+            if kinds is None or not any((typing.get_origin(kind) or kind) in (os.PathLike, Path) for kind in kinds):
                 require_texts(name, value)
             if kinds is None:
                 continue

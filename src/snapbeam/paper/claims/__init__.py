@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from snapbeam.paper.claims.claim_result import VERDICTS, ClaimResult
 from snapbeam.paper.claims.prose import fill, read_topic
@@ -24,21 +24,9 @@ __all__ = ["TOPICS", "VERDICTS", "Claim", "measure_claims", "measurements", "sum
 
 
 TOPICS = (
-    "beam",
-    "basis",
-    "contact",
-    "waveforms",
-    "ripples",
-    "thresholds",
-    "resonances",
-    "classes",
-    "transients",
-    "disturbances",
-    "locations",
-    "added_modes",
-    "efficiency",
-    "questions",
-)
+    "beam", "basis", "contact", "waveforms", "ripples", "thresholds", "resonances", "classes", "transients", "disturbances",
+    "locations", "added_modes", "efficiency", "questions",
+)  # fmt: skip
 """The topics in the order of the table."""
 
 
@@ -72,25 +60,11 @@ def measure_claims(results: Results, sketch: Results | None = None) -> list[Clai
                     raise
                 used = sketch
                 result = functions[number](sketch)
-            filled = {
-                part: fill(getattr(entry, part), result)
-                for part in ("measured", "uncertainty", "rule", "fails", "note")
-            }
-            rows.append(
-                Claim(
-                    number=number,
-                    topic=topic.title,
-                    says=entry.says,
-                    paper=entry.paper,
-                    source=entry.source,
-                    figure=entry.figure,
-                    verdict=result.verdict,
-                    close=result.close,
-                    quantities=result.quantities,
-                    size=used.size,
-                    **filled,
-                )
-            )
+            texts = ("measured", "uncertainty", "rule", "fails", "note")
+            parts: dict[str, Any] = {part: fill(getattr(entry, part), result) for part in texts}
+            parts |= {part: getattr(entry, part) for part in ("says", "paper", "source", "figure")}
+            parts |= {part: getattr(result, part) for part in ("verdict", "close", "quantities")}
+            rows.append(Claim(number=number, topic=topic.title, size=used.size, **parts))
     return rows
 
 

@@ -99,11 +99,8 @@ def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[fl
         scatter = {i: _scatter(modes, omega, drive[i], min(cycles, 60)) for i in below}
         worst = max(scatter, key=lambda i: scatter[i])
         if best is None or scatter[worst] > best[0]:
-            rows = (worst, single[0], several[0])
-            best = (
-                scatter[worst],
-                {name: (float(omega), float(drive[i])) for name, i in zip(KINDS, rows, strict=True)},
-            )
+            rows = zip(KINDS, (worst, single[0], several[0]), strict=True)
+            best = scatter[worst], {name: (float(omega), float(drive[i])) for name, i in rows}
     if best is None:
         raise InputError("fig4: no frequency of the grid has all three kinds of response")
     return best[1]
@@ -127,9 +124,8 @@ def _scatter(modes: int, omega: float, drive: float, cycles: int) -> float:
     """Standard deviation of the displacement once a cycle, over the second half of a run, in b."""
     period = 1.0 / (omega * paper_model(modes).reference_frequency)
     times = period * np.arange(cycles // 2, cycles)
-    return float(
-        paper_run(modes, float(omega), float(drive), cycles, sample_times=times).dataset.displacement_at_striker.std()
-    )
+    run = paper_run(modes, float(omega), float(drive), cycles, sample_times=times)
+    return float(run.dataset.displacement_at_striker.std())
 
 
 def _recorded(run: xr.Dataset) -> xr.Dataset:
@@ -178,7 +174,7 @@ def draw(results: Results, measured: Sequence[str | os.PathLike[str]] | None = N
             again = f"No measurement: the run of {'BDF'[row]}, drawn as\na camera would see it, and tracked"
             first.set_title(again if measured is None else "Measured", loc="left")
         for ax in axes[-1]:
-            ax.set_xlabel(_across(ax))
+            ax.set_xlabel(r"Cycles of excitation $\tau$" if ax.get_gid() == "cycles" else "Time (ms)")
         handles, labels = axes[0, 1].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
         fix_ticks(*axes.ravel())
@@ -194,7 +190,3 @@ def _waveform(ax: Axes, run: Any) -> None:
     ax.plot(x, run.striker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$", linewidth=0.8)
     ax.set_xlim(0.0 if cycles else x[0], min(x[-1], _SHOWN) if cycles else x[-1])
     ax.set_gid("cycles" if cycles else "time")
-
-
-def _across(ax: Axes) -> str:
-    return r"Cycles of excitation $\tau$" if ax.get_gid() == "cycles" else "Time (ms)"

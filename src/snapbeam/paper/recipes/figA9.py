@@ -53,11 +53,8 @@ def draw(results: Results) -> Figure:
         colors = cm.batlow(np.linspace(0.0, 0.92, _COUNT))
         for column, color in enumerate(colors):
             values = error.error.values[:, column]
-            symmetric = "o" if _is_symmetric(column) else "s"
-            ax.semilogy(
-                modes, values, color=color, marker=symmetric, markersize=1.8, linewidth=0.7,
-                label=f"{column + 1}",
-            )  # fmt: skip
+            marker = "s" if column % 2 else "o"  # the modes of the paper's beam alternate, the first is symmetric
+            ax.semilogy(modes, values, color=color, marker=marker, markersize=1.8, linewidth=0.7, label=f"{column + 1}")
         ax.axhline(7e-4, color="0.3", linewidth=0.7, dashes=(4, 2))
         ax.axvline(MODES, color="0.3", linewidth=0.7, dashes=(1, 2))
         ax.annotate("0.07 %", (modes[-1], 7e-4), (-2, 2), textcoords="offset points", fontsize=7, ha="right")
@@ -69,8 +66,3 @@ def draw(results: Results) -> Figure:
         )  # fmt: skip
         fix_ticks(ax)
     return figure
-
-
-def _is_symmetric(index: int) -> bool:
-    """Parity of a dynamic mode of the paper's beam, whose modes alternate, the first being symmetric."""
-    return index % 2 == 0

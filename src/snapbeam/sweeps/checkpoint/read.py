@@ -86,17 +86,7 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
         points += count
         table.integers[layer.places], table.numbers[layer.places] = part.integers, part.numbers
     attrs = work.setup.attributes(more={"points_done": points, "points_total": work.setup.points.size})
-    return to_dataset(work, work.setup.points, _Table(table), attrs)
-
-
-class _Table:
-    """Rows in memory."""
-
-    def __init__(self, table: ResultTable) -> None:
-        self._table = table
-
-    def read(self, start: int, stop: int) -> ResultTable:
-        return ResultTable(self._table.integers[start:stop], self._table.numbers[start:stop])
+    return to_dataset(work, work.setup.points, table, attrs)
 
 
 def _work(described: dict[str, Any], name: str, done: dict[int, TaskRecord]) -> PointWork:

@@ -483,16 +483,12 @@ class Checkpoint:
 
     def _warn_of_mixture(self) -> None:
         done = [record for record in self.task_log.records.values() if record.state == "done"]
-        if words := _mixture(
-            [*map(_recorded_provenance, done), self.provenance], {*(r.model for r in done), self._model}
-        ):
-            version, processor = next(
-                (r.version, r.processor)
-                for r in done
-                if _recorded_provenance(r) != self.provenance or r.model != self._model
-            )
+        by = list(map(_recorded_provenance, done))
+        if words := _mixture([*by, self.provenance], {*(r.model for r in done), self._model}):
+            others = (r for r, own in zip(done, by, strict=True) if own != self.provenance or r.model != self._model)
+            other = next(others)
             warnings.warn(
-                f"the checkpoint was started with snapbeam {version} on a {processor} processor and is continued with "
+                f"the checkpoint was started with snapbeam {other.version} on a {other.processor} processor and is continued with "
                 f"snapbeam {self.provenance.version} on {self.provenance.processor}: its results are identical {words}",
                 stacklevel=4,
             )
@@ -509,10 +505,8 @@ class Checkpoint:
             record = self.task_log.records.get((stage.name, task))
             if record is None or record.state != "done":
                 continue
-            if (
-                record.parameters != self.work_of(stage).task_hash(stage.columns(task))
-                or self._load(stage, task) is None
-            ):
+            known = record.parameters == self.work_of(stage).task_hash(stage.columns(task))
+            if not known or self._load(stage, task) is None:
                 del self.task_log.records[stage.name, task]
                 self.damaged.append((stage.name, task))
 
@@ -552,19 +546,12 @@ class Checkpoint:
 
     def _record(self, stage: Stage, task: int, state: str, content: str, provenance: Provenance) -> None:
         setup = self.work.setup
-        self.task_log.write(
-            TaskRecord(
-                stage=stage.name,
-                task=task,
-                state=state,
-                parameters=self.work_of(stage).task_hash(stage.columns(task)),
-                content=content,
-                engine=setup.integration.engine,
-                step=setup.plan.step,
-                model=self._model,
-                **asdict(provenance),
-            )
-        )
+        parameters = self.work_of(stage).task_hash(stage.columns(task))
+        record = TaskRecord(
+            stage=stage.name, task=task, state=state, parameters=parameters, content=content,
+            engine=setup.integration.engine, step=setup.plan.step, model=self._model, **asdict(provenance),
+        )  # fmt: skip
+        self.task_log.write(record)
 
     def _cannot_write(self, error: OSError) -> CheckpointError:
         what = "make room" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "make it writable"
@@ -642,8 +629,7 @@ class CheckpointRows:
                     )
             else:
                 columns = store.work.unfinished(last - first)
-            cut = slice(max(start - first, 0), min(stop, last) - first)
-            parts.append(ResultTable(columns.integers[cut], columns.numbers[cut]))
+            parts.append(columns.read(max(start - first, 0), min(stop, last) - first))
         return store.work.join(parts)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache, reduce
+from functools import cache, partial, reduce
 from operator import and_
 from typing import TYPE_CHECKING
 
@@ -53,22 +53,12 @@ def _agree(values: list[Quantity], printed: tuple[float, ...], digits: tuple[flo
     return reduce(and_, checks)
 
 
-def _printed(beam: sb.Beam, printed: tuple[float, ...], digits: tuple[float, ...]) -> ClaimResult:
+def _printed(results: Results, beam: sb.Beam, printed: tuple[float, ...], digits: tuple[float, ...]) -> ClaimResult:
     """Natural frequencies against printed ones, each given to a last digit."""
     values = _with_rounding(lambda other: _freq(other)[: len(printed)], beam)
     named = dict(zip(("first", "second", "third"), values, strict=False))
     off = max(abs(value.value / target - 1.0) for value, target in zip(values, printed, strict=True))
     return found(_agree(values, printed, digits), off=off, **named)
-
-
-def straight_beam(results: Results) -> ClaimResult:
-    """1a: the frequencies that set the thickness."""
-    return _printed(STRAIGHT_BEAM, (80.0, 221.0), (1.0, 1.0))
-
-
-def buckled_beam(results: Results) -> ClaimResult:
-    """1b: the frequencies about a well."""
-    return _printed(BEAM, (81.8, 159.0, 380.0), (0.1, 1.0, 1.0))
 
 
 def misprint(results: Results) -> ClaimResult:
@@ -151,8 +141,8 @@ def below_three_kilohertz(results: Results) -> ClaimResult:
 
 
 ROWS = {
-    "1a": straight_beam,
-    "1b": buckled_beam,
+    "1a": partial(_printed, beam=STRAIGHT_BEAM, printed=(80.0, 221.0), digits=(1.0, 1.0)),
+    "1b": partial(_printed, beam=BEAM, printed=(81.8, 159.0, 380.0), digits=(0.1, 1.0, 1.0)),
     "1c": misprint,
     "1d": greatest_frequency,
     "1e": measured_frequency,

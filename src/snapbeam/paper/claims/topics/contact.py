@@ -106,13 +106,9 @@ def impulse_like(results: Results) -> ClaimResult:
     )  # fmt: skip
 
 
-def _penetration(force: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray((force / CONTACT.stiffness) ** (2.0 / 3.0))
-
-
 def shallow(results: Results) -> ClaimResult:
     """22b: penetration against the radius of the tip."""
-    depth = _penetration(part(results, "waveforms", "impacts").peak_force.values)
+    depth = (part(results, "waveforms", "impacts").peak_force.values / CONTACT.stiffness) ** (2.0 / 3.0)
     deep = _over_runs(results, lambda at: float(np.quantile(depth[at], 0.99)) / _TIP_RADIUS)
     in_b = depth / BEAM.buckling_level
     return found(below(deep, 0.01), below(deep, 0.05), deep=deep, middle=float(np.median(in_b)), most=float(in_b.max()))

@@ -87,13 +87,6 @@ def _peak(results: Results, ratio: float, place: float) -> ClaimResult:
     )  # fmt: skip
 
 
-def _over_one_mode(results: Results, ratio: float) -> tuple[_Array, _Array]:
-    """Locations, and the threshold of many modes over that of one."""
-    x, one, _ = along(results, ratio, 0)
-    _, many, _ = along(results, ratio, 1)
-    return x, many / one
-
-
 def higher_everywhere(results: Results) -> ClaimResult:
     """7d: at Omega = 0.625 more modes raise the threshold at every location."""
     few, many = (_map(results, _MIDDLE, which) for which in (0, 1))
@@ -135,11 +128,8 @@ def most_beside_centre(results: Results) -> ClaimResult:
 
 def more_apparent(results: Results) -> ClaimResult:
     """7f: the rise is greater at Omega = 1.625 than at 0.625."""
-    values = []
-    for ratio in (_MIDDLE, _FAST):
-        _, times = _over_one_mode(results, ratio)
-        values.append(median_of(times))
-    slow, fast = values
+    # the threshold of many modes over that of one
+    slow, fast = (median_of(along(results, at, 1)[1] / along(results, at, 0)[1]) for at in (_MIDDLE, _FAST))
     more = Quantity(fast.value / slow.value, (fast.uncertainty + slow.uncertainty) / slow.value)
     return found(above(more, 1.0), more=more, slow=slow, fast=fast)
 
@@ -178,11 +168,7 @@ def below_static(results: Results) -> ClaimResult:
 
 def rises_with_frequency(results: Results) -> ClaimResult:
     """7j: from Omega = 0.625 to 1.625 the threshold of many modes rises over much of the beam, that of one falls."""
-    shares = []
-    for which in (0, 1):
-        slow, fast = (along(results, ratio, which)[1] for ratio in (_MIDDLE, _FAST))
-        shares.append(share(fast > slow))
-    one, many = shares
+    one, many = (share(along(results, _FAST, at)[1] > along(results, _MIDDLE, at)[1]) for at in (0, 1))
     return found(above(many, 0.5) & below(one, 0.5), above(many, 0.5) | below(one, 0.5), many=many, one=one)
 
 

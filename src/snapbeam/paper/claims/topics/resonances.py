@@ -90,9 +90,8 @@ def one_mode_is_adequate(results: Results) -> ClaimResult:
     offs = []
     for one, many in zip(_two(results, 0, _LOW), _two(results, 1, _LOW), strict=True):
         value = one.value * own / (many.value * other) - 1.0
-        offs.append(
-            Quantity(value, (1.0 + value) * combined(one.uncertainty / one.value, many.uncertainty / many.value))
-        )
+        errors = one.uncertainty / one.value, many.uncertainty / many.value
+        offs.append(Quantity(value, (1.0 + value) * combined(*errors)))
     first, second = offs
     return found(
         below(first, 0.05) & below(second, 0.05), below(first, 0.1) & below(second, 0.1), first=first, second=second,

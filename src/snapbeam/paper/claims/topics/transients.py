@@ -28,11 +28,8 @@ def _late(results: Results, which: int) -> tuple[xr.Dataset, xr.Dataset]:
 
 def outlasts(results: Results) -> ClaimResult:
     """32a: points still change class after 1000 cycles."""
-    values = []
-    for which in (0, 1):
-        before, after = _late(results, which)
-        values.append(share(before.response_class.values != after.response_class.values))
-    one, many = values
+    pairs = [[ds.response_class.values for ds in _late(results, which)] for which in (0, 1)]
+    one, many = (share(before != after) for before, after in pairs)
     cycles = [int(ds.attrs["cycles"]) for ds in _late(results, 1)]
     return found(
         above(many, 0.005) & above(one, 0.005), above(many, 0.0) | above(one, 0.0), many=many, one=one,
