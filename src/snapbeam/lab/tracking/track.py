@@ -121,7 +121,7 @@ def tracked_dataset(
     )
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
-    bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
+    bent = math.hypot(2.0 * scene.shape.shift, 2.0 * scene.shape.open, contact_shift(touch, placed), placed)
     apart = 0.0 if shaker is None or shaker.certain else never_touching(penetration, rows)
     loose = 0.0 if shaker is None else shaker.loose
     bent = math.hypot(bent, apart, loose, rounding_shift(scene.beam), 2.0 * rows.hollow)
