@@ -838,7 +838,7 @@ def _within_windows(windows: Floats, position: Floats, width: float, centre: Flo
 _SURE_LAG = 4.0  # standard errors
 _LAG = 0.04  # of the square of the speed by which the square of the blur must exceed what the exposure explains
 _PULSE_ODDS = 9.0  # chi-square by which no blur must be the better explanation for a pulse to be as likely as none
-_SELDOM, _NEVER = 0.048, 1e-3  # probability of a pulse that counts at least, and below which it counts for nothing
+_SELDOM, _NEVER = 0.048, 1e-4  # probability of a pulse that counts at least, and below which it counts for nothing
 
 
 class ExposureBlur(NamedTuple):

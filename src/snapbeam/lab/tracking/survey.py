@@ -229,7 +229,8 @@ def _symmetry(
 ) -> tuple[float, float, float, float]:
     """Gamma that makes the edge symmetric in light, its standard error, where its centre then lies, and what is open.
 
-    The centre is 0 where a linear camera will do; what curves that are not told may shift it by is open.  Texture, the parts of the edge *by_grain*, that bends it as a curve does is no curve.
+    The centre is 0 where a linear camera will do; what curves that are not told may shift it by is open.  Texture, the
+    parts of the edge *by_grain*, that bends it as a curve does is no curve.
     """
     together = _together(x, error, by_grain)
     outer = np.abs(x) > 0.8 * np.abs(x).max()
