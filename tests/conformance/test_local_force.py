@@ -46,7 +46,7 @@ def independent(system, start, times):
     """Integrate the amplitudes themselves, alpha'' from mass, damping and stiffness, by DOP853."""
     model, striker = system.model, system.striker
     mass, gamma = model.mass, model.nonlinear_stiffness
-    inverse = np.linalg.inv(mass)
+    inverse, stiffness = np.linalg.inv(mass), model.stiffness if model.stiffness.ndim == 2 else np.diag(model.stiffness)
     forces = [(each.row(model), each.numbers, type(each)) for each in system.forces]
     drive = None if system.base_excitation is None else system.base_excitation.motion
     rigid = None if drive is None else rigid_mass(model)
@@ -58,7 +58,7 @@ def independent(system, start, times):
 
     def rate(t, y):
         alpha, velocity = np.split(y, 2)
-        load = -model.stiffness * alpha - gamma * (alpha @ alpha) * alpha - model.damping_matrix @ velocity
+        load = -stiffness @ alpha - gamma * (alpha @ alpha) * alpha - model.damping_matrix @ velocity
         if drive is not None:
             shaken = drive.frequency_ratio * system.scale.omega
             # the displacement of the base is a sine, its acceleration minus a sine
@@ -229,6 +229,37 @@ def test_coulomb_friction_of_an_oscillator():
 
     truth = solve_ivp(rate, (0.0, times[-1]), [start, 0.0], "LSODA", t_eval=times, rtol=1e-11, atol=1e-15)
     np.testing.assert_allclose(found, truth.y[0], rtol=0.0, atol=1e-6 * start)
+
+
+@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_friction_that_turns_over_within_a_fraction_of_a_flight_step(own: bool, seed: int, friction) -> None:
+    """A force too small to damp, of velocities that pass zero in a short time: the steps resolve that time."""
+    rng = np.random.default_rng([40, seed])
+    modes = 2 + seed
+    sizes = rng.uniform(-1.0, 1.0, (modes, modes))
+    mass = 0.2 * (np.eye(modes) + 0.3 * sizes @ sizes.T)
+    omega = 2.0 * math.pi * np.sort(rng.uniform(8.0, 30.0, modes))
+    root, (turn, _) = np.linalg.cholesky(mass), np.linalg.qr(rng.standard_normal((modes, modes)))
+    stiffness = root @ turn @ np.diag(omega**2) @ turn.T @ root.T
+    row, force, smoothing, length = rng.uniform(0.5, 1.0, modes), 5e-3, 2e-3, 5e-3
+    model = sb.ReducedModel.from_matrices(
+        mass, 0.5 * (stiffness + stiffness.T), contact_shape=row, base_shape=np.ones(modes), length_scale=length,
+        damping_ratio=0.01, nonlinear_stiffness=1e5,
+    )  # fmt: skip
+    law = type(friction) if own else sb.CoulombFriction
+    system = sb.System(
+        model,
+        forces=[law(friction_force=force, smoothing_velocity=smoothing, shape=row)],
+        base_excitation=sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)),
+        initial_state=sb.State(amplitude=length * row),
+    )
+    times = np.linspace(0.0, 2.0, 21)[1:] / model.reference_frequency * (1.0 - 1e-9)
+    truth = independent(system, system.initial_state, times)
+    for accuracy, most in (("reference", 1e-8), ("standard", 1e-4)):
+        run = sb.simulate(system, sb.Integration(cycles=2, accuracy=accuracy), sample_times=times)
+        error = np.abs(run.dataset["modal_amplitude"].values - truth).max()
+        assert error < most * length, (accuracy, error / length)
 
 
 @pytest.mark.filterwarnings("ignore:engine = 'python' is made to be read")

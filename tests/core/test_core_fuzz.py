@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import mmap
 import re
 import signal
 import subprocess
@@ -275,3 +276,23 @@ def test_mappings_of_other_kinds():
 
 if __name__ == "__main__":
     print(*attack(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])))
+
+
+@pytest.mark.parametrize("name", ["statistics", "of_channels", "signals"])
+def test_memory_stays_while_the_core_computes(name):
+    """A view that is released in a report of progress, whose memory would go: its export is held, so it is refused."""
+    fresh = arrays(struck(8), 200_000)
+    own = fresh.batch[name]
+    memory = mmap.mmap(-1, 1 << 20)
+    view = memoryview(memory)[: own.nbytes].cast("d", own.shape)
+    view.cast("B")[:] = own.tobytes()
+    fresh.batch[name] = view
+
+    def progress(done, runs):
+        with pytest.raises(BufferError):
+            view.release()
+            memory.close()
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        _core.integrate(fresh.problem, fresh.batch, "thread", "", 1, progress)

@@ -371,7 +371,7 @@ def test_values_of_a_force_alone():
     np.testing.assert_allclose(fields["potential"], [kind.energy(law.numbers(), d) for d in x], rtol=1e-12)
     np.testing.assert_allclose(fields["stiffness"], [kind.slope(law.numbers(), d) for d in x], rtol=1e-8)
     for count in (-1.0, 0.5, 3.0, 1e9):
-        numbers[10] = count
+        numbers[len(own.head) - 1] = count
         with pytest.raises(ValueError, match="numbers of a user's law"):
             _core.law_values(channels.USER_LAWS[own.kind], {"x": x, "y": x, "numbers": numbers, **fields})
 

@@ -168,3 +168,50 @@ def test_every_netcdf_file_is_written_that_way():
     for file in package.rglob("*.py"):
         text = file.read_text(encoding="utf-8")
         assert not re.search(r"\.to_netcdf\(|h5netcdf\.File\((?!stream)|h5py\.File\((?!stream).*[\"'](w|a)", text), file
+
+
+def begins_alike(path, whole):
+    found = sb.load(path).dataset
+    xr.testing.assert_equal(found.drop_attrs(), whole.dataset.isel(time=slice(found.sizes["time"])).drop_attrs())
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*the run will be stopped where the disk is full")
+@pytest.mark.parametrize(("kind", "most"), [("map", 160), ("streamed", 2_500), ("saved", 1_000)])
+def test_disks_of_random_sizes(mounted, tmp_path, monkeypatch, model, contact, tried, kind, most):
+    """After each refusal, or after more room, the same bits; nothing incomplete is on the disk."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("snapbeam.solver.native._SAMPLES", 4096)
+    system = sb.System(model, contacts=[sb.Contact(contact, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))])
+    axes = {"drive.frequency_ratio": np.linspace(0.4, 2.0, 6), "drive.velocity_amplitude": np.linspace(0.05, 0.6, 5)}
+    how = sb.Integration(cycles=3 if kind == "map" else 60)
+    whole = sb.sweep(system, axes, how) if kind == "map" else sb.simulate(system, how)
+    draw, full, disks = np.random.default_rng(84), 0, 0
+    while full < 34:
+        disks += 1
+        disk = mounted(f"disk-{disks}", f"size={4 * draw.integers(1, most // 4)}k")
+        kept = disk / "store" if kind == "map" else disk / "run.nc"
+        try:
+            if kind == "map":
+                sb.sweep(system, axes, how, checkpoint=sb.CheckpointOptions(kept, points_per_task=2))
+            elif kind == "streamed":
+                sb.simulate_to_file(system, how, path=kept)
+            else:
+                whole.save(kept)
+        except OSError as error:
+            full += 1
+            elsewhere = re.search(r"written to '(.*)' instead", str(error))
+            assert str(disk) in str(error) and ("room" in str(error) or elsewhere)
+            if elsewhere:
+                begins_alike(Path(elsewhere[1]), whole)
+                Path(elsewhere[1]).unlink()
+        if kind == "map":
+            subprocess.run(["mount", "-o", "remount,size=8m", str(disk)], check=True)
+            again = sb.sweep(system, axes, how, checkpoint=sb.CheckpointOptions(kept, points_per_task=2))
+            xr.testing.assert_equal(again.drop_attrs(), whole.drop_attrs())
+            assert not list(kept.rglob("*.partial"))
+            continue
+        assert os.listdir(disk) == (["run.nc"] if kept.exists() else [])
+        if kept.exists():
+            begins_alike(kept, whole)
+    tried(f"disks that {'a map' if kind == 'map' else f'a {kind} run'} fills", full)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from typer.testing import CliRunner
 
 import snapbeam as sb
+from snapbeam.cli.app import app
 from snapbeam.model import default_values
 from snapbeam.model.parameter_file import load_config
 from snapbeam.simulation.run import Run
@@ -146,6 +148,8 @@ def test_results_of_another_kind(system, run, tmp_path):
         lambda: sb.lab.measure_response(run.dataset, start="a"),
         lambda: sb.lab.identify_decay(signal, frequencies="abc"),
         lambda: sb.lab.identify_decay(signal, frequencies=[]),
+        lambda: sb.lab.identify_decay(signal, buckling_level=1e200),
+        lambda: sb.lab.identify_decay(signal, buckling_level=1e-200),
         lambda: sb.lab.make_signal([0.1, 0.3], "m", time=range(10**12)),
         lambda: sb.force_displacement(system, displacement_range=[1.0, 2.0, 3.0]),
     ):
@@ -166,3 +170,19 @@ def test_values_out_of_their_kind_or_range(system):
     ):
         with pytest.raises(InputError, match=r"equilibrium|alpha|amplitude|error|quantity|height"):
             call()
+    for well in (np.array([0.1, 0.2]), FIELD):
+        with pytest.raises(InputError, match="initial_well"):
+            sb.System(system.model, contacts=system.contacts, initial_well=well)
+    for statistics in ([1, [2, 3]], [{}], [["peak_force"]]):
+        with pytest.raises(InputError, match="statistics"):
+            sb.uncertainty.probability_map(system, {"drive.frequency_ratio": [1.0]}, statistics=statistics)
+
+
+@pytest.mark.parametrize("text", ["9" * 5000, "\u00b2", "contact.\u00b2.stiffness", f"contact.{'9' * 5000}.stiffness"])
+def test_numbers_of_parts_that_int_does_not_take(text, tmp_path):
+    """Digits of other scripts are digits to ``str.isdigit``, and of thousands of them ``int`` makes no number."""
+    said = CliRunner().invoke(app, ["dynamics", "bifurcation-curve", "--parameter", text])
+    assert said.exit_code == 2 and isinstance(said.exception, SystemExit)
+    sb.lab.write_signal(tmp_path / "x.csv", sb.lab.make_signal(np.sin(np.arange(50.0)), "m/s", 1e3))
+    said = CliRunner().invoke(app, ["fit-decay", str(tmp_path / "x.csv"), "--channel", text])
+    assert said.exit_code == 2 and isinstance(said.exception, SystemExit) and "channel" in said.output

@@ -94,10 +94,37 @@ def test_why_there_are_none(objective: str, words: str) -> None:
     assert not problem("striker_work", U.Constraint(quantity="stroke", upper=1.0)).not_smooth
 
 
-def test_what_the_core_cannot_differentiate() -> None:
-    """A thickness changes the modes: the search ends as it was."""
+@pytest.mark.parametrize("name", ["beam.thickness", "beam.buckling_level", "model.damping_ratio"])
+def test_a_variable_of_the_structure(name: str) -> None:
+    """It changes the modes and the scales by which constraints are measured: differences of order six of the runs."""
+    system = small_system(2)
+    value = float(system.get(name))
+    speed = U.Constraint(quantity="rms_velocity", lower="1 mm/s", probability=0.2)
     made = U.design_problem(
-        small_system(2), {"beam.thickness": (4e-4, 6e-4)}, "striker_work", [], SPREAD, samples=8,
-        integration=sb.Integration(cycles=1, threads=1),
+        system, {name: (0.8 * value, 1.2 * value)}, "striker_work", [speed], SPREAD, samples=8,
+        integration=sb.Integration(cycles=2, threads=1, accuracy="reference"),
     )  # fmt: skip
-    assert not made.not_smooth and made.slopes(np.array([5e-4])) is None
+    design = np.array([value])
+    values, slopes = made.slopes(design)
+    needed = values[1]
+    found = made.runs_of(design[None], np.arange(8))[0]
+    speeds = found["rms_velocity"] * found["velocity_scale"]
+    one = int(np.abs((speeds - 1e-3) / 1e-3 - needed).argmin())
+
+    def exact(x: float) -> np.ndarray:
+        of_runs = made.runs_of(np.array([[x]]), np.arange(8))[0]
+        speed_of_run = (of_runs["rms_velocity"] * of_runs["velocity_scale"])[one]
+        return np.array([of_runs["striker_work"].mean(), (speed_of_run - 1e-3) / 1e-3])
+
+    step = 1e-4 * value
+    by_runs = sum(w * (exact(value + k * step) - exact(value - k * step)) for k, w in SIX) / step
+    assert values == pytest.approx(exact(value), rel=1e-5)
+    np.testing.assert_allclose(slopes[:, 0], by_runs, rtol=2e-5, atol=2e-5 * np.abs(values).max() / value)
+
+
+def test_what_the_core_cannot_differentiate() -> None:
+    made = U.design_problem(
+        small_system(1), {"drive.velocity_amplitude": (0.02, 0.04)}, "striker_work", [], SPREAD, samples=8,
+        integration=sb.Integration(cycles=1, threads=1, engine="python"),
+    )  # fmt: skip
+    assert not made.not_smooth and made.slopes(np.array([0.03])) is None

@@ -22,7 +22,7 @@ SMOOTH = (
 """Statistics that are integrals, or maxima of a contact."""
 ROUGHER = {
     "min_displacement": 30.0, "max_displacement": 30.0, "peak_velocity": 30.0, "high_frequency_energy_fraction": 30.0,
-    "harvested_power_last_quarter": 200.0,
+    "harvested_power_last_quarter": 20.0,
 }  # fmt: skip
 """Factors of the limit for what takes a cubic between the ends of steps, or a share of the step in which the last quarter begins."""
 LIMIT = {"reference": 1e-6, "standard": 1e-4}
@@ -57,6 +57,22 @@ def two_strikers() -> sb.System:
     )
 
 
+def uneven() -> sb.System:
+    imperfection = sb.Imperfection(midspan_amplitude=4e-6, antisymmetric_amplitude=3e-6, uniform_load=0.02)
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3, damping_ratio=0.012, imperfection=imperfection)
+    base = sb.BaseExcitation(motion=sb.Sine(frequency_ratio=1.07, velocity_amplitude=0.9))
+    striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.07, velocity_amplitude=0.3), location=0.44)
+    return sb.System(model, [sb.Contact(paper.CONTACT, striker)], base_excitation=base)
+
+
+def held() -> sb.System:
+    ends = sb.BoundaryConditions(left_rotational_stiffness=0.02, right_rotational_stiffness=0.05)
+    model = sb.ReducedModel.from_beam(paper.BEAM.replace(boundary=ends), modes=3, damping_ratio=0.012)
+    forces = [sb.LocalSpring(stiffness=15.0, location=0.31), sb.QuadraticDamping(coefficient=0.02, location=0.6)]
+    striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.13, velocity_amplitude=0.2), location=0.44, mass=0.05)
+    return sb.System(model, [sb.Contact(sb.HuntCrossley(2e8, 0.4), striker)], forces=forces)
+
+
 HERTZ = paper.CONTACT.stiffness
 SYSTEMS: dict[str, tuple[Callable[[], sb.System], tuple[str, ...]]] = {
     "Hertz": (lambda: struck(paper.CONTACT, 1.5e-5), ("contact.gap", "contact.stiffness", "contact.location", "drive.frequency_ratio")),
@@ -73,6 +89,12 @@ SYSTEMS: dict[str, tuple[Callable[[], sb.System], tuple[str, ...]]] = {
         ("harvester.resistance", "drive.frequency_ratio"),
     ),
     "force": (pushed, ("force.amplitude", "force.frequency_ratio")),
+    "structure": (
+        lambda: struck(paper.CONTACT, 1.5e-5, harvesters=[sb.PiezoelectricHarvester(moment_per_volt=1e-5, capacitance=1e-8, resistance=2e5)]),
+        ("beam.young_modulus", "beam.thickness", "beam.density", "model.damping_ratio", "harvester.capacitance"),
+    ),
+    "unequal wells": (uneven, ("imperfection.midspan_amplitude", "beam.length", "base_excitation.velocity_amplitude")),
+    "held and damped": (held, ("boundary.left_rotational_stiffness", "beam.buckling_level", "force.stiffness", "force.location")),
     "two strikers": (two_strikers, ("contact.2.gap", "contact.2.damping_factor", "drive.velocity_amplitude")),
 }  # fmt: skip
 
@@ -124,7 +146,9 @@ def test_derivatives_of_statistics(kind: str, accuracy: str) -> None:
             if kind == "restitution" and each == "peak_force":
                 assert np.isnan(exact[each])
                 continue
-            allowed = LIMIT[accuracy] * ROUGHER.get(each, 1.0) * max(abs(found[each]), abs(here[each]))
+            # steps follow the structure, those of the derivative stay as they are
+            moved = 4.0 if accuracy == "standard" and name.split(".")[0] in ("beam", "boundary", "model") else 1.0
+            allowed = moved * LIMIT[accuracy] * ROUGHER.get(each, 1.0) * max(abs(found[each]), abs(here[each]))
             assert abs(exact[each] - found[each]) <= allowed + 10.0 * doubt[each], (
                 name,
                 each,
@@ -140,10 +164,9 @@ def test_a_gradient_says_which_way_was_taken() -> None:
     names = ["drive.velocity_amplitude", "contact.stiffness", "beam.young_modulus"]
     system = struck(paper.CONTACT)
     found = sb.uncertainty.gradient(system, "striker_work", names, integration=how)
-    assert found["method"].values.tolist() == ["exact", "exact", "differences"]
+    assert found["method"].values.tolist() == ["exact", "exact", "exact"]
     assert (found["relative_error"].values < 1e-4).all()
-    growth = found["growth"].values
-    assert np.isnan(growth[2]) and (growth[:2] > 0.0).all()
+    assert (found["growth"].values > 0.0).all()
     value, step = system.get(names[0]), 1e-4
     ends = [
         sb.simulate(system.replace(**{names[0]: value * (1.0 + side * step)}), how).summary.striker_work
@@ -152,19 +175,24 @@ def test_a_gradient_says_which_way_was_taken() -> None:
     assert found["derivative"].values[0] == pytest.approx((ends[0] - ends[1]) / (2.0 * step * value), rel=1e-4)
 
 
-def test_jumps_that_move_take_differences() -> None:
-    burst = sb.Burst(frequency_ratio=1.1, velocity_amplitude=0.15, duration_cycles=4.0)
+def test_a_table_of_pieces_whose_jumps_move() -> None:
+    """The ramps of a burst last parts of its cycle; so its pieces and the times of their jumps change with its frequency."""
+    burst = sb.Burst(
+        frequency_ratio=1.1, velocity_amplitude=0.15, duration_cycles=2.4, ramp_up_cycles=0.6, ramp_down_cycles=0.6
+    )
     system = sb.System(ONE, [sb.Contact(paper.CONTACT, sb.Striker(drive=burst))])
-    how = sb.Integration(cycles=3, early_termination=False)
-    found = sb.uncertainty.gradient(
-        system, "impulse", ["drive.frequency_ratio", "drive.velocity_amplitude"], integration=how
-    )
-    assert found["method"].values.tolist() == ["differences", "exact"]
-    one = sb.uncertainty.gradient(
-        system, lambda near: sb.simulate(near, how).summary.impulse, "drive.velocity_amplitude", integration=how
-    )
-    assert one["method"].values.tolist() == ["differences"]
-    assert found["derivative"].values[1] == pytest.approx(one["derivative"].values[0], rel=1e-4)
+    how = sb.Integration(cycles=3, early_termination=False, accuracy="reference")
+    names = ["drive.frequency_ratio", "drive.duration_cycles", "beam.buckling_level"]
+    many = ["impulse", "striker_work", "rms_velocity"]
+    found = sb.uncertainty.gradient(system, many, names, integration=how)
+    assert (found["method"] == "exact").all()
+    for k, name in enumerate(names):
+        value, step = system.get(name), 1e-4
+        ends = [sb.simulate(system.replace(**{name: value * (1.0 + side * step)}), how).summary for side in (1.0, -1.0)]
+        for i, each in enumerate(many):
+            slope = (getattr(ends[0], each) - getattr(ends[1], each)) / (2.0 * step)
+            scale = max(abs(slope), 1e-2 * abs(float(found["value"][i])))
+            assert abs(float(found["derivative"][i, k]) * value - slope) < 1e-5 * scale, (name, each)
 
 
 def test_chaos_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -173,6 +201,6 @@ def test_chaos_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     drive = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.3)
     system = sb.System(model, [sb.Contact(paper.CONTACT, sb.Striker(drive=drive))])
     how = sb.Integration(cycles=60, early_termination=False)
-    with pytest.warns(UserWarning, match="or the motion is chaotic"):
+    with pytest.warns(UserWarning, match="the motion is chaotic"):
         found = sb.uncertainty.gradient(system, "striker_work", "drive.velocity_amplitude", integration=how)
     assert found["growth"].values[0] > 1e3 and found["relative_error"].values[0] > 1e-4

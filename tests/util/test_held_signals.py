@@ -124,6 +124,45 @@ def test_a_signal_in_each_callback_of_hdf5(tmp_path, monkeypatch, write, method)
     assert xr.open_dataset(target, engine="h5netcdf").sizes
 
 
+LARGEST = 2**16
+"""Instants searched, or numbers written, after a stop: one part of a record or one chunk of the file."""
+
+
+@posix
+@pytest.mark.parametrize(("place", "before"), [("searched", 100_000), ("written", 10), ("written", 300_000)])
+def test_work_after_a_stop_of_a_streamed_run_is_one_part(tmp_path, monkeypatch, place, before):
+    """A run of 2·10⁷ instants was searched whole, and each piece of it written whole, before a signal was heard."""
+    import h5netcdf
+
+    search, write, done, later = np.searchsorted, h5netcdf.Variable.__setitem__, [], []
+
+    def counted(call, size):
+        (done if sum(done) <= before else later).append(size)
+        if sum(done) > before and not later:
+            signal.raise_signal(signal.SIGINT)
+        return call()
+
+    if place == "searched":
+        monkeypatch.setattr(np, "searchsorted", lambda a, v, **how: counted(lambda: search(a, v, **how), np.size(v)))
+    else:
+        monkeypatch.setattr(
+            h5netcdf.Variable, "__setitem__", lambda *given: counted(lambda: write(*given), np.size(given[2]))
+        )
+    system_of_many = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=8), contacts=system().contacts)
+    with pytest.raises(KeyboardInterrupt):
+        sb.simulate_to_file(system_of_many, sb.Integration(cycles=1000), path=tmp_path / "st.nc")
+    assert sum(done) > before and done[-1] + sum(later) <= LARGEST
+    assert os.listdir(tmp_path) == []
+
+
+@posix
+def test_a_stop_while_room_is_reserved(tmp_path):
+    with netcdf.DiskStream(tmp_path / "st.nc") as stream, pytest.raises(KeyboardInterrupt), held_back():
+        signal.raise_signal(signal.SIGINT)
+        stream.reserve(2**26)
+    assert (tmp_path / "st.nc").stat().st_size <= 2**20
+
+
 @pytest.mark.parametrize("count", [1, 2, 3, 1000, 2**22, 2**22 + 1, 9_000_001])
 @pytest.mark.parametrize("end", [1.0, 0.1, 1e-3 / 3, 12345.678])
 def test_instants_by_blocks(end, count):

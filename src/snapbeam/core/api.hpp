@@ -90,7 +90,7 @@ struct Recorder {
 };
 
 // Derivatives along DIRECTIONS at a time: of the initial state, of the numbers of channels and signals; and of the output states.
-constexpr int DIRECTIONS = 8;
+constexpr int DIRECTIONS = 8, STRUCTURE_ROWS = 7, STRUCTURE_SCALARS = 4;
 struct Tangent {
     const double *q, *p;          // (runs, DIRECTIONS, modes)
     const double *numbers;        // (runs, DIRECTIONS, channels, law_numbers)
@@ -99,6 +99,12 @@ struct Tangent {
     const double *rest, *rows;    // (runs, DIRECTIONS, channels + 1), (..., modes): the last is of the displacement observed
     const double *signals;        // (runs, DIRECTIONS, signals, SIGNAL_NUMBERS)
     const double *end;            // (runs, DIRECTIONS): of the time of the end, s
+    const double *jumps;          // (runs, DIRECTIONS, jumps): of their times, s
+    const double *pieces;         // (DIRECTIONS, pieces, PIECE_NUMBERS), each of all_pieces numbers; null: they do not change
+    long all_pieces;
+    const double *structure;      // (DIRECTIONS, STRUCTURE_ROWS, modes): omega, sigma, g, shift, far_force, center, second; null: it does not change
+    const double *G;              // (DIRECTIONS, modes, modes)
+    const double *scalars;        // (DIRECTIONS, STRUCTURE_SCALARS): gamma, center_rest, dividing_height, lift
     double *states;               // (runs, outputs, DIRECTIONS, 2 modes + channels): q, p, states of laws
     double *statistics, *of_channels;  // (runs, DIRECTIONS, STATISTICS), (runs, DIRECTIONS, channels, OF_CHANNEL)
 };

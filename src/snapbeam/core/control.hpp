@@ -17,10 +17,14 @@ namespace SNAPBEAM_SET {
 
 constexpr double GRADING = 0.5, RELEASE = 0.5, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
 constexpr double CONTACT_TURN[3] = {0.5, 0.35, 0.35};  // of each composition
+constexpr double TURNOVER[3] = {1.0, 0.5, 0.5}, TURNED_OVER = 4.0;
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 template <class L> constexpr int MOST_CORRECTIONS = L::directions > 0 ? 30 : CORRECTIONS;  // of a state the error is of second order, of derivatives of first
 
 template <class L> struct Group;
+template <class L>
+typename L::Number acceleration_along(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p,
+                                      const typename L::Cell *k, int without);
 template <class L>
 typename L::Number pressed_by(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p,
                               const typename L::Cell *k);
@@ -52,6 +56,7 @@ template <class L> struct Group {
     static constexpr int FLOWS = DISTINCT_FLOWS * CELLS * 4;
     Held<Plain, FLOWS * LEVELS> tables;  // flows of the steps of every length, and of another one
     Held<Plain, FLOWS> own;
+    Held<Slopes<L>, 0, false> table_slopes, own_slopes;  // their derivatives, of a structure that changes
     Held<Cell, CELLS * Inside<L>::ROWS> scratch;
     Held<Plain, CELLS> amplitude;
     Held<Channel<L>, CHANNELS> channel;
@@ -80,6 +85,7 @@ template <class L> struct Group {
         scratch.take(arena, long(n) * Inside<L>::ROWS), amplitude.take(arena, n);
         const long flow = long(s->composition.distinct) * n * 4;
         tables.take(arena, flow * problem->levels), lengths.take(arena, problem->levels), own.take(arena, flow);
+        table_slopes.take(arena, s->changes ? flow * problem->levels : 0), own_slopes.take(arena, s->changes ? flow : 0);
         channel.take(arena, channels), signal.take(arena, signals), block.take(arena, long(channels) * BLOCK_ARRAYS), late.take(arena, channels);
         z.channel = channel, z.signal = signal, z.block = block, z.late = late;
         events.take(arena, channels);
@@ -112,10 +118,10 @@ template <class L> struct Group {
 
     // From memory that is zero; lanes that have no run have numbers, too.
     SNAPBEAM_SELDOM void begin() {
-        z.tick = z.sign = z.parts = Real(1.0), z.flows = own;
+        z.tick = z.sign = z.parts = Real(1.0), z.flows = own, z.flow_slopes = nullptr;
         for (int i = 0; i < z.signals; ++i) {
             Signal<L> &one = z.signal[i];
-            one.kind = problem->signal_kinds[i], one.pieces = batch->pieces;
+            one.kind = problem->signal_kinds[i], one.pieces = batch->pieces, one.tangent = batch->tangent;
             one.window = problem->windows[i] < 0 ? nullptr : z.signal + problem->windows[i];
             one.at.cosine = one.begun.cosine = one.kept.cosine = Number(1.0), one.set_length(z.h);
         }
@@ -142,7 +148,7 @@ template <class L> struct Group {
         number(z.t), number(jump), number(turned), number(z.sign), number(z.gq), number(z.qr), number(stretch), number(energy);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
-            number(c.onset), number(c.safe), number(c.d0), number(c.r0), number(c.own_impulse), number(c.deepest), number(c.hardest);
+            number(c.onset), number(c.safe), number(c.d0), number(c.r0), number(c.own_impulse), number(c.deepest), number(c.hardest), number(c.f);
             Number closed = select(c.closed, Number(1.0), Number(0.0)), pressing = select(c.pressing, Number(1.0), Number(0.0));
             number(closed), number(pressing);
             if (c.state >= 0) number(c.P[c.state]), number(c.offset);
@@ -221,6 +227,7 @@ template <class L> struct Group {
                 if constexpr (L::runs > 1) set_lane(to[item * 4 + x], l, a);
                 else to[item * 4 + x] = a;
             });
+            if constexpr (L::directions > 0) slopes_over(length * of_run(i, TICK), table_slopes + long(level) * distinct * n * 4);
             const double half = 0.5 * length;
             set_lane(lengths[level], l, length);
             length = length > contact || !level ? (problem->composition && !level ? contact : max(half, contact)) : half;
@@ -267,9 +274,9 @@ template <class L> struct Group {
     template <class T> struct OfMode {
         T along_q, along_p;
         bool slower;
-        OfMode(T lam, T row, double omega, double sigma) {
-            const T D = lam * lam - T(2.0 * sigma) * lam + T(omega * omega), t = value(row) != 0.0 ? row / D : T(0.0);
-            along_q = t * T(omega * omega), along_p = t * lam, slower = value(D) > 0.0;
+        OfMode(T lam, T row, T omega, T sigma) {
+            const T D = lam * lam - T(2.0) * sigma * lam + omega * omega, t = value(row) != 0.0 ? row / D : T(0.0);
+            along_q = t * (omega * omega), along_p = t * lam, slower = value(D) > 0.0;
         }
     };
 
@@ -400,6 +407,11 @@ template <class L> struct Group {
                 // towards the end of its range, where a force may be infinite, a share of the way
                 const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.numbers()) - c.x, c.x - law.low(c.numbers())); });
                 want = min(want, by_stiffness);
+                const Real turnover = with_law(c.law, [&](auto law) {
+                    if constexpr (law.contact) return Real(INFINITY);
+                    else return value(law.turnover(c.numbers()));
+                });
+                if (any(turnover < Real(NEVER))) want = min(want, by_turnover(c, turnover));
                 if (any(value(space) < Real(NEVER))) want = min(want, Real(NEARER) * value(space) / (abs(value(dot<L>(c.row, z.p, n))) * z.tick));
                 continue;
             }
@@ -427,6 +439,13 @@ template <class L> struct Group {
         const Marks changed = alive & differ(ticks, key);
         if (any(changed)) new_flows(changed, level, again | landing);
     }
+    // Ticks in which a speed along a row changes by a share of that in which a force turns over, or comes as near to zero as that.
+    SNAPBEAM_SELDOM Real by_turnover(const Channel<L> &c, Real turnover) {
+        for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].begun);
+        const Number bend = acceleration_along(z, c, z.q, z.p, z.k, -1);
+        const Real away = max(abs(value(dot<L>(c.row, z.p, s->size()))) - Real(TURNED_OVER) * turnover, Real(0.0));
+        return fma(Real(TURNOVER[problem->composition]), turnover, away) / (max(abs(value(bend)), Real(1e-300)) * z.tick);
+    }
     // Steps in which a circuit neither follows the beam nor changes slowly.
     SNAPBEAM_FN Marks half_resolved(Real length) const {
         Marks found = FromBits<Marks>::of(0);
@@ -446,6 +465,10 @@ template <class L> struct Group {
         key = select(changed, ticks, key);
         const long flow = long(s->composition.distinct) * s->size() * 4;
         if (any(changed & odd)) form_flows(own, changed & odd);
+        if constexpr (L::directions > 0) {
+            if (odd) slopes_over(value(z.h), own_slopes);
+            z.flow_slopes = !s->changes ? nullptr : odd ? own_slopes : table_slopes + long(level) * flow;
+        }
         if constexpr (L::runs == 1) {
             z.flows = odd ? own : tables + long(level) * flow;
         } else {
@@ -482,13 +505,21 @@ template <class L> struct Group {
                 const int count = all - from < W ? all - from : W;
                 Pack<W> time(0.0), omega(1.0), sigma(0.0), a[4];
                 for (int k = 0; k < count; ++k) {
-                    set_lane(time, k, length * s->composition.flow[f]), set_lane(omega, k, s->omega[m]), set_lane(sigma, k, s->sigma[m]);
+                    set_lane(time, k, length * s->composition.flow[f]), set_lane(omega, k, lane(s->omega[m], 0)), set_lane(sigma, k, lane(s->sigma[m], 0));
                     if (++m == n) m = 0, ++f;
                 }
                 set_flow(time, sigma, omega, a);
                 for (int k = 0; k < count; ++k)
                     for (int x = 0; x < 4; ++x) put(long(from + k), x, lane(a[x], k));
             }
+        }
+    }
+    // Derivatives of the flows of a structure that changes.
+    void slopes_over(double length, Slopes<L> *to) requires(L::directions > 0) {
+        for (int i = 0; s->changes && i < s->composition.distinct * s->size(); ++i) {
+            Number a[4];
+            set_flow(Number(length * s->composition.flow[i / s->size()]), s->sigma[i % s->size()], s->omega[i % s->size()], a);
+            for (int x = 0; x < 4; ++x) to[4 * i + x] = a[x].d;
         }
     }
     SNAPBEAM_FN void form_flows(Plain *to, Marks which) {
@@ -501,7 +532,7 @@ template <class L> struct Group {
         for (int f = 0; f < s->composition.distinct; ++f)
             for (int i = 0; i < s->size(); ++i, to += 4) {
                 Plain a[4];
-                set_flow(Plain(value(z.h) * Real(s->composition.flow[f])), Plain(s->sigma[i]), Plain(s->omega[i]), a);
+                set_flow(Plain(value(z.h) * Real(s->composition.flow[f])), Plain(value(s->sigma[i])), Plain(value(s->omega[i])), a);
                 for (int x = 0; x < 4; ++x) to[x] = select(which, a[x], to[x]);
             }
     }
@@ -570,7 +601,7 @@ template <class L> struct Group {
         Plain speed = Plain(0.0), doubt = Plain(0.0);
         SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) {
-            const Plain h = Plain(value(z.h)), weight = abs(value(c.row[i])), w = h * s->omega[i];
+            const Plain h = Plain(value(z.h)), weight = abs(value(c.row[i])), w = h * Plain(value(s->omega[i]));
             speed = fma(weight, amplitude[i], speed);
             const Plain error = h * min(w * w * w * Plain(1.0 / 384.0), Plain(2.5) / max(w, Plain(1.0)));
             doubt = fma(weight * error, amplitude[i], doubt);
@@ -761,12 +792,16 @@ template <class L> struct Group {
             if (c.circuit) assign(ok, c.P[c.state], c.z), assign(ok, c.r0, c.r1);
         }
         const Marks jumped = ok & (!(z.t < jump));
-        if constexpr (L::directions > 0)
-            if (jumped) move_in_time(*this, -z.drift);
+        Number later = Number(0.0);  // derivatives of the time of the jump
+        if constexpr (L::directions > 0) {
+            for (int k = 0; jumped && k < L::directions; ++k) later.d.set(k, batch->tangent->jumps[(long(run[0]) * L::directions + k) * problem->jumps + next_jump[0]]);
+            if (jumped) move_in_time(*this, later - z.drift);
+        }
         if (any(jumped)) {
             for (int l = 0; l < L::runs; ++l)
                 if (lane(jumped, l)) advance_jump(l);
             for (int i = 0; i < z.signals; ++i) z.signal[i].begin(FromBits<Marks>::of(0), jumped, z.t, z.tick, z.drift), z.signal[i].at = z.signal[i].begun;
+            if constexpr (L::directions > 0) move_in_time(*this, -later);
         }
         assign(ok, stretch, Real(value(fma(Number(2.0), z.gq, z.qr))));
         Marks changed = FromBits<Marks>::of(0);
@@ -980,12 +1015,12 @@ template <class L> void integrate(const Problem &problem, const Batch &batch) {
     Structure<L> structure;
     Group<L> groups[L::together]{};
     Arena measured{nullptr, 0};
-    structure.build(problem, measured);
+    structure.build(problem, measured, batch.tangent);
     for (Group<L> &group : groups) group.lay_out(structure, batch, measured);
     char *memory = static_cast<char *>(__builtin_calloc(measured.used + 64, 1));
     if (!memory) return void(__atomic_store_n(batch.lacking, 1, __ATOMIC_RELAXED));
     Arena arena{memory + (64 - reinterpret_cast<unsigned long long>(memory) % 64), 0};
-    structure.build(problem, arena);
+    structure.build(problem, arena, batch.tangent);
     for (Group<L> &group : groups) group.lay_out(structure, batch, arena);
     for (Group<L> &group : groups) group.begin();
     long budget = batch.recorder ? batch.recorder->budget : 0;

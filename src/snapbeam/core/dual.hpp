@@ -2,7 +2,8 @@
 //
 //   x = (v, d),   f(x) = (f(v), f'(v) d),   comparisons and choices by the value.
 //
-// A direction is a change of the initial state and of the numbers of signals and laws; what depends on none stays a plain number.
+// A direction is a change of the initial state, of the numbers of signals and laws, and of the structure, whose large arrays (G, flows)
+// are plain numbers with slopes of their own, if it changes; what depends on none stays a plain number.
 // The time of an event moves with them: where the gap d is zero with the rate r, a step that ends there is taken once more with a
 // length h that has the derivative h' = -d'/r.  Until no contact is closed the state is that at times that move, by *drift*; then, and
 // where a signal jumps or a state is handed out, it is taken back to times that do not.  Jumps of forces and velocities are so
@@ -59,6 +60,7 @@ template <int K> SNAPBEAM_FN Dual<K> sqrt(const Dual<K> &x) {  // slope 0 at 0: 
 template <int K> SNAPBEAM_FN Dual<K> exp(const Dual<K> &x) { const double y = exp(x.v); return {y, Pack<K>(y) * x.d}; }
 template <int K> SNAPBEAM_FN Dual<K> log(const Dual<K> &x) { return {log(x.v), Pack<K>(1.0 / x.v) * x.d}; }
 template <int K> SNAPBEAM_FN Dual<K> tanh(const Dual<K> &x) { const double y = tanh(x.v); return {y, Pack<K>(1.0 - y * y) * x.d}; }
+template <int K> SNAPBEAM_FN Dual<K> sinh(const Dual<K> &x) { const double y = ::sinh(x.v); return {y, Pack<K>(sqrt(1.0 + y * y)) * x.d}; }
 template <int K> SNAPBEAM_FN Turn<Dual<K>> turn(const Dual<K> &x) {
     const Turn<double> w = turn(x.v);
     return {{w.sine, Pack<K>(w.cosine) * x.d}, {w.cosine, Pack<K>(-w.sine) * x.d}, {w.cosine_less_one, Pack<K>(-w.sine) * x.d}};
@@ -84,6 +86,7 @@ template <int K> struct Tangents {
     typedef Dual<K> Cell;
     typedef double Plain;
     typedef double Coef;
+    typedef Dual<K> Shared;
     typedef bool Marks;
     static constexpr int runs = 1, lanes = 1, fixed = 0, together = 1, directions = K;
     template <class X> static SNAPBEAM_FN X total(const X &x) { return x; }

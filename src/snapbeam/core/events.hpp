@@ -22,8 +22,7 @@ constexpr double MARGIN = 1.25, TRUST = 8.0, NEVER = 1e300;
 template <class L, class Cell = typename L::Plain, class Number = typename L::Real> struct Inside {
     typedef typename L::Real Real;
     typedef typename L::Plain Plain;
-    Cell *q, *p, *a, *change;  // with derivatives or without
-    Plain *flow;
+    Cell *q, *p, *a, *change, *flow;  // with derivatives or without
     Real parts, share;
     Number part, half;
 
@@ -31,7 +30,7 @@ template <class L, class Cell = typename L::Plain, class Number = typename L::Re
     SNAPBEAM_FN void begin(const Runs<L> &z, Cell *memory) {
         const Structure<L> &s = *z.s;
         const int n = s.size();
-        q = memory, p = q + n, a = p + n, change = a + n, flow = reinterpret_cast<Plain *>(change + n);
+        q = memory, p = q + n, a = p + n, change = a + n, flow = change + n;
         parts = z.parts;
         SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) q[i] = as<Cell>(z.q[i]), p[i] = as<Cell>(z.p[i]), a[i] = as<Cell>(z.k[i]), change[i] = as<Cell>(z.k1[i]);
@@ -47,7 +46,7 @@ template <class L, class Cell = typename L::Plain, class Number = typename L::Re
         SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) {
             change[i] = Cell(per) * (change[i] - a[i]);
-            set_flow(Plain(value(part)), Plain(s.sigma[i]), Plain(s.omega[i]), flow + 4 * i);
+            set_flow(Cell(part), as<Cell>(s.sigma[i]), as<Cell>(s.omega[i]), flow + 4 * i);
         }
     }
     SNAPBEAM_FN void advance(const Structure<L> &s) {  // half a kick, a flow, half a kick
@@ -57,11 +56,9 @@ template <class L, class Cell = typename L::Plain, class Number = typename L::Re
         SNAPBEAM_LOOP
         for (int i = 0; i < s.size(); ++i) {
             const Cell x = q[i], y = fma(h, a[i], fma(first, change[i], p[i]));
-            const Plain *f = flow + 4 * i;
-            q[i] = x + fma(Cell(f[0]), x, Cell(f[1]) * y);
-            p[i] = y + fma(Cell(f[3]), y, Cell(f[2]) * x);
-            if constexpr (requires { part.d; }) lengthen(q[i], p[i], part - Number(value(part)), s.omega[i], s.sigma[i]);
-            p[i] = fma(h, a[i], fma(last, change[i], p[i]));
+            const Cell *f = flow + 4 * i;
+            q[i] = x + fma(f[0], x, f[1] * y);
+            p[i] = fma(h, a[i], fma(last, change[i], y + fma(f[3], y, f[2] * x)));
         }
     }
     // Acceleration along a row.
@@ -69,8 +66,8 @@ template <class L, class Cell = typename L::Plain, class Number = typename L::Re
         Cell sum = Cell(0.0);
         SNAPBEAM_LOOP
         for (int i = 0; i < s.size(); ++i) {
-            const Plain omega = Plain(s.omega[i]), sigma = Plain(s.sigma[i]);
-            const Cell own = fma(Cell(share), change[i], a[i]) - Cell(omega * omega) * q[i] - Cell(Plain(2.0) * sigma) * p[i];
+            const Cell omega = as<Cell>(s.omega[i]), sigma = as<Cell>(s.sigma[i]);
+            const Cell own = fma(Cell(share), change[i], a[i]) - omega * omega * q[i] - Cell(2.0) * sigma * p[i];
             sum = fma(as<Cell>(row[i]), own, sum);
         }
         return L::total(sum);
@@ -99,7 +96,7 @@ template <class L, class Row, class Cell = typename L::Cell> SNAPBEAM_CALLED typ
 template <class L> SNAPBEAM_FN void amplitudes(const Runs<L> &z, typename L::Plain *amplitude) {
     SNAPBEAM_LOOP
     for (int i = 0; i < z.s->size(); ++i) {
-        const typename L::Plain oq = abs(z.s->omega[i] * value(z.q[i])), p = abs(value(z.p[i]));
+        const typename L::Plain oq = abs(value(z.s->omega[i]) * value(z.q[i])), p = abs(value(z.p[i]));
         amplitude[i] = fma(typename L::Plain(0.4142135623730952), min(oq, p), max(oq, p));
     }
 }

@@ -25,13 +25,18 @@ template <class L> typename L::Number force_of(const Runs<L> &z, const Channel<L
     const auto x = c.contact ? penetration(z, c, q) : along(z, c, q), v = dot<L>(c.row, p, z.s->size());
     return c.circuit ? x : force_at(c, x, c.contact ? signal_slope(z, c) - v : v);
 }
+// Acceleration along the row of a channel at a state; that by channel *without* is left out.
+template <class L>
+typename L::Number acceleration_along(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p, const typename L::Cell *k, int without) {
+    typename L::Number a = dot<L>(c.row, k, z.s->size()) + linear_acceleration(*z.s, c.row, q, p);
+    for (int j = 0; j < z.channels; ++j)
+        if (j != without) a = fma(c.M[j], force_of(z, z.channel[j], q, p), a);
+    return a;
+}
 // Force that holds a contact together at a state, times M: what its row lacks of the acceleration of the tip.
 template <class L>
 typename L::Number pressed_by(const Runs<L> &z, const Channel<L> &c, const typename L::Cell *q, const typename L::Cell *p, const typename L::Cell *k) {
-    typename L::Number a = dot<L>(c.row, k, z.s->size()) + linear_acceleration(*z.s, c.row, q, p);
-    for (int j = 0; j < z.channels; ++j)
-        if (&z.channel[j] != &c) a = fma(c.M[j], force_of(z, z.channel[j], q, p), a);
-    return signal_bend(z, c) - a;
+    return signal_bend(z, c) - acceleration_along(z, c, q, p, k, int(&c - z.channel));
 }
 
 // The derivatives of the state become those of a state so much later.
@@ -41,7 +46,7 @@ template <int K> void move_in_time(Group<Tangents<K>> &runs, Dual<K> later) {
     const Structure<L> &s = *z.s;
     double *rate = reinterpret_cast<double *>(static_cast<Dual<K> *>(runs.scratch));
     runs.totals.move_in_time(z, later);
-    for (int i = 0; i < s.size(); ++i) rate[i] = z.k[i].v - s.omega[i] * s.omega[i] * z.q[i].v - 2.0 * s.sigma[i] * z.p[i].v;
+    for (int i = 0; i < s.size(); ++i) rate[i] = z.k[i].v - s.omega[i].v * s.omega[i].v * z.q[i].v - 2.0 * s.sigma[i].v * z.p[i].v;
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         const double f = force_of(z, c, z.q, z.p).v;

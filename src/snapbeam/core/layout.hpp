@@ -1,12 +1,12 @@
 // Layouts: what a number, a cell of a row of modes and a coefficient are, and how a row is summed.  Nothing else knows.
 //
-//                 Number        Cell          Coef
-//   RunLanes      W runs        W runs        double        W runs side by side, a cell a mode
-//   ModeLanes     double        W modes       W modes       one run, its modes side by side
-//   Thread        double        double        double        one run; a lane of RunLanes has the same bits
-//   Tangents      Dual          Dual          double        one run with derivatives (dual.hpp)
+//                 Number        Cell          Coef          Shared
+//   RunLanes      W runs        W runs        double        double        W runs side by side, a cell a mode
+//   ModeLanes     double        W modes       W modes       W modes       one run, its modes side by side
+//   Thread        double        double        double        double        one run; a lane of RunLanes has the same bits
+//   Tangents      Dual          Dual          double        Dual          one run with derivatives (dual.hpp)
 //
-// Number and Cell may carry derivatives; Real and Plain are the same without them.  Tables, bounds, times and counters are Real.
+// Coef and Shared are of what all runs share.  Number, Cell and Shared may carry derivatives; Real and Plain are the same without them.  Tables, bounds, times and counters are Real.
 // FIXED is a number of cells that the compiler knows, of two blocks of equal size if it is more than 1; 0: it does not.
 // *together* runs (or packs of them) take turns, a stage each, so that the processor always has work that does not wait.
 #pragma once
@@ -20,6 +20,7 @@ template <int W, int FIXED = 0> struct RunLanes {
     typedef Pack<W> Cell;
     typedef Pack<W> Plain;
     typedef double Coef;
+    typedef double Shared;
     typedef Mask<W> Marks;
     static constexpr int runs = W, lanes = 1, fixed = FIXED, together = 1, directions = 0;
     static SNAPBEAM_FN Number total(Cell x) { return x; }
@@ -33,6 +34,7 @@ template <int W, int FIXED = 0> struct ModeLanes {
     typedef Pack<W> Cell;
     typedef Pack<W> Plain;
     typedef Pack<W> Coef;
+    typedef Pack<W> Shared;
     typedef bool Marks;
     static constexpr int runs = 1, lanes = W, fixed = FIXED, together = 2, directions = 0;
     template <int N> static SNAPBEAM_FN double sum(const Pack<N> &x) {
@@ -76,6 +78,7 @@ template <int FIXED = 0> struct Thread {
     typedef double Cell;
     typedef double Plain;
     typedef double Coef;
+    typedef double Shared;
     typedef bool Marks;
     static constexpr int runs = 1, lanes = 1, fixed = FIXED, together = 1, directions = 0;
     static SNAPBEAM_FN double total(double x) { return x; }
@@ -128,7 +131,7 @@ template <class L, class Row> SNAPBEAM_FN void set_element(Row &row, int i, int 
     else set_lane(row[i], l, x);
 }
 // Mode i of a row of coefficients.
-template <class L> SNAPBEAM_FN void set_coefficient(typename L::Coef *row, int i, double x) {
+template <class L, class Row> SNAPBEAM_FN void set_coefficient(Row &&row, int i, double x) {
     if constexpr (L::lanes > 1) set_lane(row[i / L::lanes], i % L::lanes, x);
     else row[i] = x;
 }

@@ -104,7 +104,7 @@ class Arguments {  // the arrays and numbers of one mapping
         for (const Arguments *each = this; each; each = each->before_)
             for (const Held &held : each->arrays_)
                 if ((WRITABLE || held.written) && first < last && first < held.last && held.first < last) refuse(key, "must not share memory with another array");
-        arrays_.push_back({nb::borrow(given_[key]), first, last, WRITABLE});
+        arrays_.push_back({nb::ndarray<>(found.handle()), first, last, WRITABLE});
         return const_cast<T *>(found.data());
     }
     template <class T> T *optional(const char *key, const std::vector<size_t> &shape) {
@@ -137,7 +137,7 @@ class Arguments {  // the arrays and numbers of one mapping
     nb::dict given_;
     const char *name_;
     const Arguments *before_;
-    struct Held { nb::object array; const char *first, *last; bool written; };  // of an array of the arguments
+    struct Held { nb::ndarray<> array; const char *first, *last; bool written; };  // an array of the arguments, whose memory stays
     std::vector<Held> arrays_;
 };
 
@@ -376,6 +376,11 @@ static void integrate_tangents(nb::dict problem, nb::dict batch, nb::dict tangen
     t.rows = a.array<double>("rows", {runs, K, channels + 1, n});
     t.signals = a.array<double>("signals", {runs, K, size_t(p.signals), SIGNAL_NUMBERS});
     t.end = a.array<double>("end", {runs, K});
+    t.jumps = a.array<double>("jumps", {runs, K, size_t(p.jumps)});
+    const size_t pieces = call.of_batch.length("pieces");
+    t.pieces = a.optional<double>("pieces", {K, pieces, size_t(PIECE_NUMBERS)}), t.all_pieces = long(pieces) * PIECE_NUMBERS;
+    t.structure = a.optional<double>("structure", {K, STRUCTURE_ROWS, n});
+    if (t.structure) t.G = a.array<double>("G", {K, n, n}), t.scalars = a.array<double>("scalars", {K, STRUCTURE_SCALARS});
     t.states = a.array<double, true>("states", {runs, size_t(b.outputs), K, 2 * n + channels}, false);
     t.statistics = a.array<double, true>("statistics", {runs, K, STATISTICS}, false);
     t.of_channels = a.array<double, true>("of_channels", {runs, K, channels, OF_CHANNEL}, false);
@@ -407,7 +412,7 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
         if (r.marks[i] < 0 || r.marks[i] > most[i]) of_recorder.refuse("marks", "must count what is recorded");
     const size_t saved = of_recorder.length("saved");
     // as many numbers as any layout of any width holds of a run
-    const size_t wanted = (size_t(p.modes + 64) * 3 + size_t(p.channels) * (11 + OF_CHANNEL) + STATISTICS + 32) * 8;
+    const size_t wanted = (size_t(p.modes + 64) * 3 + size_t(p.channels) * (12 + OF_CHANNEL) + STATISTICS + 32) * 8;
     if (saved < wanted) of_recorder.refuse("saved", "has no room for the state of a run");
     r.saved = of_recorder.array<double, true>("saved", {saved}, false);
     r.budget = long(of_recorder.number("budget", 1.0, 2e9));

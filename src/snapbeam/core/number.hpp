@@ -259,6 +259,7 @@ template <int W> SNAPBEAM_FN Pack<W> sqrt(Pack<W> x) {
 }
 template <class T> SNAPBEAM_FN T exp(T x) { return each(x, [](double y) { return ::exp(y); }); }
 template <class T> SNAPBEAM_FN T log(T x) { return each(x, [](double y) { return ::log(y); }); }
+template <class T> SNAPBEAM_FN T sinh(T x) { return each(x, [](double y) { return ::sinh(y); }); }
 template <class T> SNAPBEAM_FN T tanh(T x) { return each(x, [](double y) { return ::tanh(y); }); }
 template <class T> SNAPBEAM_FN T power(T x, T n) { return select(x > T(0.0), exp(n * log(max(x, T(1e-300)))), T(0.0)); }
 
@@ -274,6 +275,13 @@ template <class T> SNAPBEAM_FN T remainder(T x, T y) {
     return select(r >= y, r - y, r);
 }
 
+// c_0 + c_1 x + c_2 x^2 + ...
+template <class T, int N> SNAPBEAM_FN T horner(T x, const double (&c)[N]) {
+    T sum = T(c[N - 1]);
+    for (int i = N - 2; i >= 0; --i) sum = fma(x, sum, T(c[i]));
+    return sum;
+}
+
 template <class T> struct Turn { T sine, cosine, cosine_less_one; };
 
 // Sine, cosine and cosine - 1 by argument reduction in three steps and Taylor polynomials; within 3e-16 for |x| < 1e5.
@@ -287,21 +295,10 @@ template <class T> SNAPBEAM_CALLED Turn<T> turn(T x) {
         r = fma(k, T(-2.0222662487959506e-21), r);
     }
     const T z = r * r;
-    T s = fma(z, T(2.811457254345521e-15), T(-7.647163731819816e-13));
-    s = fma(z, s, T(1.605904383682161e-10));
-    s = fma(z, s, T(-2.505210838544172e-08));
-    s = fma(z, s, T(2.755731922398589e-06));
-    s = fma(z, s, T(-1.984126984126984e-04));
-    s = fma(z, s, T(8.333333333333333e-03));
-    s = fma(z, s, T(-1.666666666666667e-01));
-    s = fma(z * r, s, r);
-    T c = fma(z, T(4.779477332387385e-14), T(-1.147074559772973e-11));
-    c = fma(z, c, T(2.087675698786810e-09));
-    c = fma(z, c, T(-2.755731922398589e-07));
-    c = fma(z, c, T(2.480158730158730e-05));
-    c = fma(z, c, T(-1.388888888888889e-03));
-    c = fma(z, c, T(4.166666666666666e-02));
-    c = fma(z, c, T(-0.5));
+    const T s = fma(z * r, horner(z, {-1.666666666666667e-01, 8.333333333333333e-03, -1.984126984126984e-04, 2.755731922398589e-06,
+                                      -2.505210838544172e-08, 1.605904383682161e-10, -7.647163731819816e-13, 2.811457254345521e-15}), r);
+    T c = horner(z, {-0.5, 4.166666666666666e-02, -1.388888888888889e-03, 2.480158730158730e-05, -2.755731922398589e-07,
+                     2.087675698786810e-09, -1.147074559772973e-11, 4.779477332387385e-14});
     const T less = z * c;
     c = less + T(1.0);
     if (small) return {s, c, less};
@@ -316,17 +313,8 @@ template <class T> SNAPBEAM_CALLED Turn<T> turn(T x) {
 // exp(-x) - 1 for |x| <= 4, within 2e-14 of exp(-x).
 template <class T> SNAPBEAM_FN T decay_less_one(T x) {
     const T y = x * T(-0.0625);
-    T e = fma(y, T(2.08767569878681e-09), T(2.505210838544172e-08));
-    e = fma(y, e, T(2.755731922398589e-07));
-    e = fma(y, e, T(2.755731922398589e-06));
-    e = fma(y, e, T(2.480158730158730e-05));
-    e = fma(y, e, T(1.984126984126984e-04));
-    e = fma(y, e, T(1.388888888888889e-03));
-    e = fma(y, e, T(8.333333333333333e-03));
-    e = fma(y, e, T(4.166666666666666e-02));
-    e = fma(y, e, T(1.666666666666667e-01));
-    e = fma(y, e, T(0.5));
-    e = fma(y, e, T(1.0));
+    T e = horner(y, {1.0, 0.5, 1.666666666666667e-01, 4.166666666666666e-02, 8.333333333333333e-03, 1.388888888888889e-03,
+                     1.984126984126984e-04, 2.480158730158730e-05, 2.755731922398589e-06, 2.755731922398589e-07, 2.505210838544172e-08, 2.08767569878681e-09});
     e = y * e;
     for (int i = 0; i < 4; ++i) e = e * (e + T(2.0));
     return e;

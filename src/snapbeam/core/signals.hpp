@@ -33,6 +33,7 @@ template <class L> struct Signal {
     typedef typename L::Marks Marks;
     int kind;
     const double *pieces;                                 // rows of PIECE_NUMBERS
+    const snapbeam::Tangent *tangent;                     // and their derivatives; null: none
     Signal *window;                                       // null: none
     bool acts, formed;                                    // in the kicks of the step; advances over its flows are at hand
     Number p[snapbeam::SIGNAL_NUMBERS];                   // numbers, in the order of api.hpp
@@ -88,16 +89,22 @@ template <class L> struct Signal {
     }
     template <class T> SNAPBEAM_FN void of_pieces(int l, T t, const T *own, T &value, T &slope, T &bend) {
         using namespace snapbeam;
-        const double *rows = pieces + long(lane(own[FIRST_PIECE], 0)) * PIECE_NUMBERS, at = lane(t, 0);
+        const long begins = long(lane(own[FIRST_PIECE], 0)) * PIECE_NUMBERS;
+        const double *rows = pieces + begins, at = lane(t, 0);
         const int count = int(lane(own[PIECE_COUNT], 0));
         int &i = piece[l];
         if (i >= count) i = 0;
         while (i + 1 < count && at >= rows[(i + 1) * PIECE_NUMBERS]) ++i;
         while (i > 0 && at < rows[i * PIECE_NUMBERS]) --i;
-        const double *c = rows + i * PIECE_NUMBERS + 1;
-        const T x = t - T(c[-1]), gain = own[GAIN];
-        value = T(c[5]), slope = bend = T(0.0);
-        for (int k = 4; k >= 0; --k) bend = fma(bend, x, slope), slope = fma(slope, x, value), value = fma(value, x, T(c[k]));
+        const auto number = [&](int k) {
+            T found = T(rows[i * PIECE_NUMBERS + k]);
+            if constexpr (L::directions > 0)
+                for (int d = 0; tangent->pieces && d < L::directions; ++d) found.d.set(d, tangent->pieces[d * tangent->all_pieces + begins + i * PIECE_NUMBERS + k]);
+            return found;
+        };
+        const T x = t - number(0), gain = own[GAIN];
+        value = number(6), slope = bend = T(0.0);
+        for (int k = 5; k >= 1; --k) bend = fma(bend, x, slope), slope = fma(slope, x, value), value = fma(value, x, number(k));
         value = gain * value, slope = gain * slope, bend = T(2.0) * gain * bend;
     }
     template <class T> SNAPBEAM_FN static void of_sweep(T t, const T *own, T &value, T &slope, T &bend) {

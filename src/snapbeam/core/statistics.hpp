@@ -67,7 +67,7 @@ template <class L> struct Totals {
     }
     SNAPBEAM_FN Number height(const Runs<L> &z, const Cell *q) const { return fma(z.sign, rest, dot<L>(row, q, s->size())); }
     SNAPBEAM_FN Number center_height(const Runs<L> &z, const Cell *q) const {
-        return fma(z.sign, Number(s->problem->center_rest), dot<L>(s->center, q, s->size()));
+        return fma(z.sign, s->center_rest, dot<L>(s->center, q, s->size()));
     }
     SNAPBEAM_SELDOM void start(Runs<L> &z, Marks which, Number energy_now) {
         using namespace snapbeam;
@@ -89,15 +89,15 @@ template <class L> struct Totals {
         Cell sum_of = Cell(0.0);
         SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) {
-            const Cell own = Cell(beam ? s->beam[i] : typename L::Coef(1.0)), oq = s->omega[i] * z.q[i];
+            const Cell own = Cell(beam ? s->beam[i] : typename L::Shared(1.0)), oq = s->omega[i] * z.q[i];
             sum_of = fma(own * z.p[i], z.p[i], fma(own * oq, oq, sum_of));
         }
         const Number gq = z.gq, qr = z.qr, along_g = z.along_g, along_r = z.along_r;
         tension(z, z.q, dot_cells<L>(s->g, z.q, n));
-        Number all = fma(Number(0.5), L::total(sum_of), Number(s->problem->gamma) * z.qr * fma(Number(0.25), z.qr, z.gq));
+        Number all = fma(Number(0.5), L::total(sum_of), s->gamma * z.qr * fma(Number(0.25), z.qr, z.gq));
         z.gq = gq, z.qr = qr, z.along_g = along_g, z.along_r = along_r;
         const Number there = Number(Real(0.5) * (Real(1.0) - z.sign));
-        if (s->problem->far_force) all += there * (Number(s->problem->lift) - dot<L>(s->far_force, z.q, n));
+        if (s->problem->far_force) all += there * (s->lift - dot<L>(s->far_force, z.q, n));
         for (int j = 0; j < z.channels && !beam; ++j) {
             const Channel<L> &c = z.channel[j];
             if (c.timed || (c.contact && !contacts)) continue;
@@ -114,9 +114,9 @@ template <class L> struct Totals {
         return s->problem->shift ? first * value(sum[snapbeam::SIDE]) : z.sign;
     }
     // A well in mode i, as q.
-    SNAPBEAM_FN Plain origin(const Runs<L> &z, Real well, int i) const {
+    SNAPBEAM_FN Cell origin(const Runs<L> &z, Real well, int i) const {
         const Plain there = Plain(Real(0.5) * (Real(1.0) - well)), away = Plain(Real(0.5) * (z.sign - well));
-        return fma(there, Plain(s->second[i]), away * Plain(s->shift[i]));
+        return fma(Cell(there), Cell(s->second[i]), Cell(away) * Cell(s->shift[i]));
     }
     // Energies of the modes of the beam about the nearest well and of the high ones, and the sums that bound the errors of the cubics:
     // by the inequality of Cauchy and Schwarz (sum_i c_i A_i)^2 <= N sum_i c_i^2 A_i^2.
@@ -132,7 +132,7 @@ template <class L> struct Totals {
             if (!s->problem->high) continue;
             Cell own = square;
             if (apart) {
-                const Cell from = s->omega[i] * (z.q[i] - Cell(origin(z, near, i)));
+                const Cell from = s->omega[i] * (z.q[i] - origin(z, near, i));
                 own = fma(p, p, from * from);
             }
             own = Cell(s->beam[i]) * own;
@@ -152,10 +152,10 @@ template <class L> struct Totals {
         Cell energy[4], high[4];  // at the beginning and its rate, at the end and its rate
         for (int k = 0; k < 4; ++k) energy[k] = high[k] = Cell(0.0);
         for (int i = 0; i < s->size(); ++i) {
-            const Plain a = origin(z, here, i), b = origin(z, -here, i), middle = Plain(0.5) * (a + b);
-            const Plain slope = Plain(s->beam[i]) * Plain(s->omega[i]) * Plain(s->omega[i]) * (a - b), high_slope = Plain(s->high[i]) * slope;
-            const Cell at[] = {z.q[i] - Cell(middle), z.p[i], z.q1[i] - Cell(middle), z.p1[i]};
-            for (int k = 0; k < 4; ++k) energy[k] = fma(Cell(slope), at[k], energy[k]), high[k] = fma(Cell(high_slope), at[k], high[k]);
+            const Cell a = origin(z, here, i), b = origin(z, -here, i), middle = Cell(0.5) * (a + b);
+            const Cell slope = Cell(s->beam[i]) * Cell(s->omega[i]) * Cell(s->omega[i]) * (a - b), high_slope = Cell(s->high[i]) * slope;
+            const Cell at[] = {z.q[i] - middle, z.p[i], z.q1[i] - middle, z.p1[i]};
+            for (int k = 0; k < 4; ++k) energy[k] = fma(slope, at[k], energy[k]), high[k] = fma(high_slope, at[k], high[k]);
         }
         Number e[4], high_e[4];
         for (int k = 0; k < 4; ++k) L::totals(energy[k], high[k], e[k], high_e[k]);
@@ -181,9 +181,8 @@ template <class L> struct Totals {
         Cell whole = Cell(0.0), high = Cell(0.0);
         const Real near = well(z);
         for (int i = 0; i < s->size(); ++i) {
-            const Plain omega = Plain(s->omega[i]);
-            const Cell p = z.p[i];
-            Cell own = z.k[i] - Cell(2.0) * Cell(s->sigma[i]) * p - Cell(omega * omega * origin(z, near, i));
+            const Cell p = z.p[i], omega = Cell(s->omega[i]);
+            Cell own = z.k[i] - Cell(2.0) * Cell(s->sigma[i]) * p - omega * omega * origin(z, near, i);
             for (int j = 0; j < z.channels; ++j) {
                 const Channel<L> &c = z.channel[j];
                 if (c.active && c.law != AXIAL_LOAD) own = fma(Cell(last ? c.f : c.first_f), c.row[i], own);
@@ -275,7 +274,7 @@ template <class L> struct Totals {
     SNAPBEAM_SELDOM void follow(const Runs<L> &z, Marks near, Number end_u, Number end_v, Number end_c, Number end_cv, Cell *memory) {
         using namespace snapbeam;
         const int n = s->size();
-        const Number zero = Number(0.0), point_rest = z.sign * rest, center_rest = Number(z.sign * Real(s->problem->center_rest));
+        const Number zero = Number(0.0), point_rest = z.sign * rest, center_rest = z.sign * s->center_rest;
         Missed of_point = {zero, zero, max(z.h, Number(1e-300))}, of_center = of_point;
         for (int pass = 0; pass < 2; ++pass) {
             Inside<L, Cell, Number> inside;
@@ -352,7 +351,7 @@ template <class L> struct Totals {
         }
         const Number end_c = center_height(z, z.q1), end_cv = dot<L>(s->center, z.p1, n);
         const Number u0 = point.u, v0 = point.v, u1 = end_u, v1 = end_v, c0 = center.u, cv0 = center.v, c1 = end_c, cv1 = end_cv;
-        const Number level = Number(s->problem->dividing_height);
+        const Number level = s->dividing_height;
         const Marks changed = ok & differ(h, length);
         if (s->problem->high && any(changed)) correct(z, changed, h, false);
         count_crossings(z, ok, c0 - level, cv0, c1 - level, cv1);
@@ -413,9 +412,9 @@ template <class L> struct Totals {
         SNAPBEAM_LOOP
         for (int i = 0; i < s->size(); ++i) {
             Plain of_u, of_v;
-            doubts_of_mode(h, Plain(s->omega[i]), of_u, of_v);
+            doubts_of_mode(h, Plain(value(s->omega[i])), of_u, of_v);
             of_u *= amplitude[i], of_v *= amplitude[i];
-            const Plain at = abs(value(row[i])), middle = abs(Plain(s->center[i]));
+            const Plain at = abs(value(row[i])), middle = abs(Plain(value(s->center[i])));
             su = fma(at, of_u, su), sv = fma(at, of_v, sv), sc = fma(middle, of_u, sc), scv = fma(middle, of_v, scv);
         }
         assign(long_step, u, L::total(su)), assign(long_step, v, L::total(sv));
@@ -434,19 +433,21 @@ template <class L> struct Totals {
         }
         c.sums[WORK] += select(acts, c.work, zero), c.sums[GROSS_WORK] += select(acts, abs(c.work), zero), c.sums[LOST] += select(acts, c.lost, zero);
         if (!c.harvests) return;
-        c.sums[LATE_LOST] += select(acts, late_share(z) * c.lost, zero);
-        Number most;
+        Number most, before, after;  // at both ends what the power lost is P[0] times the square of
         if (c.circuit) {
-            const Number before = c.P[c.state];
-            const Cubic<Number> up(before, c.r0, c.z, c.r1, z.h), down(-before, -c.r0, -c.z, -c.r1, z.h);
-            most = max(max(abs(before), abs(c.z)), select(c.follows, zero, max(crest(up, c.r0, c.r1), crest(down, -c.r0, -c.r1))));
+            before = c.P[c.state], after = c.z;
+            const Cubic<Number> up(before, c.r0, after, c.r1, z.h), down(-before, -c.r0, -after, -c.r1, z.h);
+            most = max(max(abs(before), abs(after)), select(c.follows, zero, max(crest(up, c.r0, c.r1), crest(down, -c.r0, -c.r1))));
         } else {  // in proportion to a velocity
-            const Number v0 = dot<L>(c.row, z.p, s->size()), v1 = dot<L>(c.row, z.p1, s->size());
-            Number speed = max(abs(v0), abs(v1));
+            before = dot<L>(c.row, z.p, s->size()), after = dot<L>(c.row, z.p1, s->size());
+            Number speed = max(abs(before), abs(after));
             const Marks higher = acts & (Real(1.3) * value(speed) * value(c.P[0]) > value(c.sums[PEAK_FORCE]));
-            if (any(higher)) assign(higher, speed, speed_on(dot<L>(c.row, z.q1, s->size()) - dot<L>(c.row, z.q, s->size()), v0, bend_at(z, c.row, false), v1, bend_at(z, c.row, true), z.h));
+            if (any(higher)) assign(higher, speed, speed_on(dot<L>(c.row, z.q1, s->size()) - dot<L>(c.row, z.q, s->size()), before, bend_at(z, c.row, false), after, bend_at(z, c.row, true), z.h));
             most = c.P[0] * speed;
         }
+        // of a step in which the last quarter begins, with a power that changes linearly
+        const Number share = late_share(z), tilt = Number(0.5) * z.h * c.P[0] * (after * after - before * before);
+        c.sums[LATE_LOST] += select(acts, share * fma(tilt, Number(1.0) - share, c.lost), zero);
         assign(acts, c.sums[PEAK_FORCE], max(c.sums[PEAK_FORCE], most));
     }
 
@@ -466,7 +467,7 @@ template <class L> struct Totals {
         sum[SQUARE_DISPLACEMENT] += u * u * by, sum[SQUARE_VELOCITY] += v * v * by;
         sum[SQUARE_CENTER] += c * c * by, sum[SQUARE_CENTER_VELOCITY] += cv * cv * by;
         sum[ENERGY_TIME] += Number(value(modal_energy)) * by, sum[HIGH_ENERGY_TIME] += Number(value(high_energy)) * by;
-        for (int i = 0; i < n && z.account; ++i) sum[DISSIPATED] += Number(2.0 * s->sigma[i] * z.p[i].v * z.p[i].v) * by;
+        for (int i = 0; i < n && z.account; ++i) sum[DISSIPATED] += Number(2.0 * s->sigma[i].v * z.p[i].v * z.p[i].v) * by;
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &one = z.channel[j];
             if (one.contact && !one.closed) continue;

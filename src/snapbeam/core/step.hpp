@@ -86,6 +86,7 @@ template <class L> struct Runs {
     Signal<L> *signal;
     Held<Cell, CELLS> q, p, k, q1, p1, k1, r;  // state and acceleration by the tension at both ends; Gq at a kick
     const Plain *flows;                   // (distinct flows, cells, 4) of the step
+    const Slopes<L> *flow_slopes;         // and their derivatives; null: none
     Number *block;                        // arrays of the velocity block
     int *late;                            // channels of it
     Real t, tick, sign;                   // sign: +1 about the first well, -1 about its mirror image
@@ -176,9 +177,15 @@ template <class L, class Number = typename L::Number> SNAPBEAM_FN void tension(R
             if (i < end) along += product_rows<1, L>(s, q, z.r, i, from, count);
         }
     }
+    if constexpr (L::directions > 0)
+        for (int i = 0; s.changes && i < s.size(); ++i) {
+            Slopes<L> of_r(0.0);
+            for (int j = 0; j < s.size(); ++j) of_r = fma(s.G_slopes[long(i) * s.size() + j], Slopes<L>(q[j].v), of_r);
+            z.r[i].d += of_r, along.d += of_r * Slopes<L>(q[i].v);
+        }
     L::totals(along, gq, z.qr, z.gq);
     z.gq = z.sign * z.gq;
-    const Number gamma = Number(-s.problem->gamma);
+    const Number gamma = -s.gamma;
     z.along_g = gamma * z.qr, z.along_r = gamma * fma(Number(2.0), z.gq, z.qr);
     for (int j = 0; j < z.channels; ++j)
         if (z.channel[j].law == AXIAL_LOAD) {
@@ -427,8 +434,8 @@ template <class L> SNAPBEAM_FN typename L::Marks follows(const Channel<L> &c, in
 }
 
 // The end of a flow that lasts longer; the values are those without.
-template <class Cell> SNAPBEAM_FN void lengthen(Cell &q, Cell &p, Cell longer, double omega, double sigma) {
-    const double rate = -omega * omega * q.v - 2.0 * sigma * p.v;
+template <class Cell> SNAPBEAM_FN void lengthen(Cell &q, Cell &p, Cell longer, Cell omega, Cell sigma) {
+    const double rate = -omega.v * omega.v * q.v - 2.0 * sigma.v * p.v;
     q += Cell(p.v) * longer, p += Cell(rate) * longer;
 }
 
@@ -442,6 +449,7 @@ template <class L> struct Flow {
     bool first;
     int which;
     Number longer;  // derivatives of its time
+    const Slopes<L> *slopes;  // and of its numbers; null: none
 
     template <int CIRCUITS, bool MODES> SNAPBEAM_FN void take(Runs<L> &z, Channel<L> *one, Channel<L> *other) const {
         const Structure<L> &s = *z.s;
@@ -452,7 +460,11 @@ template <class L> struct Flow {
         for (int i = 0; i < n; ++i, a += 4) {
             const Cell q = from_q[i], p = first ? fma(weight, from_k[i], from_p[i]) : fma(by_g, s.g[i], fma(by_r, z.r[i], from_p[i]));
             Cell dq = fma(a[0], q, a[1] * p), dp = fma(a[3], p, a[2] * q), q1 = q + dq, p1 = p + dp;
-            if constexpr (L::directions > 0) {  // of a flow that lasts longer
+            if constexpr (L::directions > 0) {  // of a flow that changes, or lasts longer
+                if (slopes) {
+                    const Slopes<L> *of = slopes + 4 * i, x = Slopes<L>(q.v), y = Slopes<L>(p.v);
+                    q1.d += fma(of[0], x, of[1] * y), p1.d += fma(of[3], y, of[2] * x);
+                }
                 lengthen(q1, p1, longer, s.omega[i], s.sigma[i]);
                 dq = q1 - q, dp = p1 - p;
             }
@@ -558,7 +570,7 @@ template <class L, class Number = typename L::Number, class Cell = typename L::C
     }
     const bool direct = stage == 0 && z.direct;
     const Cell *from_q = direct ? z.q : z.q1, *from_p = direct ? z.p : z.p1, *from_k = direct ? z.k : z.k1;
-    const Flow<L> flow = {a, from_q, from_p, from_k, by_g, by_r, weight, stage == 0, which, Number(s.composition.flow[which]) * (z.h - Number(value(z.h)))};
+    const Flow<L> flow = {a, from_q, from_p, from_k, by_g, by_r, weight, stage == 0, which, Number(s.composition.flow[which]) * (z.h - Number(value(z.h))), z.flow_slopes ? z.flow_slopes + long(which) * n * 4 : nullptr};
     int circuits = 0, first = z.channels, second = z.channels;
     for (int j = 0; j < z.channels; ++j)
         if (z.channel[j].circuit && circuits++ < 2) (circuits == 1 ? first : second) = j;

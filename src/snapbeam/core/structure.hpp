@@ -43,6 +43,7 @@ SNAPBEAM_FN Composition composition_of(int number) {
              1 - 2 * (0.0829844064174052 + 0.396309801498368 - 0.0390563049223486), 0, 0}};
 }
 
+template <class L> using Slopes = Pack<(L::directions > 0 ? L::directions : 1)>;  // derivatives beside a plain number
 constexpr int FEWEST_PARTS = 8, PARTS_PER_TURN = 12;
 
 // e^(-x) - 1 for any x.
@@ -64,8 +65,8 @@ template <class T> SNAPBEAM_CALLED void set_flow(T time, T sigma, T omega, T *a)
     T over = w.sine / damped, cosine_less = w.cosine_less_one, less = decay_of(time * sigma);
     const auto creeping = square < T(0.0);
     if (any(creeping)) {  // overdamped: cosh and sinh in place of cos and sin
-        const T rate = sqrt(max(-square, T(0.0))), half = each(T(0.5) * rate * time, [](double x) { return ::sinh(x); });
-        over = select(creeping, each(rate * time, [](double x) { return ::sinh(x); }) / rate, over);
+        const T rate = sqrt(max(-square, T(0.0))), half = sinh(T(0.5) * rate * time);
+        over = select(creeping, sinh(rate * time) / rate, over);
         cosine_less = select(creeping, T(2.0) * half * half, cosine_less);
     }
     const T decay = less + T(1.0), ds = sigma * over;
@@ -83,13 +84,16 @@ template <class L> struct Structure {
     double fastest;                                // angular frequency
     Held<int, BLOCKS> first, count, mode_first, mode_count;  // of each block: cells and modes
     Held<int, CELLS> place;                                  // of each mode in the padded order
-    typedef Held<Coef, CELLS> Row;
+    typedef Held<typename L::Shared, CELLS> Row;
     Row omega, sigma, g, shift, far_force, center, high, beam, second;
     Held<Coef, CELLS * CELLS> G;
+    typename L::Number gamma, center_rest, dividing_height, lift;
+    bool changes;                                  // it has derivatives
+    Held<Slopes<L>, 0, false> G_slopes;            // those of G
 
     SNAPBEAM_FN int size() const { return KNOWN ? CELLS : L::fixed ? L::fixed : cells; }
 
-    void build(const Problem &p, Arena &arena) {
+    void build(const Problem &p, Arena &arena, const snapbeam::Tangent *tangent = nullptr) {
         problem = &p;
         composition = composition_of(p.composition);
         cells = 0;
@@ -97,11 +101,15 @@ template <class L> struct Structure {
         padded = cells * L::lanes;
         first.take(arena, p.blocks), count.take(arena, p.blocks);
         mode_first.take(arena, p.blocks), mode_count.take(arena, p.blocks), place.take(arena, p.modes);
-        constexpr int ROWS = 9;
-        Row *rows[ROWS] = {&omega, &sigma, &g, &shift, &far_force, &center, &high, &beam, &second};
-        const double *given[ROWS] = {p.omega, p.sigma, p.g, p.shift, p.far_force, p.center, p.high, p.beam, p.second};
+        constexpr int ROWS = 9;  // the first STRUCTURE_ROWS may have derivatives
+        Row *rows[ROWS] = {&omega, &sigma, &g, &shift, &far_force, &center, &second, &high, &beam};
+        const double *given[ROWS] = {p.omega, p.sigma, p.g, p.shift, p.far_force, p.center, p.second, p.high, p.beam};
         for (Row *row : rows) row->take(arena, cells);
         G.take(arena, long(cells) * padded);
+        gamma = typename L::Number(p.gamma), center_rest = typename L::Number(p.center_rest);
+        dividing_height = typename L::Number(p.dividing_height), lift = typename L::Number(p.lift);
+        changes = L::directions > 0 && tangent && tangent->structure;
+        G_slopes.take(arena, changes ? long(cells) * cells : 0);
         if (!arena.base && !KNOWN) return;
         int cell = 0, mode = 0;
         for (int b = 0; b < p.blocks; ++b) {
@@ -122,6 +130,20 @@ template <class L> struct Structure {
                 if (given[k]) set_coefficient<L>(*rows[k], at, given[k][i]);
             fastest = p.omega[i] > fastest ? p.omega[i] : fastest;
             for (int j = 0; j < p.modes; ++j) set_coefficient<L>(G + long(place[j]) * cells, at, p.G[long(i) * p.modes + j]);
+        }
+        if constexpr (L::directions > 0)
+            if (changes) change(*tangent, rows);
+    }
+    // Derivatives of all that the structure has.
+    void change(const snapbeam::Tangent &t, Row **rows) requires(L::directions > 0) {
+        const int n = problem->modes;
+        typename L::Number *scalars[] = {&gamma, &center_rest, &dividing_height, &lift};
+        for (int k = 0; k < L::directions; ++k) {
+            for (int x = 0; x < snapbeam::STRUCTURE_ROWS; ++x)
+                for (int i = 0; i < n; ++i) (*rows[x])[place[i]].d.set(k, t.structure[(k * snapbeam::STRUCTURE_ROWS + x) * n + i]);
+            for (int x = 0; x < snapbeam::STRUCTURE_SCALARS; ++x) scalars[x]->d.set(k, t.scalars[k * snapbeam::STRUCTURE_SCALARS + x]);
+            for (int i = 0; i < n; ++i)
+                for (int j = 0; j < n; ++j) G_slopes[long(place[i]) * cells + place[j]].set(k, t.G[(long(k) * n + i) * n + j]);
         }
     }
     // Parts in which a step of a run is followed inside: a flight step's, whatever the step.

@@ -204,15 +204,15 @@ class Stroboscope:
     def slope(self, x: _Array, periods: int, values: Mapping[str, float], name: str, step: float) -> _Array:
         """Derivative by one of the parameters of the runs of where the map brings one state, shape (d,).
 
-        The numbers of a run are differentiated by a difference over twice the *step*, the run itself exactly.  A motion whose table of
-        pieces depends on the parameter, or that jumps, takes differences between runs.
+        The numbers of a run are differentiated by a difference over twice the *step*, the run itself exactly.  Only where the parameter
+        changes how many pieces a motion has, or in which order it jumps, differences between runs are taken.
         """
         begun, moved = self._begun(x[None]), np.zeros((1, 1, self.dimension))
         given = {key: np.array([value]) for key, value in values.items()}
         points = [given, *(given | {name: np.array([values[name] + sign * step])} for sign in (1.0, -1.0))]
         for _ in range(periods):
             here, above, below = (self._ensemble(begun, 1, each) for each in points)
-            if not native.differentiable(above, below):
+            if not (native.unchanged(above, below) and native.differentiable(above, below)):
                 ends = [self.advance(x[None], periods, points=each) for each in points[1:]]
                 change: _Array = (ends[0].states - ends[1].states)[0] / (2.0 * step)
                 return change

@@ -249,6 +249,18 @@ class LocalForce:
         places = self.displacements(largest, 17).tolist()
         return max(abs(damping(numbers, u, s * v)) for u in places for v in speeds for s in (1.0, -1.0))
 
+    def turnover(self, largest: float, fastest: float) -> float:
+        """Speed at which the damping coefficient is 1/cosh(1)^2 of that at rest, m/s: v_0 of friction F_c tanh(v/v_0).
+
+        Infinite where the coefficient stays larger up to *fastest*.
+        """
+        numbers, damping = self.numbers, type(self).damping_coefficient
+        place = float(self.displacements(largest, 3)[1])
+        at_rest = abs(damping(numbers, place, 0.0)) / math.cosh(1.0) ** 2
+        speeds = fastest * 10.0 ** np.linspace(-9.0, 0.0, 181)
+        fallen = (float(v) for v in speeds for s in (1.0, -1.0) if abs(damping(numbers, place, s * v)) < at_rest)
+        return next(fallen, math.inf)
+
 
 def _elementwise(function: Callable[[Any, float], float], numbers: Any, displacement: Any) -> Any:
     """A scalar function of a law at each displacement; a float for a float."""

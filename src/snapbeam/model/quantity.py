@@ -146,7 +146,12 @@ def section_of(kind: str, number: int) -> str:
 def numbered(section: str) -> tuple[str, int]:
     """The kind and the number of a section: ``contact.2`` is that of the second contact; 1 of any other."""
     kind, _, number = section.partition(".")
-    return (kind, int(number)) if kind in NUMBERED and number.isdigit() else (section, 1)
+    return (kind, int(number)) if kind in NUMBERED and countable(number) else (section, 1)
+
+
+def countable(text: str) -> bool:
+    """Return whether a text is the number of a part or a channel: of digits that ``int`` takes, and not too many."""
+    return text.isdecimal() and len(text) < 10
 
 
 def split_name(name: str) -> tuple[str, str]:

@@ -296,7 +296,7 @@ UNFORCED = "unforced"
 
 def checked_initial_well(name: str, value: Any) -> str | int:
     """A well as of :func:`checked_well`, or that of the structure without its local forces."""
-    if value == UNFORCED:
+    if isinstance(value, str) and value == UNFORCED:
         return UNFORCED
     try:
         return checked_well(name, value)

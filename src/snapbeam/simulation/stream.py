@@ -110,9 +110,10 @@ def simulate_to_file(
             report(share)
 
     full = False
+    pieces = engine_of(run.ensemble).record(run.ensemble, run.instants, run.times is None, reported)
     with netcdf_stream(target) as (file, stream):
         writer = _Writer(file, run)
-        for piece in engine_of(run.ensemble).record(run.ensemble, run.instants, run.times is None, reported):
+        for piece in pieces:
             full = not stream.reserve(writer.room(piece))
             if full and writer.waiting is not None:
                 break
@@ -159,7 +160,6 @@ class _Writer:
         ready = max(0, together.times.size - _KEPT_BACK)
         self.waiting = together.at(slice(ready, None))
         for begin in range(0, ready, _CHUNK):
-            raise_held()
             self.append(together.at(slice(begin, min(ready, begin + _CHUNK))))
 
     def finish(self) -> RunSummary:
@@ -193,11 +193,15 @@ class _Writer:
         dataset = run_dataset(self.run.ensemble, self.run.system, samples, times, self.run.period, {})
         begin, end = self.written, self.written + dataset.sizes["time"]
         if begin == 0:
-            dataset.dump_to_store(NetCDFStore(self.file), encoding=_chunked(dataset), unlimited_dims={"time"})
-        else:
-            self.file.resize_dimension("time", end)
-            for name, variable in _over_time(dataset):
-                self.file.variables[name][begin:end] = variable.values
+            begin = 1
+            first = dataset.isel(time=slice(0, 1))
+            first.dump_to_store(NetCDFStore(self.file), encoding=_chunked(first), unlimited_dims={"time"})
+        self.file.resize_dimension("time", end)
+        for name, variable in _over_time(dataset):
+            stored, rows = self.file.variables[name], _rows(variable)
+            for at in range(begin, end, rows):
+                raise_held()
+                stored[at : min(at + rows, end)] = variable.values[at - self.written : at - self.written + rows]
         self.written = end
 
 
@@ -207,10 +211,13 @@ def _over_time(dataset: xr.Dataset) -> Iterator[tuple[str, xr.Variable]]:
             yield str(name), variable
 
 
+def _rows(variable: xr.Variable) -> int:
+    """Instants in a chunk of a variable."""
+    return max(1, _CHUNK * variable.sizes["time"] // max(1, variable.size))
+
+
 def _chunked(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
     encoding = compressed(dataset)
     for name, variable in _over_time(dataset):
-        beside = variable.size // variable.sizes["time"]
-        rows = max(1, _CHUNK // beside)
-        encoding[name] = {**encoding.get(name, {}), "chunksizes": (rows, *variable.shape[1:])}
+        encoding[name] = {**encoding.get(name, {}), "chunksizes": (_rows(variable), *variable.shape[1:])}
     return encoding

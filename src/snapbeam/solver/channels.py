@@ -161,7 +161,11 @@ class _Builder:
         if kind in LAWS:
             number, names = LAWS[kind]
             return number, (), names
-        own = contact_law(law) if isinstance(law, ContactLaw) else local_force(law, law.largest_displacement(model))
+        if isinstance(law, ContactLaw):
+            own = contact_law(law)
+        else:
+            largest = law.largest_displacement(model)
+            own = local_force(law, largest, 10.0 * largest * 2.0 * math.pi * model.reference_frequency)
         self.of_user.append(own)
         return USER_LAWS[own.kind], own.head, kind.numbers_type()._fields
 

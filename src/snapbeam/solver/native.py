@@ -230,7 +230,7 @@ class _Arrays:
         shapes: dict[str, tuple[int, ...]] = {
             "q": (n,), "p": (n,), "numbers": batch["numbers"].shape[1:], "laws": (channels,), "offset": (channels,), "rest": (channels + 1,),
             "rows": (channels + 1, n), "signals": batch["signals"].shape[1:], "end": (), "statistics": (len(STATISTICS),),
-            "of_channels": (channels, len(OF_CHANNEL)),
+            "of_channels": (channels, len(OF_CHANNEL)), "jumps": batch["jumps"].shape[1:],
         }  # fmt: skip
         found = {name: np.zeros((self.ensemble.size, _core.DIRECTIONS, *shape)) for name, shape in shapes.items()}
         room = (self.ensemble.size, batch["outputs"], _core.DIRECTIONS, 2 * n + channels)
@@ -246,7 +246,20 @@ class _Arrays:
                 {"rows": batch["rows"][batch["row_of"]], "end": end}
                 | {name: batch[name] for name in ("q", "p", "numbers", "offset", "rest", "signals")}
             )
-        found = {name: (parts[0][name] - parts[1][name]) / distance for name in parts[0]}
+            order = np.argsort(self.channels.jumps, axis=1, kind="stable")
+            parts[-1] |= {
+                "jumps": np.take_along_axis(arrays.channels.jumps, order, axis=1),
+                "pieces": arrays.channels.pieces,
+            }
+            if not unchanged(above, below):
+                problem = {name: arrays.problem[name] for name in (*_ROWS, *_SCALARS, "G")}
+                rows = [np.zeros(self.order.size) if problem[name] is None else problem[name] for name in _ROWS]
+                structures = {"structure": np.array(rows), "scalars": np.array([problem[name] for name in _SCALARS])}
+                parts[-1] |= structures | {"G": problem["G"]}
+        with np.errstate(invalid="ignore"):  # a jump that never is
+            found = {name: np.nan_to_num((parts[0][name] - parts[1][name]) / distance) for name in parts[0]}
+        if not found["pieces"].any():
+            del found["pieces"]
         found["signals"][:, self.problem["signal_kinds"] == 0, 4] = 0.0  # periods in ticks of another clock
         found["signals"][:, :, 6:] = 0.0  # bounds
         return found
@@ -358,16 +371,40 @@ def integrate_with_output_states(
     )
 
 
+_ROWS = ("omega", "sigma", "g", "shift", "far_force", "center", "second")
+_SCALARS = ("gamma", "center_rest", "dividing_height", "lift")
+"""Rows and numbers of a structure that may have derivatives, beside G, as in ``core/api.hpp: Tangent``."""
+_NEAR = 1e-2
+"""Relative change of a structure over the step of a difference, beyond which its modes are not the same: two of one frequency."""
+
+
+def unchanged(above: Ensemble, below: Ensemble) -> bool:
+    """Return whether two ensembles have the same modes."""
+    return _same(above, below, {"levels"})
+
+
 def differentiable(above: Ensemble, below: Ensemble) -> bool:
-    """Return whether two ensembles differ only in numbers of which the core takes derivatives: the same modes, pieces of signals and times of jumps."""
+    """Return whether two ensembles differ only in numbers of which the core takes derivatives, and little."""
     one, other = above.channels, below.channels
     assert one is not None and other is not None
-    if not np.array_equal(one.pieces, other.pieces) or not np.array_equal(one.jumps, other.jumps):
+    if one.pieces.shape != other.pieces.shape or one.jumps.shape != other.jumps.shape:
         return False
-    first, second = (
-        {name: value for name, value in _Arrays(each).problem.items() if name != "levels"} for each in (above, below)
-    )
-    return all(np.array_equal(value, second[name]) for name, value in first.items())
+    if not (one.jumps.argsort(axis=1, kind="stable") == other.jumps.argsort(axis=1, kind="stable")).all():
+        return False
+    if not _same(above, below, {"levels", "G", *_ROWS, *_SCALARS}):
+        return False
+    first, second = _Arrays(above), _Arrays(below)
+    near = [(first.problem[name], second.problem[name]) for name in ("G", *_ROWS)]
+    if any((high is None) != (low is None) for high, low in near) or not np.array_equal(first.order, second.order):
+        return False
+    near = [pair for pair in near if pair[0] is not None] + [(first.batch["rows"], second.batch["rows"])]
+    near += [(high, low) for high, low in zip(one.pieces.T, other.pieces.T, strict=True)]
+    return all(np.abs(high - low).max(initial=0.0) <= _NEAR * np.abs(high).max(initial=0.0) for high, low in near)
+
+
+def _same(above: Ensemble, below: Ensemble, without: set[str]) -> bool:
+    first, second = (_Arrays(each).problem for each in (above, below))
+    return all(np.array_equal(value, second[name]) for name, value in first.items() if name not in without)
 
 
 def tangents(
@@ -402,7 +439,7 @@ def tangents(
         some = q[:, own].shape[1]
         seeds = arrays.no_change()
         for name, change in changes.items():
-            seeds[name][:, :some] = change[:, None]
+            _seed(seeds, name, slice(some), change)
         seeds["q"][:, :some], seeds["p"][:, :some] = arrays.row(q[:, own]), arrays.row(p[:, own])
         for channel, change in laws.items():
             seeds["laws"][:, :some, channel] = change[:, own]
@@ -410,6 +447,14 @@ def tangents(
         ends = seeds["states"][:, 0, :some]
         found_q[:, own], found_p[:, own] = arrays.modes_of(ends, ends[..., 2 * n :])
     return found_q, found_p
+
+
+def _seed(seeds: dict[str, _Array], name: str, directions: slice, change: _Array) -> None:
+    """Give some directions a derivative, of each run or of what all runs share."""
+    if name in ("structure", "scalars", "G", "pieces"):
+        seeds.setdefault(name, np.zeros((_core.DIRECTIONS, *change.shape)))[directions] = change
+    else:
+        seeds[name][:, directions] = change[:, None]
 
 
 def _differentiated(ensemble: Ensemble) -> _Arrays:
@@ -457,7 +502,7 @@ def changed_accumulators(
         some, seeds = beside[first : first + _core.DIRECTIONS], arrays.no_change()
         for k, each in enumerate(some):
             for name, change in arrays.changes(*each).items():
-                seeds[name][:, k] = change
+                _seed(seeds, name, slice(k, k + 1), change)
         _integrate_tangents(arrays, seeds, threads)
         whole = arrays.accumulators()
         ends = seeds["states"][:, 0, :]
@@ -501,10 +546,14 @@ class Recording:
         arrays.batch["states"] = np.empty((1, 1, 2 * n + 1 + 2 * count))
         # one step may hold many instants
         span = 2.0 * float(ensemble.step_times[0])
-        most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
+        most = 0
+        for begin in range(0, times.size, _SAMPLES):  # a signal is heard between the parts
+            part = times[begin : begin + _SAMPLES]
+            found = np.searchsorted(times, part + span, side="right") - np.arange(begin, begin + part.size)
+            most = max(most, int(found.max()))
         width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
         samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // width), most + 8)
-        saved = (3 * (n + 64) + count * (11 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
+        saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
         self.recorder: dict[str, Any] = {
             "times": np.ascontiguousarray(times, dtype=float),
             "in_contact": int(in_contact),

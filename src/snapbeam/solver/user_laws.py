@@ -196,11 +196,11 @@ def contact_law(law: ContactLaw) -> UserLaw:
     damping = (kind.damping_coefficient, 1) if kind.rate_dependent else None
     memory = [(kind.yield_penetration, 0), (kind.memory_after, 1)] if kind.memory else [None, None]
     core = "contact with memory" if kind.memory else "lossy contact" if damping else "contact"
-    return _law_of(kind, core, [*hooks, None, damping, *memory], (0.0, math.inf), 0.0)
+    return _law_of(kind, core, [*hooks, None, damping, *memory], (0.0, math.inf), 0.0, _FAR)
 
 
-def local_force(force: LocalForce, largest: float) -> UserLaw:
-    """The functions of a local force of one's own; *largest* is the displacement that it may reach, m or rad."""
+def local_force(force: LocalForce, largest: float, fastest: float) -> UserLaw:
+    """The functions of a local force of one's own, which may reach *largest* (m or rad) and *fastest*, per second."""
     kind: Any = type(force)
     elastic = [(getattr(kind, name), 1) if force.is_conservative else None for name in ("force", "energy")]
     lossy = [(getattr(kind, name), 2) if kind.dissipative else None for name in ("damping_force", "damping_coefficient")]  # fmt: skip
@@ -212,11 +212,12 @@ def local_force(force: LocalForce, largest: float) -> UserLaw:
         [*elastic, None, *lossy, None, None],
         limits,
         span if force.is_conservative else 0.0,
+        min(force.turnover(largest, fastest), _FAR),
         kind.is_limited(),
     )
 
 
-def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float, limited: bool = False) -> UserLaw:  # fmt: skip
+def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float, turnover: float, limited: bool = False) -> UserLaw:  # fmt: skip
     numbers = kind.numbers_type()
     count = len(numbers._fields)
     if count > MOST_NUMBERS:
@@ -234,4 +235,4 @@ def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, flo
     addresses = struct.unpack(
         f"{len(made)}d", struct.pack(f"{len(made)}Q", *(each.address if each else 0 for each in made))
     )
-    return UserLaw(core, functions, (*addresses, low, high, span, float(count)), limited)
+    return UserLaw(core, functions, (*addresses, low, high, span, turnover, float(count)), limited)

@@ -48,12 +48,14 @@ def gradient(
 ) -> xr.Dataset:
     """Derivatives of smooth quantities by parameters of the system, with error estimates.
 
-    Statistics have exact derivatives through the run, with those of the times of impacts, by parameters that leave the
-    modes, a user's laws and the times of jumps of a motion: a frequency, an amplitude, a gap, a contact's stiffness or
-    location, a resistance. The step is a quarter of the usual one, and the error a third of the change that this makes.
+    Statistics have exact derivatives through the run, with those of the times of impacts and of the jumps of motions, by
+    the parameters of the beam, its ends and damping (through the derivatives of the assembled matrices), of motions,
+    contacts, forces and circuits. The step is a quarter of the usual one, and the error a third of the change that this
+    makes.
 
-    By other parameters, and of a function, central differences of order six are taken, with a step that is shortened
-    until orders six and four agree and all runs have the same number of impacts.
+    With a user's laws, engine = "python" or a tolerance, where a parameter changes the number of pieces of a motion, and
+    of a function, central differences of order six are taken, with a step that is shortened until orders six and four
+    agree and all runs have the same number of impacts.
 
     Parameters
     ----------
@@ -212,21 +214,46 @@ def slopes_of_runs(
 ) -> tuple[Columns, list[Columns]] | None:
     """Statistics of runs and their exact changes between pairs of columns beside; None where the core takes no derivative.
 
-    The columns of each pair differ a little, by a parameter of a design.
+    The columns of each pair differ a little, by a parameter of a design.  ``length_scale`` and ``velocity_scale`` are among the statistics.
     """
-    structural = any(name.startswith("initial_state.") or not lookup(name).is_run for name in columns)
-    if structural or how.engine == "python" or how.tolerance is not None:
+    structural = [name for name in columns if not lookup(name).is_run]
+    if (
+        any(name.startswith("initial_state.") for name in columns)
+        or how.engine == "python"
+        or how.tolerance is not None
+    ):
         return None
-    here, *sides = (make_ensemble(system, how, each) for each in (columns, *(side for pair in beside for side in pair)))
-    pairs = list(zip(sides[::2], sides[1::2], strict=True))
-    if here.channels.of_user or not all(native.differentiable(*pair) for pair in pairs):
-        return None
-    found, _, whole = native.changed_accumulators(here, [(*pair, 1.0) for pair in pairs], how.threads)
-    changes = []
-    for near, records in zip(pairs, found, strict=True):
-        high, low = (statistics_of(each, own) for each, own in zip(near, records, strict=True))
-        changes.append({name: high[name] - low[name] for name in high if STATISTICS[name].dtype == "float64"})
-    return statistics_of(here, whole), changes
+    sides = [columns, *(side for pair in beside for side in pair)]
+    count = next(iter(columns.values())).size
+    of_system = np.stack([columns[name] for name in structural], axis=1) if structural else np.zeros((count, 0))
+    _, group = np.unique(of_system, axis=0, return_inverse=True)
+    whole: Columns = {}
+    changes: list[Columns] = [{} for _ in beside]
+    for number in range(int(group.max()) + 1):
+        rows = np.flatnonzero(group.ravel() == number)
+        ensembles, scales = [], []
+        for side in sides:
+            own = {name: values[rows] for name, values in side.items()}
+            near = system.replace(**{name: float(own.pop(name)[0]) for name in structural}) if structural else system
+            ensembles.append(make_ensemble(near, how, own))
+            scales.append({"length_scale": near.scale.length, "velocity_scale": near.scale.length * near.scale.omega})
+        here, pairs = ensembles[0], list(zip(ensembles[1::2], ensembles[2::2], strict=True))
+        if here.channels.of_user or not all(native.differentiable(*pair) for pair in pairs):
+            return None
+        found, _, records = native.changed_accumulators(here, [(*pair, 1.0) for pair in pairs], how.threads)
+        tables = [(scales[0], here, records)]
+        tables += [
+            (scales[1 + i], ensembles[1 + i], own) for i, own in enumerate(own for pair in found for own in pair)
+        ]
+        of_sides = [
+            statistics_of(near, own) | {name: np.full(rows.size, size) for name, size in scale.items()}
+            for scale, near, own in tables
+        ]
+        for name, values in of_sides[0].items():
+            whole.setdefault(name, np.zeros(count, np.asarray(values).dtype))[rows] = values
+            for k, change in enumerate(changes if np.asarray(values).dtype == np.float64 else []):
+                change.setdefault(name, np.zeros(count))[rows] = of_sides[1 + 2 * k][name] - of_sides[2 + 2 * k][name]
+    return whole, changes
 
 
 def _value(system: System, name: str) -> float:
@@ -303,8 +330,9 @@ def _dataset(
         Diagnostic(
             "gradient.doubtful",
             f"{label}: estimated relative error of the derivative by "
-            f"{', '.join(f'{name} {each:.1g}' for name, each in large.items())}: an impact grazes, or begins or ends with the run, or the "
-            "motion is chaotic; change the parameter a little or the number of cycles",
+            f"{', '.join(f'{name} {each:.1g}' for name, each in large.items())}: an impact grazes, or begins or ends with the run, the "
+            "motion is chaotic, or the derivative is what is left of larger parts; change the parameter a little or the number of cycles, or "
+            "take accuracy = 'reference'",
             {"relative_error": max(large.values())},
         )
         for label, reason, errors in zip(labels, reasons, error, strict=True)

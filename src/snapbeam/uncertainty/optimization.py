@@ -561,8 +561,7 @@ class DesignProblem:
         if found is None or not reached(found[0]).all():
             return None
         self.trials.runs += numbers.size
-        scale, answers = self.trials.system.scale, []
-        units = {"": 1.0, "length_scale": scale.length, "velocity_scale": scale.length * scale.omega}
+        answers = []
         for each in self._parts:
             if each._quantity.kind == "design":
                 own = self._own(each, near)
@@ -573,8 +572,11 @@ class DesignProblem:
                 value, change = each.followed(runs, changes)
                 answers.append(self._sign(each) * np.append(value, change / distance))
             else:
-                unit, needed = units[each.scale], _share_for(each.required, self.validation_samples) * runs.size
-                value, change = each.followed(unit * runs, unit * changes, math.ceil(needed - 1e-9))
+                needed = _share_for(each.required, self.validation_samples) * runs.size
+                if each.scale:  # what runs have over a length or velocity of their own system
+                    unit, of_units = found[0][each.scale], np.array([change[each.scale] for change in found[1]])
+                    runs, changes = unit * runs, unit * changes + of_units * runs
+                value, change = each.followed(runs, changes, math.ceil(needed - 1e-9))
                 answers.append(np.append(value, change / distance))
         table = np.array(answers)
         return table[:, 0], table[:, 1:]

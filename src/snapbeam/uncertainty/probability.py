@@ -294,7 +294,8 @@ def probability_map(
 
 
 def _several(given: Any) -> list[Any]:
-    return [given] if np.ndim(given) == 0 else list(given)
+    given = given.tolist() if isinstance(given, np.ndarray) else given
+    return [given] if isinstance(given, (str, Mapping)) or not isinstance(given, Iterable) else list(given)
 
 
 def outcomes_of(given: Any, allocation: SamplingPlan) -> dict[str, Event]:
@@ -304,7 +305,7 @@ def outcomes_of(given: Any, allocation: SamplingPlan) -> dict[str, Event]:
 
 def statistics_of(given: Any) -> list[str]:
     """Names of statistics that are numbers, each once."""
-    return [number_statistic("statistics", each).name for each in dict.fromkeys(_several(given))]
+    return list(dict.fromkeys(number_statistic("statistics", each).name for each in _several(given)))
 
 
 def levels_of(given: Any) -> tuple[float, ...]:

@@ -155,6 +155,8 @@ def netcdf_stream(path: str | os.PathLike[str]) -> Iterator[tuple[h5netcdf.File,
     """Give what :func:`netcdf_file` gives, and the stream, which reserves room on the disk for a file that grows."""
     import h5netcdf
 
+    import snapbeam.util.datasets  # noqa: F401  (loaded before signals are held back)
+
     with held_back(), atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
         with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
             yield file, stream
@@ -255,6 +257,7 @@ class DiskStream(io.RawIOBase):
         try:
             self._file.seek(begin := max(self._reserved, self.size))
             while begin < self.size + more:
+                raise_held()
                 begin += self._file.write(zeros[: self.size + more - begin])
                 self._reserved = begin
         except OSError:

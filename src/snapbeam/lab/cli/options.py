@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import file_line, out
+from snapbeam.model.quantity import countable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,7 +89,7 @@ def open_signal(
     from snapbeam.lab.signal_files import read_channels, read_signal
 
     chosen: str | int | None = channel
-    if channel is not None and channel.isdigit():
+    if channel is not None and countable(channel):
         names = [entry["name"] for entry in read_channels(path, sampling_frequency, columns)]
         chosen = channel if channel in names else int(channel)
     return read_signal(

@@ -28,7 +28,7 @@ from snapbeam.lab.decay.window import find_centres, noise_fall, prepared, undone
 from snapbeam.lab.diagnostics import KINDS_DECAY
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.util.diagnostics import diagnostics_of
-from snapbeam.util.validation import InputError, choice, finite_array, integer, positive
+from snapbeam.util.validation import InputError, choice, finite_array, integer, positive, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -202,7 +202,7 @@ def _by_cycles(
 def _known_softening(level: float | None, units: str, frequency: float) -> tuple[float, float] | None:
     if level is None:
         return None
-    b = positive("buckling_level", level, "m")
+    b = within("buckling_level", level, 1e-12, 1e3, closed="both", unit="m")
     if units == "m":
         scale = b
     elif units == "m/s":
