@@ -367,7 +367,8 @@ class EdgeShape:
 
     ``misfit`` is the root mean square of what the blurred step leaves of it, share of the contrast; ``gamma`` the
     exponent of grey level over light that makes it symmetric, NaN if the sample is too small; ``shift`` the rows by
-    which the fitted edge lies outside that one, ``open`` their standard error where no curve is told but none excluded;
+    which the fitted edge lies outside that one, ``open`` their standard deviation over the curves that are not excluded
+    where none is told;
     ``clipped`` the share of saturated pixels in the middle of the beam.
     """
 

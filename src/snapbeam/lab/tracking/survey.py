@@ -188,7 +188,6 @@ _GRAIN = 4  # columns that share a grain of texture
 _CERTAIN = 30.0  # chi-square by which a bent edge must be worse than a straight one
 _LIKELY = 0.4  # |log gamma| of a curve that is taken before stronger ones
 _USUAL = 0.6  # standard deviation of log gamma of cameras with a curve
-_BENT = 0.09  # share of recordings with a curve, where edges leave it open
 _CENTRES = 24  # tried on either side of 0
 _GAMMAS = np.exp(np.linspace(math.log(0.25), math.log(4.0), 81))
 
@@ -229,7 +228,7 @@ def _symmetry(
 ) -> tuple[float, float, float, float]:
     """Gamma that makes the edge symmetric in light, its standard error, where its centre then lies, and what is open.
 
-    The centre is 0 where a linear camera will do; what curves that are not told may shift it by is open.  Texture, the
+    The centre is 0 where a linear camera will do; what curves that are not excluded shift it by is open.  Texture, the
     parts of the edge *by_grain*, that bends it as a curve does is no curve.
     """
     together = _together(x, error, by_grain)
@@ -264,7 +263,7 @@ def _symmetry(
     if worse > _CERTAIN:
         return gamma, gamma * log_se, float(centres[best]), 0.0
     likely_too = np.exp(-0.5 * ((scatter - scatter.min()) / unit + (np.log(_GAMMAS) / _USUAL) ** 2))
-    return gamma, gamma * log_se, 0.0, math.sqrt(_BENT * float(np.average(centres**2, weights=likely_too)))
+    return gamma, gamma * log_se, 0.0, math.sqrt(float(np.average(centres**2, weights=likely_too)))
 
 
 def _light(y: Floats, error: Floats, gamma: float, ratio: float, sign: float) -> tuple[Floats, Floats]:
