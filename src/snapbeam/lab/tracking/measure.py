@@ -838,7 +838,7 @@ def _within_windows(windows: Floats, position: Floats, width: float, centre: Flo
 _SURE_LAG = 4.0  # standard errors
 _LAG = 0.04  # of the square of the speed by which the square of the blur must exceed what the exposure explains
 _PULSE_ODDS = 9.0  # chi-square by which no blur must be the better explanation for a pulse to be as likely as none
-_SELDOM, _NEVER = 0.048, 1e-4  # probability of a pulse that counts at least, and below which it counts for nothing
+_SELDOM = 0.05  # probability of a pulse that an interval of two standard errors may leave out
 
 
 class ExposureBlur(NamedTuple):
@@ -883,9 +883,7 @@ def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> Exposur
         return nothing
     pulse = likely((more**2 - float(slope) ** 2) / error**2, _PULSE_ODDS)
     late = 0.5 * opened
-    # a pulse that edges do not show must not lie beyond five standard errors
-    counted = math.sqrt(max(pulse, _SELDOM)) if pulse > _NEVER else 0.0
-    return ExposureBlur(0.0, late if pulse > 0.5 else 0.0, late * counted)
+    return ExposureBlur(0.0, late if pulse > 0.5 else 0.0, late * math.sqrt(pulse) if pulse > _SELDOM else 0.0)
 
 
 def alternation(row: Floats) -> float:
