@@ -171,7 +171,7 @@ def test_background_between_a_fixed_line_and_the_beam_is_no_bar():
 def test_a_contact_bounds_the_curve_that_edges_leave_open(seen, spread):
     """The mean square of the shift by Bayes' rule, summed: none in 91 % of recordings, else normal about none."""
     shape, error = EdgeShape(0.01, 1.0, 0.3, 0.0, spread, 0.0), np.hypot(0.01, 0.03)
-    shift = np.linspace(-12.0 * spread, 12.0 * spread, 200_001)
+    shift = np.linspace(-12.0 * spread - 0.5, 12.0 * spread + 0.5, 200_001)
     curve = np.exp(-0.5 * ((shift / (2.0 * spread)) ** 2 + ((seen - shift) / error) ** 2))
     curve *= 0.09 / (2.0 * spread * np.sqrt(2.0 * np.pi)) * (shift[1] - shift[0])
     none = 0.91 * np.exp(-0.5 * (seen / error) ** 2)
