@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from snapbeam.lab import open_recording
-from snapbeam.lab.tracking.diagnostics import never_touching
+from snapbeam.lab.tracking.diagnostics import never_touching, open_shift
 from snapbeam.lab.tracking.frame_order import find_order
-from snapbeam.lab.tracking.measure import exposure_blur, find_rest
+from snapbeam.lab.tracking.measure import Touch, exposure_blur, find_rest
+from snapbeam.lab.tracking.settings import EdgeShape
 from snapbeam.lab.tracking.survey import border_bar
 from snapbeam.util.diagnostics import diagnostics_of
 
@@ -163,6 +164,20 @@ def test_background_between_a_fixed_line_and_the_beam_is_no_bar():
         frame[line : line + 4] = True
         frame[beam : beam + 12] = True
     assert border_bar(~light) == 0
+
+
+@pytest.mark.parametrize("seen", [0.0, 0.04, -0.1, 0.3])
+@pytest.mark.parametrize("spread", [0.02, 0.15, 0.4])
+def test_a_contact_bounds_the_curve_that_edges_leave_open(seen, spread):
+    """The mean square of the shift by Bayes' rule, summed: none in 91 % of recordings, else normal about none."""
+    shape, error = EdgeShape(0.01, 1.0, 0.3, 0.0, spread, 0.0), np.hypot(0.01, 0.03)
+    shift = np.linspace(-12.0 * spread - 0.5, 12.0 * spread + 0.5, 200_001)
+    curve = np.exp(-0.5 * ((shift / (2.0 * spread)) ** 2 + ((seen - shift) / error) ** 2))
+    curve *= 0.09 / (2.0 * spread * np.sqrt(2.0 * np.pi)) * (shift[1] - shift[0])
+    none = 0.91 * np.exp(-0.5 * (seen / error) ** 2)
+    expected = np.sqrt((curve * shift**2).sum() / (curve.sum() + none))
+    assert open_shift(shape, Touch(seen, 0.01, 8), 0.03) == pytest.approx(expected, rel=1e-4)
+    assert open_shift(shape, Touch(np.nan, np.nan, 0), 0.03) == pytest.approx(0.3 * 2.0 * spread)
 
 
 def test_a_gap_of_two_pixels_is_no_contact_unless_the_tip_merges():

@@ -46,7 +46,7 @@ class MapComparison:
     >>> axes = {"frequency_ratio": [1.0, 1.2], "velocity_amplitude": [0.02, 0.1, 0.2]}
     >>> dataset = sb.sweep(system, axes, sb.Integration(cycles=20))
     >>> measured = sb.MeasuredPoints(
-    ...     frequency_ratio=[1.0, 1.2], velocity_amplitude=[0.02, 0.2], location=[0.4762, 0.4762], response_class=[0, 3]
+    ...     frequency_ratio=[1.0, 1.2], velocity_amplitude=[0.02, 0.02], location=[0.4762, 0.4762], response_class=[0, 3]
     ... )
     >>> comparison = lab.compare_measured_points(measured, dataset)
     >>> comparison.agreement

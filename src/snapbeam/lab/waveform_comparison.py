@@ -453,9 +453,9 @@ def measure_response(
     >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.005)
     >>> shaker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> system = sb.System(model, contacts=[sb.Contact(paper.CONTACT, shaker)])
-    >>> run = sb.simulate(system, sb.Integration(cycles=20))
-    >>> lab.measure_response(run.dataset, cycles=20).zero_crossings
-    16
+    >>> run = sb.simulate(system, sb.Integration(cycles=8))
+    >>> lab.measure_response(run.dataset, cycles=8).zero_crossings
+    8
     """
     choice("at", at, _PLACES)
     check_trajectory(run, require=(at,))

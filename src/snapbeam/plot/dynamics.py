@@ -345,6 +345,8 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None, *, per: str = "s
     ----------
     dataset : xarray.Dataset
         Of :func:`snapbeam.dynamics.lyapunov_spectrum` or :func:`snapbeam.dynamics.largest_lyapunov`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
     per : {"second", "period"}
         Unit of time: 1 s, or one period of the excitation.
 
@@ -452,6 +454,8 @@ def plot_multipliers(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     ----------
     dataset : xarray.Dataset
         Of ``to_dataset`` of a :class:`snapbeam.dynamics.PeriodicOrbit` or a :class:`snapbeam.dynamics.Branch`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
 
     Examples
     --------
@@ -517,6 +521,8 @@ def plot_backbone(
     ----------
     datasets : xarray.Dataset or sequence of xarray.Dataset
         Of :func:`snapbeam.dynamics.backbone_curve`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
     labels : sequence of str, optional
         Of the curves, in a legend; the wells by default if there are several.
 
@@ -657,6 +663,8 @@ def plot_attractors(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     ----------
     dataset : xarray.Dataset
         Of :meth:`snapbeam.dynamics.Attractors.to_dataset`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
 
     Examples
     --------
@@ -696,6 +704,8 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str | None = No
     ----------
     dataset : xarray.Dataset
         Of :func:`snapbeam.dynamics.poincare_section`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
     x : {"midspan_displacement", "displacement_at_striker", "drive_phase"}, optional
         By default the displacement of mid-span, once a period; the phase of the drive, at impacts or a level.
 

@@ -38,6 +38,8 @@ def plot_force_displacement(dataset: xr.Dataset, ax: Axes | None = None) -> Axes
     ----------
     dataset : xarray.Dataset
         Of :func:`snapbeam.force_displacement`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
 
     Examples
     --------
@@ -153,6 +155,8 @@ def plot_equilibrium_branches(
     ----------
     dataset : xarray.Dataset
         Of :func:`snapbeam.model.equilibrium_branches`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
     variable : {"midspan_displacement", "natural_frequency"}
         Displacement of the centre, or first natural frequency of the stable parts, which is 0 where one ends.
 

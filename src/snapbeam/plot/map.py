@@ -78,6 +78,8 @@ def plot_response_map(
     dataset : xarray.Dataset
         Map with ``response_class`` over one or two axes of more than one point, or a list of points
         (:func:`plot_points`).
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
     measurements : MeasuredPoints, optional
         Measured responses, drawn as dots in the colours of their classes. Those at another value of the map's fixed
         coordinate (by more than 2 %) are left out, with a warning.
@@ -331,6 +333,8 @@ def plot_statistic(
         Map, or a result of :func:`snapbeam.dynamics.hysteresis`, drawn as two lines.
     name : str
         Name of a variable over the axes; over an axis of seeds its mean, with the interval over one other axis.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
     log : bool, optional
         True for powers of ten; by default where the values span more than two.
     over : str, optional
@@ -537,6 +541,8 @@ def plot_points(
         Result of :func:`snapbeam.sweep` over a list of points.
     name : str
         Name of a variable over the points.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
     across, upward : str, optional
         Parameters along the axes; by default two of those that differ.
     measurements, quasi_static_line

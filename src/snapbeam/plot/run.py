@@ -74,6 +74,13 @@ def across(dataset: xr.Dataset) -> tuple[str, str]:
 def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, modes: int = 5) -> Axes:
     """Draw the amplitudes of the first *modes* buckling modes, over that of the well.
 
+    Parameters
+    ----------
+    run : Run or xarray.Dataset
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
+    modes : int
+
     Examples
     --------
     >>> import snapbeam as sb

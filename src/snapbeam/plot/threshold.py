@@ -42,6 +42,8 @@ def plot_threshold(
     dataset : xarray.Dataset
         Result of :func:`snapbeam.threshold` along one axis, or a curve for each point of a second; without an axis the
         classes along the parameter are drawn.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; new ones by default.
     quasi_static : bool
         True for the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed, of a system that it describes.
     legend : bool

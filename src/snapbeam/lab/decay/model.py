@@ -41,7 +41,7 @@ _LOWEST = 4.0  # least amplitude of a usable cycle, in standard deviations of it
 _CERTAIN = 30.0  # chi-square by which a second law must better the fit
 _MOST = 0.45  # of the viscous rate that laws which are not told may put in doubt; more is no damping
 _ODDS = 8.0  # chi-square at which an explanation is as likely as none: its parameter, and that it is rare
-_BEYOND = ((2.0, 0.0455), (5.0, 0.01))  # standard errors, and the probability beyond that may be left to no law
+_BEYOND = ((2.0, 0.0455), (4.0, 0.002))  # standard errors, and the probability beyond that may be left to no law
 _FEW = 4  # amplitudes below which a record tells nothing of its law
 _SHARE = 0.9  # of the probability of all forms, that one of the list must have
 _SMOOTH = 8  # degree of the polynomial that a residual of amplitudes is tested with
@@ -411,7 +411,8 @@ def find_law(
     """The law of damping that the amplitude of each cycle shows, its doubt, and what it leaves over the noise.
 
     The doubt is half the reach about the damping ratio at zero amplitude, over that ratio, that holds all forms but 4.55 %
-    of their probability: how far a curve may turn below the amplitudes of the record.  *start* [s] is where the decay begins, *decay_rate* [1/s] a guess
+    of their probability, or a quarter of that which holds all but .2 %: how far a curve may turn below the amplitudes of
+    the record.  *start* [s] is where the decay begins, *decay_rate* [1/s] a guess
     of the viscous rate, *bend* the change of ln a by softening at the start and its standard deviation.
     """
     t = cycles.time - start
@@ -445,10 +446,6 @@ def find_law(
     zero = np.array([one.found[2] for one in forms])
     within = np.array([one.spread[2] for one in forms])
 
-    def doubt(value: float, own: float) -> float:
-        variance = float(weights @ ((zero - value) ** 2 + within**2) / weights.sum()) - own**2
-        return math.sqrt(max(variance, 0.0)) / value
-
     def probable(value: float, own: float) -> float:
         def beyond(reach: float) -> float:
             return float(weights @ (ndtr((value - reach - zero) / within) + ndtr((zero - value - reach) / within)))
@@ -469,13 +466,13 @@ def find_law(
             for w, one in zip(weights[3:], free, strict=True)
         ) / float(weights[3:].sum())
         curve = np.maximum(curve / mean, _LEAST_DAMPING)
-        return DampingLaw("free", float(curve[0] - 1.0), 0.0, curve), doubt(mean, 0.0), unit
+        return DampingLaw("free", float(curve[0] - 1.0), 0.0, curve), probable(mean, 0.0), unit
     changed = abs(usual.found[2] / plain.found[2] - 1.0)
     if not certain or name == "viscous" or changed < _MATTERS:
         return DampingLaw(), min(probable(float(plain.found[2]), float(plain.spread[2])), _MOST), unit
     strength = float(usual.found[3] / usual.found[2])
     error = float(usual.spread[3] / usual.found[2])
-    return DampingLaw(name, strength, error), doubt(float(usual.found[2]), float(usual.spread[2])), unit
+    return DampingLaw(name, strength, error), probable(float(usual.found[2]), float(usual.spread[2])), unit
 
 
 def _regressions(design: _Array, aim: _Array, weight: _Array, bend: tuple[float, float]) -> tuple[list[_Form], float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from snapbeam.lab.decay.model import likely
 from snapbeam.lab.diagnostics import holding, table
 from snapbeam.lab.tracking.frame_order import FrameOrder
 from snapbeam.lab.tracking.measure import ExposureBlur, Rest, Touch, TrackedRows
@@ -128,6 +129,7 @@ _FASTEST = (30.0, 3.0)  # m/s of beam and shaker
 _CLOSE = 3.0  # px of gap that is no contact, of a tip that merges with the beam
 _NEAR = 1.2  # px of gap that is no contact, of another one
 _STRIKER = 0.5  # share of the frames in which the striker must be found
+_BENT = 0.09  # share of recordings with a curve, where edges leave it open
 _CONTACT = 6  # stretches of frames in contact from which an offset is told
 _LEVELS = 16.0  # grey levels of contrast
 _EVENED = 0.4  # grey levels of noise that even out their rounding
@@ -204,6 +206,21 @@ def contact_shift(touch: Touch, known: float) -> float:
     shift = abs(touch.penetration)
     told = touch.frames >= _CONTACT and shift > max(6.0 * touch.error, 4.0 * known, 0.06)
     return shift if told else 0.0
+
+
+def open_shift(shape: EdgeShape, touch: Touch, known: float) -> float:
+    """Standard error [px] of the shaker against the beam by curves of the camera that edges and contact leave open.
+
+    *known* is as in :func:`contact_shift`.  Without a contact a curve is as probable as it is rare.
+    """
+    far, share = 2.0 * shape.open, _BENT
+    if touch.frames and far > 0.0:
+        error = math.hypot(touch.error, known)
+        wide = math.hypot(far, error)
+        gain = (touch.penetration / error) ** 2 - (touch.penetration / wide) ** 2 - 2.0 * math.log(wide / error)
+        share = likely(gain, -2.0 * math.log(_BENT / (1.0 - _BENT)))
+        far = far / wide * math.hypot(far / wide * touch.penetration, error)
+    return math.sqrt(share) * far
 
 
 def rounding_shift(beam: BeamView) -> float:

@@ -367,13 +367,16 @@ class EdgeShape:
 
     ``misfit`` is the root mean square of what the blurred step leaves of it, share of the contrast; ``gamma`` the
     exponent of grey level over light that makes it symmetric, NaN if the sample is too small; ``shift`` the rows by
-    which the fitted edge lies outside that one; ``clipped`` the share of saturated pixels in the middle of the beam.
+    which the fitted edge lies outside that one, ``open`` their standard deviation over the curves that are not excluded
+    where none is told;
+    ``clipped`` the share of saturated pixels in the middle of the beam.
     """
 
     misfit: float
     gamma: float
     gamma_se: float
     shift: float
+    open: float
     clipped: float
 
 

@@ -187,6 +187,7 @@ _MIRRORED = 5e-4  # of the contrast to which the halves of an edge are alike
 _GRAIN = 4  # columns that share a grain of texture
 _CERTAIN = 30.0  # chi-square by which a bent edge must be worse than a straight one
 _LIKELY = 0.4  # |log gamma| of a curve that is taken before stronger ones
+_USUAL = 0.6  # standard deviation of log gamma of cameras with a curve
 _CENTRES = 24  # tried on either side of 0
 _GAMMAS = np.exp(np.linspace(math.log(0.25), math.log(4.0), 81))
 
@@ -199,7 +200,7 @@ def edge_shape(
     *fit* is what :func:`fit_edges` made of them, *clipped* the share of saturated pixels in the middle of the beam.
     """
     data, position = windows[good], fit.position[good]
-    unknown = EdgeShape(math.nan, math.nan, math.nan, _CLIPPED_SHIFT if clipped > CLIPPED else 0.0, clipped)
+    unknown = EdgeShape(math.nan, math.nan, math.nan, _CLIPPED_SHIFT if clipped > CLIPPED else 0.0, 0.0, clipped)
     if data.shape[0] < _LEAST:
         return unknown
     rows = data.shape[-1]
@@ -218,17 +219,17 @@ def edge_shape(
     dark = level if sign > 0 else -(level + contrast)
     ratio = float(np.median(dark / contrast))  # the dark side's grey level over the contrast
     if not ratio > 1e-3:
-        return EdgeShape(misfit, math.nan, math.nan, 0.0, clipped)
-    gamma, error_of_gamma, shift = _symmetry(x, y, error, ratio, sign, by_grain)
-    return EdgeShape(misfit, gamma, error_of_gamma, shift, clipped)
+        return EdgeShape(misfit, math.nan, math.nan, 0.0, 0.0, clipped)
+    return EdgeShape(misfit, *_symmetry(x, y, error, ratio, sign, by_grain), clipped)
 
 
 def _symmetry(
     x: Floats, y: Floats, error: Floats, ratio: float, sign: float, by_grain: Floats
-) -> tuple[float, float, float]:
-    """Gamma that makes the edge symmetric in light, its standard error, and where its centre then lies.
+) -> tuple[float, float, float, float]:
+    """Gamma that makes the edge symmetric in light, its standard error, where its centre then lies, and what is open.
 
-    The centre is 0 where a linear camera will do.  Texture, the parts of the edge *by_grain*, that bends it as a curve does is no curve.
+    The centre is 0 where a linear camera will do; what curves that are not excluded shift it by is open.  Texture, the
+    parts of the edge *by_grain*, that bends it as a curve does is no curve.
     """
     together = _together(x, error, by_grain)
     outer = np.abs(x) > 0.8 * np.abs(x).max()
@@ -259,8 +260,10 @@ def _symmetry(
     spread = np.log(_GAMMAS[alike & (np.abs(np.log(_GAMMAS / _GAMMAS[best])) < _LIKELY)])
     log_se = max(0.5 * float(np.ptp(spread)), 0.5 * math.log(_GAMMAS[1] / _GAMMAS[0]))
     gamma = float(_GAMMAS[best])
-    shift = float(centres[best]) if worse > _CERTAIN else 0.0
-    return gamma, gamma * log_se, shift
+    if worse > _CERTAIN:
+        return gamma, gamma * log_se, float(centres[best]), 0.0
+    likely_too = np.exp(-0.5 * ((scatter - scatter.min()) / unit + (np.log(_GAMMAS) / _USUAL) ** 2))
+    return gamma, gamma * log_se, 0.0, math.sqrt(float(np.average(centres**2, weights=likely_too)))
 
 
 def _light(y: Floats, error: Floats, gamma: float, ratio: float, sign: float) -> tuple[Floats, Floats]:

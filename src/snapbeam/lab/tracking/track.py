@@ -16,6 +16,7 @@ from snapbeam.lab.tracking.diagnostics import (
     SeenMotion,
     contact_shift,
     never_touching,
+    open_shift,
     rounding_shift,
     tracking_diagnostics,
 )
@@ -121,7 +122,9 @@ def tracked_dataset(
     )
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
-    bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
+    bent = math.hypot(
+        2.0 * scene.shape.shift, max(contact_shift(touch, placed), open_shift(scene.shape, touch, placed)), placed
+    )
     apart = 0.0 if shaker is None or shaker.certain else never_touching(penetration, rows)
     loose = 0.0 if shaker is None else shaker.loose
     bent = math.hypot(bent, apart, loose, rounding_shift(scene.beam), 2.0 * rows.hollow)
