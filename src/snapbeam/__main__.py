@@ -5,15 +5,17 @@ from __future__ import annotations
 import io
 import sys
 
-from snapbeam.util import interrupts, memory_limit
+from snapbeam.util import interrupts
 
 
 def main() -> None:
     """Run the program."""
+    interrupts.install()  # before the imports of the program, which take seconds
+    from snapbeam.util import memory_limit
+
     for stream in (sys.stdout, sys.stderr):  # where the locale has no micro sign: escapes
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    interrupts.install()  # before the imports of the program, which take seconds
     memory_limit.refuse_libraries_without_room()
     try:
         from snapbeam.cli.app import main as run

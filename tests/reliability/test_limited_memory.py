@@ -73,3 +73,21 @@ def test_the_need_grows_with_the_threads(monkeypatch):
 def test_without_a_limit_nothing_is_said_of_one(monkeypatch):
     monkeypatch.setattr(memory_limit, "limit", lambda: float("inf"))
     assert memory_limit.not_sufficient("a word") == "the memory is not sufficient (a word)"
+
+
+@pytest.mark.parametrize(
+    "name, loaded, room", [("linalg", "special", 100), ("special", "linalg", 100), ("special", "", 400)]
+)
+def test_either_loader_of_scipys_blas_needs_room_once(monkeypatch, name, loaded, room):
+    """Without it the library tries for ever to get memory."""
+    for each in ("linalg", "special"):
+        monkeypatch.delitem(sys.modules, f"scipy.{each}", raising=False)
+    monkeypatch.setattr(memory_limit, "_used", lambda: 0)
+    monkeypatch.setattr(memory_limit, "_blas_threads", lambda: 2)
+    monkeypatch.setattr(memory_limit, "limit", lambda: 100 * 10**6)
+    with pytest.raises(MemoryError):
+        memory_limit._Room().find_spec(f"scipy.{name}", None)
+    if loaded:
+        monkeypatch.setitem(sys.modules, f"scipy.{loaded}", sys)
+    monkeypatch.setattr(memory_limit, "limit", lambda: room * 10**6)
+    assert memory_limit._Room().find_spec(f"scipy.{name}", None) is None

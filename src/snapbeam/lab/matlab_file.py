@@ -9,6 +9,7 @@ import io
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import zlib
@@ -23,6 +24,8 @@ from snapbeam.util.validation import InputError
 
 _LONGEST = 60.0
 """Seconds for a small file."""
+_WORK = 6
+"""Seconds of processor time for a small file: SciPy does not end if sizes of version 4 are negative."""
 _SLOWEST = 1e6
 """Bytes of a file for each further second."""
 
@@ -34,7 +37,7 @@ def read_version_5(path: Path) -> dict[str, Any]:
     ------
     InputError
         If the file cannot be read, its content is out of proportion (:func:`~snapbeam.util.input_files.refuse_inflated`),
-        or its reader crashes or takes over 60 s and a second for each megabyte.
+        or its reader crashes or takes over 6 s of processor time, or 60 s, and a second for each megabyte.
     """
     longest = _LONGEST + path.stat().st_size / _SLOWEST
     folders = os.pathsep.join(each or os.getcwd() for each in sys.path)
@@ -50,6 +53,8 @@ def read_version_5(path: Path) -> dict[str, Any]:
         )
     except subprocess.TimeoutExpired:
         raise InputError(f"{path}: is damaged: its reader did not end within {longest:.0f} s") from None
+    if ended.returncode and -ended.returncode == getattr(signal, "SIGXCPU", 0):
+        raise InputError(f"{path}: is damaged: its reader did not end within {_work(path)} s of processor time")
     line, _, content = ended.stdout.partition(b"\n")
     if ended.returncode or not line:
         raise InputError(f"{path}: is damaged: its reader crashed (status {ended.returncode})")
@@ -58,6 +63,10 @@ def read_version_5(path: Path) -> dict[str, Any]:
         raise InputError(found["refused"])
     stream = io.BytesIO(content)
     return {name: np.lib.format.read_array(stream, allow_pickle=False) for name in found["names"]}
+
+
+def _work(path: Path) -> int:
+    return _WORK + math.ceil(path.stat().st_size / _SLOWEST)
 
 
 def _load(path: Path) -> dict[str, Any]:
@@ -84,18 +93,16 @@ def _load(path: Path) -> dict[str, Any]:
 
 
 def _stated_size(path: Path) -> int:
-    """Bytes of the variables of a MATLAB file of version 4 or 5 as its headers state them, 8 for a number.
+    """Bytes of the variables of a MATLAB file of version 4 or 5 as its headers state them, 8 for a number or an element.
 
-    The numbers of structures and cells are not counted in any header: each may take one byte in the file.
+    The numbers in structures and cells are not counted in any header: each may take one byte in the file.
     """
     from scipy.io import whosmat
 
-    arrays = {"double", "single", "logical", "char", "sparse"} | {
-        f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)
-    }
     variables = whosmat(path)
-    size = sum(8 * math.prod(map(int, shape)) for _, shape, kind in variables if kind in arrays)
-    if all(kind in arrays - {"sparse"} for *_, kind in variables):
+    size = sum(8 * abs(math.prod(map(int, shape))) for _, shape, _ in variables)
+    arrays = {"double", "single", "logical", "char"}
+    if all(kind in arrays or kind.lstrip("u").startswith("int") for *_, kind in variables):
         return size
     with open(path, "rb") as file:
         order: Literal["little", "big"] = "little" if file.read(128)[126:] == b"IM" else "big"
@@ -115,6 +122,7 @@ def _send(path: Path) -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_CPU, (_work(path), _work(path) + 1))
     output = sys.stdout.buffer
     try:
         values = _load(path)

@@ -13,10 +13,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:  # each takes milliseconds, in which a signal ends the program without a word
+    from pathlib import Path
 
 WORDS = "interrupted; no file was left half written"
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -26,13 +27,13 @@ _LONGEST = 5.0
 """Seconds after which the program ends if the main thread has not reacted, as in a call of a library that does not end."""
 
 
-@dataclass
 class _Held:
     """Signals that wait for the end of a block, and the incomplete files to remove if the program cannot wait."""
 
-    handlers: dict[int, Callable[[int, FrameType | None], object]] = field(default_factory=dict)
-    waiting: list[int] = field(default_factory=list)
-    incomplete: set[Path] = field(default_factory=set)
+    def __init__(self) -> None:
+        self.handlers: dict[int, Callable[[int, FrameType | None], object]] = {}
+        self.waiting: list[int] = []
+        self.incomplete: set[Path] = set()
 
 
 class _State:

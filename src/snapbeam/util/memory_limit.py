@@ -19,8 +19,10 @@ _LIBRARY = 24 * MB
 _LIBRARIES = {"h5py": 60 * MB, "av": 200 * MB, "cv2": 250 * MB}
 _THREAD = 45 * MB
 """Address space of a thread of OpenBLAS: its buffer and its stack."""
-_BLAS = {"numpy": 60 * MB, "scipy.linalg": 100 * MB}
-"""Modules that load an OpenBLAS each, and their address space without its threads."""
+_BLAS = {"numpy": 60 * MB, "scipy": 100 * MB}
+"""Packages that have an OpenBLAS each, and their address space without its threads."""
+_LOADERS = {"numpy": ("numpy",), "scipy.linalg": (_SCIPY := ("scipy.linalg", "scipy.special")), "scipy.special": _SCIPY}
+"""Modules that load it, with those after which it is loaded.  The loader does not end if it finds no room for a buffer."""
 _PROGRAM = 850 * MB
 """Address space that suffices for commands on the paper's beam, with figures and animations, without threads of OpenBLAS."""
 
@@ -82,8 +84,8 @@ class _Room(MetaPathFinder):
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: object = None) -> None:
         need = _LIBRARIES.get(name, _LIBRARY)
-        if name in _BLAS:
-            need = _BLAS[name] + _THREAD * _blas_threads()
+        if not sys.modules.keys() & set(_LOADERS.get(name, sys.modules)):
+            need = _BLAS[name.partition(".")[0]] + _THREAD * _blas_threads()
         used = _used()
         if used is not None and limit() - used < need:
             raise MemoryError
