@@ -188,7 +188,10 @@ def main() -> None:
         system = SYSTEMS[key].system()
         earlier = {name for other in list(SYSTEMS)[: list(SYSTEMS).index(key)] for name in swept_names(other)}
         names = [name for name in swept_names(key) if name not in earlier or name.partition(".")[0] not in COMMON]
-        if system.base_excitation is not None and type(system.base_excitation.motion).name == "chirp":
+        if system.base_excitation is not None and type(system.base_excitation.motion).name in (
+            "chirp",
+            "acceleration_chirp",
+        ):
             names.remove("base_excitation.striker_on_base")  # a sweep is refused under a striker in space
         if "contact.suspension_damping" in names and not system.get("contact.suspension_stiffness"):
             names.remove("contact.suspension_damping")  # of a suspension, which a mass in flight has not

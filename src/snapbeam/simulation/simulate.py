@@ -206,6 +206,10 @@ def _causes(system: System, integration: Integration) -> str:
     return f"the step follows from the highest mode, the strongest damping{contact}; fewer cycles take less time"
 
 
+_UNBALANCED = (RunStatus.INTERRUPTED, RunStatus.DIVERGED)
+"""The balance is closed at the end of a run alone, and beyond the range of a law a force may be infinite."""
+
+
 def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any) -> dict[str, Any]:
     """Return the attributes of a run that ended."""
     lasted = run.end / run.period
@@ -215,8 +219,7 @@ def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any
     attrs = attributes_of("run of a struck bistable beam", run.system, run.integration, run.plan, more)
     attrs["gross_work"] = float(accumulators_of_runs["gross_work"][0])
     missed, scale = _energy_balance(accumulators_of_runs)
-    # the balance is closed at the end of a run alone
-    attrs["energy_error"] = math.nan if summary.status is RunStatus.INTERRUPTED else missed / scale
+    attrs["energy_error"] = math.nan if summary.status in _UNBALANCED else missed / scale
     if run.accuracy is not None:
         attrs |= run.accuracy.attributes()
     return attrs
@@ -224,7 +227,7 @@ def run_attributes(run: Prepared, summary: RunSummary, accumulators_of_runs: Any
 
 def tell_imbalance(run: Prepared, summary: RunSummary, accumulators_of_runs: Any) -> None:
     """Report an energy-balance error of a run that ended."""
-    if summary.status in (RunStatus.INTERRUPTED, RunStatus.DIVERGED):
+    if summary.status in _UNBALANCED:
         return
     missed, scale = _energy_balance(accumulators_of_runs)
     rounding = float(rounding_energy(run.ensemble, accumulators_of_runs)[0])
