@@ -131,6 +131,15 @@ class Attractor:
     See Also
     --------
     snapbeam.dynamics.find_attractors, snapbeam.dynamics.Attractors
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> found = sb.dynamics.find_attractors(system, 12)
+    >>> [(each.kind, each.period) for each in found.attractors]
+    [('periodic', 1), ('periodic', 1), ('periodic', 1)]
     """
 
     kind: str
@@ -171,6 +180,15 @@ class Attractors:
     See Also
     --------
     snapbeam.dynamics.find_attractors, snapbeam.dynamics.basins_of_attraction
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> found = sb.dynamics.find_attractors(system, 12)
+    >>> found.undecided
+    0.0
     """
 
     flow: Flow
@@ -322,8 +340,6 @@ def find_attractors(
     >>> from snapbeam import paper
     >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
-    >>> [(each.kind, each.period) for each in found.attractors], found.undecided
-    ([('periodic', 1), ('periodic', 1), ('periodic', 1)], 0.0)
     >>> f"{found.unseen_share():.2f}"  # upper bound at 95 % of the fraction of states that go to other attractors
     '0.22'
     """

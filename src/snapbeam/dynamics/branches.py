@@ -49,6 +49,16 @@ class SpecialPoint:
     See Also
     --------
     snapbeam.dynamics.switch_branch, snapbeam.dynamics.bifurcation_curve
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
+    >>> [(point.kind, round(point.value, 4)) for point in branch.special_points]
+    [('fold', 0.0379)]
     """
 
     kind: str
@@ -73,6 +83,16 @@ class Branch:
     See Also
     --------
     snapbeam.dynamics.continuation, snapbeam.dynamics.SpecialPoint
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=5)
+    >>> len(branch.orbits), branch.termination_reason
+    (5, '5 orbits, the maximum (max_points)')
     """
 
     name: str
@@ -419,11 +439,9 @@ def continuation(
     >>> from snapbeam import paper
     >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
-    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
-    >>> len(branch.orbits), branch.termination_reason
-    (12, '12 orbits, the maximum (max_points)')
-    >>> [(point.kind, round(point.value, 4)) for point in branch.special_points]
-    [('fold', 0.0379)]
+    >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.032))
+    >>> float(branch.values.max())
+    0.032
     """
     low, high = interval("bounds", bounds)
     begun = orbit.flow.value(name)
