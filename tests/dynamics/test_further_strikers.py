@@ -193,7 +193,7 @@ def test_tangents_are_derivatives(modes: int, snaps: bool) -> None:
     damping = float((system.model.damping_ratio * system.model.omega).sum())
     exact = -2.0 * damping * 4.0 * math.pi / (RATIO * omega)
     start = sb.State(amplitude=at, velocity=rate)
-    for accuracy, bound in (("standard", 5e-5), ("reference", 1e-8)):
+    for accuracy, bound in (("standard", 5e-4), ("reference", 1e-8)):
         gone = sb.advance(system, start, 2, changes, integration=sb.Integration(accuracy=accuracy))
         columns = np.concatenate((gone.tangent[:, 0], gone.tangent[:, 1] / omega), axis=1)
         assert np.linalg.slogdet(columns)[1] == pytest.approx(exact, abs=bound)
@@ -295,7 +295,7 @@ def test_questions_of_dynamics() -> None:
     assert any(each.orbit is not None for each in found.attractors)
     grid = {"amplitude[1]": np.linspace(-1.2, 1.2, 4), "velocity[1]": [-0.1, 0.1]}
     with pytest.warns(sb.DiagnosticWarning, match=r"undecided .* search for further attractors"):
-        basin = sb.dynamics.basins_of_attraction(found, grid, periods=100).basin
+        basin = sb.dynamics.basins_of_attraction(found, grid, periods=50).basin
     assert basin.shape == (4, 2) and int(basin.max()) >= 0
     diagram = sb.dynamics.bifurcation_diagram(
         system, "drive.2.velocity_amplitude", [0.04, 0.05], periods=(100, 8), grazing=True
