@@ -154,7 +154,19 @@ def sources(entry, max_steps):
     if entry == "integrate":
         return [[each.problem, each.batch] for each in fresh]
     tangents = [native._differentiated(each.ensemble) for each in fresh]
-    return [[each.problem, each.batch, each.no_change()] for each in tangents]
+    return [[each.problem, each.batch, each.no_change() | of_all_runs(each)] for each in tangents]
+
+
+def of_all_runs(each):
+    """Derivatives of the structure and of the pieces of its signals, which a call may leave out."""
+    n, pieces = each.order.size, each.batch["pieces"]
+    shapes = {
+        "structure": (len(native._ROWS), n),
+        "scalars": (len(native._SCALARS),),
+        "G": (n, n),
+        "pieces": pieces.shape,
+    }
+    return {name: np.zeros((_core.DIRECTIONS, *shape)) for name, shape in shapes.items()}
 
 
 def others_of(rng, entry):
@@ -296,3 +308,16 @@ def test_memory_stays_while_the_core_computes(name):
 
     with pytest.raises(KeyboardInterrupt):
         _core.integrate(fresh.problem, fresh.batch, "thread", "", 1, progress)
+
+
+@pytest.mark.parametrize("name", ["structure", "scalars", "G", "pieces", "jumps"])
+def test_derivatives_of_another_shape_are_refused(name):
+    """The structure's come together; each has the shape of what it belongs to."""
+    problem, batch, seeds = sources("integrate_tangents", 200)[2]
+    wrong = seeds | {name: np.zeros((*seeds[name].shape, 2))}
+    with pytest.raises(ValueError, match=rf"tangent\['{name}'\] has shape"):
+        _core.integrate_tangents(problem, batch, wrong, "", 1, None)
+    if name in ("scalars", "G"):
+        del wrong[name]
+        with pytest.raises(ValueError, match=rf"tangent\['{name}'\] is missing"):
+            _core.integrate_tangents(problem, batch, wrong, "", 1, None)
