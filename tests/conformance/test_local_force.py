@@ -233,7 +233,7 @@ def test_coulomb_friction_of_an_oscillator():
 
 @pytest.mark.parametrize("own", [False, True])
 @pytest.mark.parametrize("seed", range(3))
-def test_friction_that_turns_over_within_a_fraction_of_a_flight_step(own: bool, seed: int, friction) -> None:
+def test_friction_that_reverses_within_a_fraction_of_a_flight_step(own: bool, seed: int, friction) -> None:
     """A force too small to damp, of velocities that pass zero in a short time: the steps resolve that time."""
     rng = np.random.default_rng([40, seed])
     modes = 2 + seed

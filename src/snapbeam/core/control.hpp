@@ -17,7 +17,7 @@ namespace SNAPBEAM_SET {
 
 constexpr double GRADING = 0.5, RELEASE = 0.5, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
 constexpr double CONTACT_TURN[3] = {0.5, 0.35, 0.35};  // of each composition
-constexpr double TURNOVER[3] = {1.0, 0.5, 0.5}, TURNED_OVER = 4.0;
+constexpr double REVERSAL[3] = {1.0, 0.5, 0.5}, SLIDING = 4.0;  // friction reverses: change of speed in a step, and speed above which it slides, over the scale
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 template <class L> constexpr int MOST_CORRECTIONS = L::directions > 0 ? 30 : CORRECTIONS;  // of a state the error is of second order, of derivatives of first
 
@@ -407,11 +407,11 @@ template <class L> struct Group {
                 // towards the end of its range, where a force may be infinite, a share of the way
                 const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.numbers()) - c.x, c.x - law.low(c.numbers())); });
                 want = min(want, by_stiffness);
-                const Real turnover = with_law(c.law, [&](auto law) {
+                const Real reversal = with_law(c.law, [&](auto law) {
                     if constexpr (law.contact) return Real(INFINITY);
-                    else return value(law.turnover(c.numbers()));
+                    else return value(law.reversal(c.numbers()));
                 });
-                if (any(turnover < Real(NEVER))) want = min(want, by_turnover(c, turnover));
+                if (any(reversal < Real(NEVER))) want = min(want, by_reversal(c, reversal));
                 if (any(value(space) < Real(NEVER))) want = min(want, Real(NEARER) * value(space) / (abs(value(dot<L>(c.row, z.p, n))) * z.tick));
                 continue;
             }
@@ -439,12 +439,12 @@ template <class L> struct Group {
         const Marks changed = alive & differ(ticks, key);
         if (any(changed)) new_flows(changed, level, again | landing);
     }
-    // Ticks in which a speed along a row changes by a share of that in which a force turns over, or comes as near to zero as that.
-    SNAPBEAM_SELDOM Real by_turnover(const Channel<L> &c, Real turnover) {
+    // Ticks in which the speed along a row changes by a share of the scale over which friction reverses, or falls to where it begins to.
+    SNAPBEAM_SELDOM Real by_reversal(const Channel<L> &c, Real reversal) {
         for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].begun);
         const Number bend = acceleration_along(z, c, z.q, z.p, z.k, -1);
-        const Real away = max(abs(value(dot<L>(c.row, z.p, s->size()))) - Real(TURNED_OVER) * turnover, Real(0.0));
-        return fma(Real(TURNOVER[problem->composition]), turnover, away) / (max(abs(value(bend)), Real(1e-300)) * z.tick);
+        const Real away = max(abs(value(dot<L>(c.row, z.p, s->size()))) - Real(SLIDING) * reversal, Real(0.0));
+        return fma(Real(REVERSAL[problem->composition]), reversal, away) / (max(abs(value(bend)), Real(1e-300)) * z.tick);
     }
     // Steps in which a circuit neither follows the beam nor changes slowly.
     SNAPBEAM_FN Marks half_resolved(Real length) const {

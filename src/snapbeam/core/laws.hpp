@@ -12,7 +12,7 @@
 //   pressing(x, y, P)      of a lossy contact: what has the sign of the force, smooth down to x = 0
 //   low(P), high(P)        displacements between which it is valid (of a force)
 //   loss(x, y, f, P)       power lost by the force f (of a force)
-//   turnover(P)            speed above which the force hardly changes with y, of one that turns over with y (of a force); else infinite
+//   reversal(P)            of friction, speed scale over which it reverses with the sign of y: v_0 of tanh(y/v_0); else infinite (of a force)
 //
 // affine: the force is linear in y;  contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force
 // is the channel's signal;  state(P): place among the numbers of a state of the law's own, or -1;  rough: bounds may be largest anywhere.
@@ -53,7 +53,7 @@ template <int NUMBERS> struct ForceLaw {
     static constexpr bool contact = false, lossy = false, timed = false, affine = false, memory = false, impulsive = false, rough = false;
     template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T loss(T, T y, T f, const T *) { return -(f * y); }
-    template <class T> static SNAPBEAM_FN T turnover(const T *) { return T(INFINITY); }
+    template <class T> static SNAPBEAM_FN T reversal(const T *) { return T(INFINITY); }
     template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
@@ -186,7 +186,7 @@ struct CoulombFriction : ForceLaw<2> {  // f = -F tanh(v / v_0)
     static constexpr bool lossy = true;
     template <class T> static SNAPBEAM_FN T force(T, T v, const T *P) { return -(P[0] * tanh(v / P[1])); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return P[0] / P[1]; }
-    template <class T> static SNAPBEAM_FN T turnover(const T *P) { return P[1]; }
+    template <class T> static SNAPBEAM_FN T reversal(const T *P) { return P[1]; }
 };
 struct LinearDamping : ForceLaw<1> {  // f = -c v, as of a circuit without inertia
     static constexpr bool lossy = true, affine = true;
@@ -210,9 +210,9 @@ struct Timed : ForceLaw<0> {  // the signal of the channel: a force, the acceler
 };
 
 // Laws of a user: functions of the host, called run by run.  Their addresses are the first numbers, bit for bit; null: none, as in a
-// lane without a run.  Then the range, the step of differences (0: 1e-5 of x, or no elastic part), the turnover, and how many numbers follow.
+// lane without a run.  Then the range, the step of differences (0: 1e-5 of x, or no elastic part), the speed scale of a reversal, and how many numbers follow.
 struct User {
-    enum Number : int { ELASTIC, ENERGY, SLOPE, LOSSY, DAMPING, YIELD, GROWN, LOW, HIGH, SPAN, TURNOVER, COUNT, OWN, MOST = OWN + 55 };
+    enum Number : int { ELASTIC, ENERGY, SLOPE, LOSSY, DAMPING, YIELD, GROWN, LOW, HIGH, SPAN, REVERSAL, COUNT, OWN, MOST = OWN + 55 };
     typedef double (*Function)(double x, double y, const double *numbers);
 
     static Function function(int which, const double *P) {
@@ -320,7 +320,7 @@ struct UserLossyForce : UserForce {
     static constexpr bool lossy = true;
     template <class T> static SNAPBEAM_FN T force(T u, T v, const T *P) { return User::each(u, v, P, User::whole); }
     template <class T> static SNAPBEAM_FN T damping(T u, T v, const T *P) { return User::each(u, v, P, User::greatest_damping); }
-    template <class T> static SNAPBEAM_FN T turnover(const T *P) { return P[User::TURNOVER]; }
+    template <class T> static SNAPBEAM_FN T reversal(const T *P) { return P[User::REVERSAL]; }
     template <class T> static SNAPBEAM_FN T loss(T u, T v, T f, const T *P) {
         return any(P[User::SPAN] > T(0.0)) ? (UserForce::force(u, v, P) - f) * v : -(f * v);
     }

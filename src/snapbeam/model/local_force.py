@@ -249,10 +249,10 @@ class LocalForce:
         places = self.displacements(largest, 17).tolist()
         return max(abs(damping(numbers, u, s * v)) for u in places for v in speeds for s in (1.0, -1.0))
 
-    def turnover(self, largest: float, fastest: float) -> float:
-        """Speed at which the damping coefficient is 1/cosh(1)^2 of that at rest, m/s: v_0 of friction F_c tanh(v/v_0).
+    def reversal_speed(self, largest: float, fastest: float) -> float:
+        """Speed scale over which friction reverses, m/s: v_0 of F_c tanh(v/v_0).
 
-        Infinite where the coefficient stays larger up to *fastest*.
+        At this speed the damping coefficient is 1/cosh(1)^2 of that at rest. Infinite where it stays larger up to *fastest*.
         """
         numbers, damping = self.numbers, type(self).damping_coefficient
         place = float(self.displacements(largest, 3)[1])

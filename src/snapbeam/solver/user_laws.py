@@ -212,12 +212,12 @@ def local_force(force: LocalForce, largest: float, fastest: float) -> UserLaw:
         [*elastic, None, *lossy, None, None],
         limits,
         span if force.is_conservative else 0.0,
-        min(force.turnover(largest, fastest), _FAR),
+        min(force.reversal_speed(largest, fastest), _FAR),
         kind.is_limited(),
     )
 
 
-def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float, turnover: float, limited: bool = False) -> UserLaw:  # fmt: skip
+def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float, reversal: float, limited: bool = False) -> UserLaw:  # fmt: skip
     numbers = kind.numbers_type()
     count = len(numbers._fields)
     if count > MOST_NUMBERS:
@@ -235,4 +235,4 @@ def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, flo
     addresses = struct.unpack(
         f"{len(made)}d", struct.pack(f"{len(made)}Q", *(each.address if each else 0 for each in made))
     )
-    return UserLaw(core, functions, (*addresses, low, high, span, turnover, float(count)), limited)
+    return UserLaw(core, functions, (*addresses, low, high, span, reversal, float(count)), limited)
