@@ -301,3 +301,48 @@ def test_an_indentation_is_a_coordinate_but_orbits_are_not_isolated() -> None:
     for tool in (sb.dynamics.periodic_orbit, sb.dynamics.find_attractors):
         with pytest.raises(sb.InputError, match="orbits and attractors are not isolated"):
             tool(system)
+
+
+REVERSIBLE: dict[str, Any] = {
+    "a contact": {},
+    "other ends": {"modes": 3, "damping": 0.2},
+    "two tones": {"drive": SINE + sb.Sine(frequency_ratio=2.6, velocity_amplitude=0.03, phase=0.4)},
+    "a body": {"striker": {"mass": 0.02, "suspension_stiffness": 700.0}},
+    "a power law": {"law": sb.PowerLaw(force_at_1um=0.1, exponent=1.4)},
+    "a spring and a magnet": {"forces": [SPRING, sb.MagneticForce(strength=2e-9, gap=8e-4, location=0.4)]},
+    "a moving base": {
+        "base_excitation": sb.BaseExcitation(
+            motion=sb.AccelerationSine(frequency_ratio=1.3, acceleration_amplitude=2.0)
+        )
+    },
+    "a changing load": {
+        "axial_load": sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=1.3, amplitude=0.5))
+    },
+}
+IRREVERSIBLE: dict[str, Any] = {
+    "a damped contact": {"law": sb.KelvinVoigt(linear_stiffness=2e5, linear_damping=2.0)},
+    "Newton's law": {"modes": 1, "law": sb.Restitution(0.8)},
+    "a circuit": {"harvesters": [PIEZO]},
+    "friction": {"forces": [sb.CoulombFriction(friction_force=1e-3, smoothing_velocity=1e-3, location=0.4)]},
+}
+
+
+@pytest.mark.parametrize("name", REVERSIBLE)
+def test_motion_back_in_time_is_the_inverse_map(name: str) -> None:
+    """States through impacts and back, and the product of both derivatives, which is the identity."""
+    flow = Stroboscope(system_of(**REVERSIBLE[name]), PRECISE)
+    back = flow.inverse
+    assert back is not None and back.inverse is not None and not back.inverse.backward
+    start = settled(flow) + 0.02 * np.random.default_rng(3).normal(size=(12, flow.dimension))
+    eye = np.broadcast_to(np.eye(flow.dimension), (12, flow.dimension, flow.dimension))
+    came = flow.advance(start, tangents=eye)
+    assert (came.statistics["impacts"] > 0).any()
+    returned = back.advance(came.states, tangents=came.tangents)
+    amplified = 1.0 + np.linalg.norm(np.linalg.inv(came.tangents), axis=(1, 2))
+    assert (np.abs(returned.states - start).max(axis=1) < 1e-9 * amplified).all()
+    assert (np.abs(returned.tangents - eye).max(axis=(1, 2)) < 1e-9 * amplified**2).all()
+
+
+@pytest.mark.parametrize("name", IRREVERSIBLE)
+def test_motion_that_has_no_inverse_in_time_is_not_integrated_backwards(name: str) -> None:
+    assert Stroboscope(system_of(**IRREVERSIBLE[name]), sb.Integration()).inverse is None

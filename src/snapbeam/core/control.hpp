@@ -735,7 +735,7 @@ template <class L> struct Group {
             const Real noise = c.impulsive ? Real(NOISE) * (abs(value(c.tip_slope)) + abs(r1 - value(c.tip_slope))) * step * z.tick : Real(0.0);
             const Marks unsafe = open & (!(z.t + ticks <= c.safe) | !(d1 <= noise));
             if (any(unsafe)) {
-                if (!have_amplitudes) amplitudes(z, amplitude), have_amplitudes = true;
+                if (!have_amplitudes) amplitudes(z, amplitude, Real(TRUST) * step * z.tick), have_amplitudes = true;
                 const Marks near = may_close(c, unsafe, touching);
                 if (any(near)) {
                     totals.sum[snapbeam::SAMPLED_STEPS] += select(near, Number(1.0), Number(0.0));

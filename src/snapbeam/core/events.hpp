@@ -92,13 +92,17 @@ template <class L, class Row, class Cell = typename L::Cell> SNAPBEAM_CALLED typ
     return L::total(sum);
 }
 
-// Amplitudes (p^2 + omega^2 q^2)^(1/2) of the modes at the beginning of the step, at most 1.09 times as large: a + (2^(1/2) - 1) b, a >= b.
-template <class L> SNAPBEAM_FN void amplitudes(const Runs<L> &z, typename L::Plain *amplitude) {
+// Bounds of (p^2 + omega^2 q^2)^(1/2) of the modes within a horizon (s), at most 1.09 times as large at its beginning: a + (2^(1/2) - 1) b,
+// a >= b, times the growth of modes without damping but with its opposite.
+template <class L> SNAPBEAM_FN void amplitudes(const Runs<L> &z, typename L::Plain *amplitude, typename L::Real horizon) {
     SNAPBEAM_LOOP
     for (int i = 0; i < z.s->size(); ++i) {
         const typename L::Plain oq = abs(value(z.s->omega[i]) * value(z.q[i])), p = abs(value(z.p[i]));
         amplitude[i] = fma(typename L::Plain(0.4142135623730952), min(oq, p), max(oq, p));
     }
+    if (!(z.s->growth > 0.0)) return;
+    const typename L::Plain most = typename L::Plain(exp(horizon * typename L::Real(z.s->growth)));
+    for (int i = 0; i < z.s->size(); ++i) amplitude[i] = amplitude[i] * most;
 }
 
 // Bound of the sum of a channel's signals, of which *of* gives that of each.

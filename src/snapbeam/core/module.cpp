@@ -149,7 +149,7 @@ static Problem problem_of(Arguments &a) {
     p.omega = a.array<double>("omega", {n}), p.sigma = a.array<double>("sigma", {n});
     p.G = a.array<double>("G", {n, n}), p.g = a.array<double>("g", {n}), p.gamma = a.number("gamma", 0.0, 1e300);
     for (size_t i = 0; i < n; ++i)
-        if (p.omega[i] < 0.0 || p.sigma[i] < 0.0) a.refuse(p.omega[i] < 0.0 ? "omega" : "sigma", "must not be negative");
+        if (p.omega[i] < 0.0) a.refuse("omega", "must not be negative");
     p.shift = a.optional<double>("shift", {n}), p.far_force = a.optional<double>("far_force", {n});
     p.second = a.optional<double>("second", {n}), p.high = a.optional<double>("high", {n}), p.beam = a.array<double>("beam", {n});
     p.lift = a.number("lift", -1e300, 1e300);

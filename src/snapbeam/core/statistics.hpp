@@ -406,7 +406,7 @@ template <class L> struct Totals {
         u = v = c = cv = Real(0.0);
         const auto long_step = Real(s->fastest) * value(z.h) > Real(0.3);  // in a shorter one the errors are below 2e-5
         if (!any(long_step)) return;
-        amplitudes(z, amplitude);
+        amplitudes(z, amplitude, value(z.h));
         Plain su = Plain(0.0), sv = Plain(0.0), sc = Plain(0.0), scv = Plain(0.0);
         const Plain h = Plain(value(z.h));
         SNAPBEAM_LOOP

@@ -81,7 +81,7 @@ template <class L> struct Structure {
     const Problem *problem;
     Composition composition;
     int cells, padded;
-    double fastest;                                // angular frequency
+    double fastest, growth;                        // greatest angular frequency, and rate at which a mode grows, 1/s
     Held<int, BLOCKS> first, count, mode_first, mode_count;  // of each block: cells and modes
     Held<int, CELLS> place;                                  // of each mode in the padded order
     typedef Held<typename L::Shared, CELLS> Row;
@@ -123,12 +123,12 @@ template <class L> struct Structure {
             set_coefficient<L>(omega, i, 1.0);
             for (int j = 0; j < padded; ++j) set_coefficient<L>(G + long(j) * cells, i, 0.0);
         }
-        fastest = 0.0;
+        fastest = growth = 0.0;
         for (int i = 0; i < p.modes; ++i) {
             const int at = place[i];
             for (int k = 0; k < ROWS; ++k)
                 if (given[k]) set_coefficient<L>(*rows[k], at, given[k][i]);
-            fastest = p.omega[i] > fastest ? p.omega[i] : fastest;
+            fastest = p.omega[i] > fastest ? p.omega[i] : fastest, growth = -p.sigma[i] > growth ? -p.sigma[i] : growth;
             for (int j = 0; j < p.modes; ++j) set_coefficient<L>(G + long(place[j]) * cells, at, p.G[long(i) * p.modes + j]);
         }
         if constexpr (L::directions > 0)

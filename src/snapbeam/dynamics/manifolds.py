@@ -3,7 +3,8 @@
 A branch of the one-dimensional manifold of a saddle x* with the multiplier sigma and its eigenvector v is covered by the images of
 one fundamental segment, x* + delta sigma^s v with 0 <= s < 1: the point of age k + s is P^k of it.  Points are inserted into
 the segment wherever neighbours at that age are too far apart, or the curve turns too much between them (Hobson, J. Comput.
-Phys. 104 (1993) 14).  The stable manifold is that of the inverse map, whose points are found by Newton's method along the curve.
+Phys. 104 (1993) 14).  The stable manifold is that of the inverse map: the motion backwards in time, or, of a system without
+such a motion and of a map, what Newton's method finds along the curve.
 """
 
 from __future__ import annotations
@@ -102,12 +103,13 @@ class _Segment(NamedTuple):
         return self.saddle + self.factor ** ages[:, None] * self.vector
 
     def image(self, states: _Array, near: _Array) -> _Array:
-        """Images of states; under the inverse map they are sought from *near*, and NaN where Newton's method fails.
+        """Images of states; under the inverse map Newton's method seeks them from *near*, and they are NaN where it fails.
 
         The map of a flow is one to one, so that a state that is found is the inverse image.
         """
-        if not self.inverse:
-            return self.flow.advance(states, self.periods).states
+        backward = self.flow.inverse if self.inverse and isinstance(self.flow, Stroboscope) else None
+        if not self.inverse or backward is not None:
+            return (backward or self.flow).advance(states, self.periods).states
         x, left = near.copy(), np.arange(len(states))
         found, size = np.full_like(x, np.nan), np.full(len(states), np.inf)
         eye = np.eye(x.shape[1])
@@ -275,8 +277,8 @@ def invariant_manifold(
     max_points : int
         Maximum number of points of each branch.
     max_seconds : float, optional
-        Time limit, s, after which both branches end; none by default. Points of a stable manifold take longer (Newton's
-        method).
+        Time limit, s, after which both branches end; none by default. A stable manifold takes longer where the motion has
+        no inverse in time (circuits, damped contacts, friction) or where *orbit* is that of a map: Newton's method.
     progress : callable, optional
         Called as ``progress(share)`` with the share of the length; True prints it with the time left.
 
@@ -483,8 +485,7 @@ def homoclinic_tangency(
     tolerance : float
         Width of the bracket over that of *bounds*, between 1e-9 and 0.5.
     max_seconds : float, optional
-        Time limit of the search, s; none by default. Each value takes the time of two manifolds, about ten seconds for
-        a struck beam.
+        Time limit of the search, s; none by default. Each value takes the time of two manifolds.
     progress : callable, optional
         Called as ``progress(share)`` with the share of the values; True prints it with the time left.
 

@@ -48,6 +48,8 @@ class Stroboscope:
     system: System
     integration: Integration = field(default_factory=Integration)
     phase: float | None = None
+    backward: bool = False
+    """True of the inverse map, which integrates backwards in time."""
 
     def __post_init__(self) -> None:
         instance("system", self.system, System, "a System")
@@ -93,6 +95,12 @@ class Stroboscope:
     def refined(self) -> Stroboscope:
         """The flow at accuracy level "reference"."""
         return replace(self, integration=self.integration.replace(accuracy="reference", step=None))
+
+    @cached_property
+    def inverse(self) -> Stroboscope | None:
+        """The inverse map; None if a part of the system, as a damped contact, cannot be integrated backwards in time."""
+        possible = native.reversed_in_time(make_ensemble(self.system, self.integration)) is not None
+        return replace(self, backward=not self.backward) if possible else None
 
     @property
     def with_half_step(self) -> Stroboscope:
@@ -199,7 +207,10 @@ class Stroboscope:
         if own:
             self.clock.require_period(own)
         how = self.during(periods)
-        return make_ensemble(self.system, how, own, start=begun.flat, periods=how.cycles)
+        ensemble = make_ensemble(self.system, how, own, start=begun.flat, periods=how.cycles)
+        found = native.reversed_in_time(ensemble) if self.backward else ensemble
+        assert found is not None
+        return found
 
     def slope(self, x: _Array, periods: int, values: Mapping[str, float], name: str, step: float) -> _Array:
         """Derivative by one of the parameters of the runs of where the map brings one state, shape (d,).
@@ -228,6 +239,9 @@ class Stroboscope:
     ) -> AdvancedStates:
         ensemble = self._ensemble(begun, periods, points or {})
         seen = engine_of(ensemble).integrate_with_output_states(ensemble, self.integration.threads)
+        if self.backward:  # when a contact began is known forwards alone: its penetration decides
+            ticks = np.where(seen.contact_ticks > 0.0, np.nan, seen.contact_ticks)
+            seen = seen._replace(p=-seen.p, contact_ticks=ticks)
         status = seen.accumulators_of_runs["status"]
         failed = ~np.isin(status, _REACHED)
         if begun.statistics is not None:
@@ -263,7 +277,9 @@ class Stroboscope:
     ) -> _Array:
         """Small changes of shape (runs, k, d) of the coordinates at the end of runs, NaN of those that failed."""
         q, p = self.space.modal_directions(ensemble)
-        q, p = native.tangents(ensemble, tangents @ q, tangents @ p, self.integration.threads, beside)
+        sense = -1.0 if self.backward else 1.0
+        q, p = native.tangents(ensemble, tangents @ q, tangents @ (sense * p), self.integration.threads, beside)
+        p = sense * p
         one, none = np.ones(q.shape[:2], np.int64), np.zeros_like(q)
         found: _Array = self.space.of_modal(ensemble, q, p, one) - self.space.of_modal(ensemble, none, none, one)
         found[failed] = np.nan

@@ -42,7 +42,7 @@ def states_of(
         striker_position=np.where(
             runs["offset"] > FAR_AWAY, structure.sign * (runs["rest_contact"] + runs["offset"]), np.nan
         ),
-        contact_time=np.where(contact_ticks >= 0, contact_ticks * tick[:, None], -1.0),
+        contact_time=np.where(contact_ticks < 0, -1.0, contact_ticks * tick[:, None]),
         striker_shift=structure.bodies_of(q),
         striker_rate=structure.bodies_of(p),
         indentation=structure.indentations_of(q),

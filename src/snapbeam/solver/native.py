@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +84,27 @@ def layout_of(ensemble: Ensemble) -> str:
     if ensemble.structure.omega.size > FEW_MODES:
         return "modes"
     return "runs" if ensemble.size > 1 else "thread"
+
+
+def reversed_in_time(ensemble: Ensemble) -> Ensemble | None:
+    """The runs with time reversed: velocities and damping change sign, and A sin(rate t + phase) becomes A sin(rate t + pi - phase).
+
+    None where a part has no such inverse: a force that depends on the velocity or has a memory, a circuit, another motion
+    than sines.
+    """
+    channels, structure = ensemble.channels, ensemble.structure
+    if channels is None or structure.circuits or structure.indentations or np.isin(channels.laws, _core.LOSSY).any():
+        return None
+    if channels.kinds.any() or channels.jumps.size:
+        return None
+    signals = channels.signals.copy()
+    signals[:, :, 3] = math.pi - signals[:, :, 3]
+    return replace(
+        ensemble,
+        structure=replace(structure, damping_ratio=-structure.damping_ratio),
+        channels=replace(channels, signals=signals),
+        starts=ensemble.starts * np.array([1.0, -1.0])[:, None],
+    )
 
 
 class _Arrays:
