@@ -80,3 +80,17 @@ def test_bad_records_are_refused():
         sb.Striker(drive=sb.RecordedMotion(displacement=wave, velocity=wave[:-1], **good))
     with pytest.raises(sb.InputError, match="must be finite"):
         sb.Striker(drive=sb.RecordedMotion(displacement=np.full(9, np.nan), velocity=np.zeros(9), **good))
+
+
+def test_samples_reach_the_end_of_the_last_cycle_whatever_ticks_it_lies_between(tmp_path):
+    """A run ends on a tick: up to 1.4e-9 of its length from the end of the cycles that are asked for."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.03)
+    for ratio in np.linspace(0.9, 1.6, 15):
+        drive = sine_record(model, ratio, 0.01, 3)
+        times = np.linspace(0.0, 2.0 / drive.drive.frequency, 41)
+        system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, drive)])
+        run = sb.simulate(system, sb.Integration(cycles=2), sample_times=times)
+        assert run.dataset["time"].values == pytest.approx(times, abs=1e-8 * times[-1])
+        run.save(tmp_path / f"{ratio}.nc", content="states")
+        stored = sb.load(tmp_path / f"{ratio}.nc")
+        assert stored.dataset["cycle"].values == pytest.approx([0.0, 1.0, 2.0], abs=1e-8)

@@ -54,7 +54,7 @@ def save_run(run: Run, path: str | os.PathLike[str], content: str = CONTENTS[0])
 
 def _whole_cycles(cycle: NDArray[np.float64]) -> NDArray[np.intp]:
     """The samples at the starts of cycles, or nearest to them, one for each."""
-    wanted = np.arange(np.ceil(cycle[0] - 1e-9), np.floor(cycle[-1] + 1e-9) + 1.0)
+    wanted = np.arange(np.ceil(cycle[0] - 1e-6), np.floor(cycle[-1] + 1e-6) + 1.0)
     after = np.clip(np.searchsorted(cycle, wanted), 1, cycle.size - 1)
     return np.unique(np.where(wanted - cycle[after - 1] <= cycle[after] - wanted, after - 1, after))
 

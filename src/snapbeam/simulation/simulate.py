@@ -191,7 +191,7 @@ def prepared(system: System, integration: Integration, sample_times: ArrayLike |
     ensemble = make_ensemble(system, integration, plan=plan)
     end = float(ensemble.runs["tick"][0]) * int(ensemble.runs["end"][0])
     period = cycle_of(system)
-    times = None if sample_times is None else _checked_times(sample_times, end)
+    times = None if sample_times is None else _checked_times(sample_times, end, float(ensemble.runs["tick"][0]))
     count = _regular_count(system, end, period) if times is None else times.size
     steps = float(ensemble.runs["end"][0]) / SUBDIVISION
     tell(long_run(system.model.modes, plan.step, steps, _causes(system, integration)))
@@ -321,13 +321,14 @@ def check_memory(system: System, samples: int, with_contacts: bool) -> None:
         )
 
 
-def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
+def _checked_times(sample_times: ArrayLike, end: float, tick: float) -> _Array:
+    """Sample times of a run, whose end is that of its cycles to a *tick* (s)."""
     times = finite_array("sample_times", sample_times, 1).copy()
     if times.size == 0:
         raise InputError("sample_times = []: must contain at least one time")
     if (np.diff(times) <= 0.0).any():
         raise InputError("sample_times: must be strictly increasing")
-    if times[0] < 0.0 or times[-1] > end * (1.0 + 1e-9):
+    if times[0] < 0.0 or times[-1] > end * (1.0 + 1e-9) + tick:
         raise InputError(f"sample_times from {times[0]:g} to {times[-1]:g} s: must lie within the run, 0 to {end:g} s")
     return times
 
