@@ -19,6 +19,7 @@ _PARTS = {
     "dynamics": "dynamics",
     "systems": "systems",
     "fixed-steps": "fixed_steps",
+    "calls": "calls",
 }
 
 

@@ -22,7 +22,7 @@ __all__ = ["METHODS", "Program"]
 
 _Array = NDArray[np.float64]
 _INSTANTS = 20  # a cycle, at which e5 is measured
-_LANES = 8
+_LANES = 32
 
 
 class _Beam(ctypes.Structure):
@@ -73,7 +73,7 @@ class Program:
         return out / self.scale
 
     def advance(self, cycles: int) -> None:
-        """Integrate all runs: eight at a time of one mode, else one after the other."""
+        """Integrate all runs: those of one mode side by side, else one after the other."""
         beam = ctypes.byref(self.beam)
         if self.modes > 1:
             for run, steps in zip(self.runs, self.steps, strict=True):
@@ -81,7 +81,7 @@ class Program:
             return
         for i in range(0, len(self.runs), _LANES):
             runs = (_Run * _LANES)(*self.runs[i : i + _LANES])
-            _LIBRARY.integrate_eight(beam, runs, (ctypes.c_int * _LANES)(*self.steps[i : i + _LANES]), cycles)
+            _LIBRARY.integrate_many(beam, runs, (ctypes.c_int * _LANES)(*self.steps[i : i + _LANES]), cycles)
 
 
 def _prepare(case: Case, step: float) -> Solver:
