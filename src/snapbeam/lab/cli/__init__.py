@@ -1,5 +1,7 @@
 """Commands of the laboratory part."""
 
+from snapbeam.parts import installed_parts
+
 COMMANDS = {
     "track": "snapbeam.lab.cli.track:track",
     "vibrometer": "snapbeam.lab.cli.vibrometer:vibrometer",
@@ -8,5 +10,5 @@ COMMANDS = {
     "calibrate": "snapbeam.lab.cli.calibrate:calibrate",
     "compare": "snapbeam.lab.cli.compare:compare",
     "process-tests": "snapbeam.lab.cli.process_tests:process_tests",
-}
+} | ({"look": "snapbeam.lab.cli.look:look"} if "explorer" in installed_parts() else {})
 """Module and function of each command, by name."""
