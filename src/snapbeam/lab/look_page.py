@@ -142,8 +142,8 @@ class LookPage(Tab):
             words = "in the file" if stated[name] is not None else f"not in the file{'; ' if hint else ''}{hint}"
             words = "in the file of settings" if name in sections["camera"] else words
             self.source_of[name] = Html(FAINT.format(words), width=170, margin=(0, 10))
-        self.length = pn.widgets.TextInput(name="Length of the line, mm", width=110)
-        self.centred = pn.widgets.Checkbox(name="between the centres of two marks", align="end")
+        self.length = pn.widgets.TextInput(name="Length of the line, mm", width=170)
+        self.centred = pn.widgets.Checkbox(name="between the centres of two marks", margin=(30, 10, 5, 10))
         self.frame = pn.widgets.IntSlider(name="Frame", start=0, end=max(self.count - 1, 1), sizing_mode="stretch_width")
         self.frame.param.watch(lambda _: self.post(self.show), "value")
         self.way = pn.widgets.RadioButtonGroup(options=list(_WAYS), margin=(5, 10))
@@ -166,7 +166,7 @@ class LookPage(Tab):
             "xs", "ys", source=self.lines, line_color="color", line_dash="dash", line_width=2, legend_field="name"
         )
         third = [self.width / 3 - 0.5, 2 * self.width / 3 - 0.5]
-        self.line = ColumnDataSource({"x": third, "y": [self.height / 2 - 0.5] * 2}, name="line")
+        self.line = ColumnDataSource({"x": third, "y": [self.height / 8] * 2}, name="line")
         self.contact = ColumnDataSource({"x": [], "y": []}, name="contact")
         self.marks = ColumnDataSource({name: [] for name in ("left", "right", "top", "bottom")}, name="marks")
         accent = self.look.accent
@@ -197,8 +197,8 @@ class LookPage(Tab):
         )
         plot.toolbar_location = None
         for side in ("left", "right", "top", "bottom"):
-            self.box.on_change(side, lambda *_: self.post(self._region_drawn))
-        self.line.on_change("data", lambda *_: self.post(self._measure))
+            self.box.on_change(side, lambda attr, old, new: self.post(self._region_drawn))
+        self.line.on_change("data", lambda attr, old, new: self.post(self._measure))
         legend(plot, self.look)
 
     def _laid_out(self) -> Any:
@@ -219,7 +219,10 @@ class LookPage(Tab):
             return button(name, self.post, lambda: self._told(work), **options)
 
         def row(*parts: Any) -> Any:
-            return pn.FlexBox(*parts, align_items="flex-end", **wide)
+            return pn.FlexBox(*parts, **wide)
+
+        def stated(name: str) -> Any:
+            return pn.Column(field[name], self.source_of[name], margin=0)
 
         scale = press("Set the pixel size", self.take_scale, width=150)
         tip = press("Set tip to sticker", self.take_tip, width=150)
@@ -228,15 +231,14 @@ class LookPage(Tab):
         self.command = Html("", sizing_mode="stretch_width", css_classes=["look-command"])
         right = pn.Column(
             Html(HEADING.format("Scale")),
-            row(pn.Column(field["pixel_size"], self.source_of["pixel_size"], margin=0), self.length, self.centred),
+            row(stated("pixel_size"), self.length, self.centred),
             self.measured, row(scale, tip),
             Html(HEADING.format("Time")),
-            row(pn.Column(field["frame_rate"], self.source_of["frame_rate"], margin=0), field["frames"]),
-            row(begin, end, field["rest_frames"]),
+            row(stated("frame_rate"), field["frames"], field["rest_frames"]), row(begin, end),
             Html(HEADING.format("Scene")),
             row(field["region"], field["threshold"]), row(field["side"], field["objects"]),
-            row(field["shaker"], field["marker"]), row(field["tip_distance"]),
-            row(field["buckling_level"], field["location"]),
+            row(field["shaker"], field["marker"]),
+            row(field["tip_distance"], field["buckling_level"], field["location"]),
             row(
                 press("Find beam and shaker", self.find, width=170),
                 press("Write the settings", self.write, width=170, button_type="primary"),
