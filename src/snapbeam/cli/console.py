@@ -298,11 +298,7 @@ _NO_PARAMETERS = frozenset(
 
 def _defaults(arguments: Mapping[str, Any], context: typer.Context) -> list[Path]:
     """The paths among the arguments of a command that were not given."""
-    return [
-        each
-        for name, each in arguments.items()
-        if isinstance(each, Path) and _is_default(name, context)
-    ]
+    return [each for name, each in arguments.items() if isinstance(each, Path) and _is_default(name, context)]
 
 
 def _is_default(name: str, context: typer.Context) -> bool:

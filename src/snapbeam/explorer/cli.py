@@ -16,8 +16,7 @@ from snapbeam.util.validation import InputError
 COMMANDS = {"explore": "snapbeam.explorer.cli:explore"}
 """Module and function of each command, by name."""
 Port = Annotated[
-    int | None,
-    typer.Option(help="Port; by default 8760 or the next free one; 0 for any free one.", min=0, max=65535),
+    int | None, typer.Option(help="Port; by default 8760 or the next free one; 0 for any free one.", min=0, max=65535)
 ]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
 

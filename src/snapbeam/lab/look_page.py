@@ -11,15 +11,7 @@ from typing import Any
 import numpy as np
 import panel as pn
 from bokeh.document import Document
-from bokeh.models import (
-    BoxAnnotation,
-    BoxEditTool,
-    ColumnDataSource,
-    CustomJS,
-    LinearColorMapper,
-    PointDrawTool,
-    Range1d,
-)
+from bokeh.models import BoxAnnotation, BoxEditTool, ColumnDataSource, LinearColorMapper, PointDrawTool, Range1d
 from markupsafe import Markup
 
 from snapbeam.explorer.address import Address
@@ -30,7 +22,7 @@ from snapbeam.lab.camera import Recording, pixel_size_from_marks
 from snapbeam.lab.cli.options import rest_of, whole_numbers
 from snapbeam.lab.image_sources import open_source
 from snapbeam.lab.look import moved, opened_with, write_look
-from snapbeam.lab.plot.tracking import BEAM_MARK, NEAR_MARK, SHAKER_MARK, STICKER_MARK, edge_lines
+from snapbeam.lab.plot.tracking import BEAM_MARK, SHAKER_MARK, STICKER_MARK, edge_lines
 from snapbeam.lab.tracking.first_look import first_look
 from snapbeam.lab.tracking.settings import SIDES, TrackingSettings
 from snapbeam.lab.tracking.track import edges_in
@@ -144,7 +136,9 @@ class LookPage(Tab):
             self.source_of[name] = Html(FAINT.format(words), width=170, margin=(0, 10))
         self.length = pn.widgets.TextInput(name="Length of the line, mm", width=170)
         self.centred = pn.widgets.Checkbox(name="between the centres of two marks", margin=(30, 10, 5, 10))
-        self.frame = pn.widgets.IntSlider(name="Frame", start=0, end=max(self.count - 1, 1), sizing_mode="stretch_width")
+        self.frame = pn.widgets.IntSlider(
+            name="Frame", start=0, end=max(self.count - 1, 1), sizing_mode="stretch_width"
+        )
         self.frame.param.watch(lambda _: self.post(self.show), "value")
         self.way = pn.widgets.RadioButtonGroup(options=list(_WAYS), margin=(5, 10))
 

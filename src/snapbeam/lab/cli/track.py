@@ -216,9 +216,7 @@ def _opened(path: Path, camera: dict[str, Any], scale_marks: str | None) -> Reco
 
 
 @contextmanager
-def _first_look_at(
-    path: Path, camera: dict[str, Any], look: tuple[TrackingSettings, int, Path]
-) -> Iterator[None]:
+def _first_look_at(path: Path, camera: dict[str, Any], look: tuple[TrackingSettings, int, Path]) -> Iterator[None]:
     """Write the first look at a recording that cannot be opened or tracked beside the output, unless that is a figure."""
     from snapbeam.lab.camera import open_recording
     from snapbeam.util.validation import InputError

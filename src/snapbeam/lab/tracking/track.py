@@ -306,7 +306,7 @@ def track(
     wanted = (settings or TrackingSettings()).changed(**changes)
     wanted = wanted.checked_for(recording.shape, len(recording))
     sample, head = _sample(recording)
-    scene, prepare = find_scene(recording, wanted, sample, head)
+    scene, prepare = _find_scene(recording, wanted, sample, head)
     marks = _FixedMarks(sample[:head], wanted, prepare.turn)
     background = _Background(prepare(sample[:head]), measure_beam(scene.beam, prepare(sample)).row, scene, wanted)
     follower = Follower(scene, wanted.blur_limit)
@@ -328,21 +328,23 @@ def track(
     return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields, background.moves(recording.numbers))
 
 
-def find_scene(
+def _find_scene(
     recording: Recording, settings: TrackingSettings, sample: NDArray[np.integer], head: int
-) -> tuple[Scene, Prepare]:
+) -> tuple[Scene, _Prepare]:
     """Find beam and shaker in a sample of frames, the first *head* of them neighbours, and how a frame is prepared."""
     turn = Orientation(settings.side, recording.shape)
     noise = pixel_noise(turn.turn(sample).astype(np.float32))
     saturated = saturation_level(sample, float(recording.max_value), noise)
-    prepare = Prepare(recording, turn, settings, saturated)
+    prepare = _Prepare(recording, turn, settings, saturated)
     pixel_size = _pixel(recording, settings)[0]
     return survey(prepare(sample), settings, saturated=prepare.saturated, pixel_size=pixel_size, head=head), prepare
 
 
-def edges_in(recording: Recording, settings: TrackingSettings) -> Callable[[int], tuple[dict[str, Any], dict[str, float]]]:
+def edges_in(
+    recording: Recording, settings: TrackingSettings
+) -> Callable[[int], tuple[dict[str, Any], dict[str, float]]]:
     """Find beam and shaker; return a function of a frame that gives attributes and variables of it as :func:`track` does."""
-    scene, prepare = find_scene(recording, settings, *_sample(recording))
+    scene, prepare = _find_scene(recording, settings, *_sample(recording))
     beam, shaker = scene.beam, scene.shaker
 
     def measured(index: int) -> tuple[dict[str, Any], dict[str, float]]:
@@ -391,7 +393,7 @@ def _sample(recording: Recording) -> tuple[NDArray[np.integer], int]:
     return np.stack([recording.frame(int(index)) for index in chosen]), head
 
 
-class Prepare:
+class _Prepare:
     """Rotate a batch of frames so that the shaker is below, linearise grey levels, subtract the background."""
 
     def __init__(self, recording: Recording, turn: Orientation, settings: TrackingSettings, saturated: float) -> None:
