@@ -29,9 +29,10 @@ class Recording:
     :meth:`close`.
 
     ``path`` is the file, folder or pattern; ``shape`` the (height, width) of a frame in the region [px]; ``region``
-    (first row, last row + 1, first column, last column + 1) in the full frame; ``numbers`` the number of each frame
-    counted from the first in use, where a hole is a missing frame; ``frame_rate`` in Hz; ``pixel_size`` [m] the height of a pixel,
-    for motion along columns, and ``pixel_width`` its width; ``exposure`` the shutter time [s] or None; ``max_value`` the
+    (first row, last row + 1, first column, last column + 1) in the full frame; ``frames`` in use (first, last + 1);
+    ``numbers`` the number of each frame counted from the first in use, where a hole is a missing frame; ``frame_rate``
+    in Hz; ``pixel_size`` [m] the height of a pixel, for motion along columns, and ``pixel_width`` its width;
+    ``exposure`` the shutter time [s] or None; ``max_value`` the
     grey level at which a pixel is saturated; ``metadata`` and ``diagnostics`` those of the file, and ``edge_error`` the
     standard error [px] of every edge from the way the file stores pictures.
 
@@ -66,8 +67,8 @@ class Recording:
         self.pixel_width = pixel_size if pixel_width is None else pixel_width
         self.region = region
         self.shape = (region[1] - region[0], region[3] - region[2])
-        self._first, last = frames or (0, source.numbers.size)
-        self.numbers = _numbers(source, (self._first, last))
+        self.frames = frames or (0, source.numbers.size)
+        self.numbers = _numbers(source, self.frames)
         self.exposure = source.exposure
         self.max_value = source.max_value
         self.metadata: dict[str, Any] = dict(source.metadata)
@@ -106,7 +107,7 @@ class Recording:
 
     def _read(self, start: int, stop: int) -> NDArray[np.integer]:
         top, bottom, left, right = self.region
-        return self._source.read(start + self._first, stop + self._first, (top, bottom))[:, :, left:right]
+        return self._source.read(start + self.frames[0], stop + self.frames[0], (top, bottom))[:, :, left:right]
 
     def close(self) -> None:
         """Close the file."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from contextlib import suppress
 from decimal import Decimal
@@ -18,7 +19,7 @@ from snapbeam.explorer.address import Address
 from snapbeam.explorer.jobs import Tab
 from snapbeam.explorer.server import begin_pages
 from snapbeam.explorer.style import FAINT, HEADING, NOTE, REFUSED, Html, button, figure, legend, look_of, sheet, styled
-from snapbeam.lab.camera import Recording, pixel_size_from_marks
+from snapbeam.lab.camera import Recording, open_recording, pixel_size_from_marks
 from snapbeam.lab.cli.options import rest_of, whole_numbers
 from snapbeam.lab.image_sources import open_source
 from snapbeam.lab.look import moved, opened_with, write_look
@@ -108,8 +109,8 @@ class LookPage(Tab):
         """One field for each setting, filled with what the file of settings or the recording says."""
         source, sections = self.shared.source, self.shared.sections
         given = moved(sections["tracking"], sections["camera"].get("region"), 1) | sections["camera"]
-        shown = (*_NUMBERS, *_WHOLE, *_CHOICES, *_FLAGS, *_DRAWN)
-        self.kept = {name: value for name, value in sections["tracking"].items() if name not in shown}
+        own = (*_NUMBERS, *_WHOLE, *_CHOICES, *_FLAGS, *_DRAWN)
+        self.kept = {name: value for name, value in sections["tracking"].items() if name not in own}
         self.drawn = {name: given.get(name) for name in _DRAWN}
         stated = {name: getattr(source, name) for name in _ANY}
         usual = vars(TrackingSettings())
@@ -222,7 +223,8 @@ class LookPage(Tab):
         tip = press("Set tip to sticker", self.take_tip, width=150)
         begin = press("First: this frame", lambda: self.take_frame(0), width=150)
         end = press("Last: this frame", lambda: self.take_frame(1), width=150)
-        self.command = Html("", sizing_mode="stretch_width", css_classes=["look-command"])
+        words = ("snapbeam", "track", str(self.shared.path), "--settings", str(self.shared.output))
+        command = Html(Markup("<pre>{}</pre>").format(shlex.join(words)), sizing_mode="stretch_width")
         right = pn.Column(
             Html(HEADING.format("Scale")),
             row(stated("pixel_size"), self.length, self.centred),
@@ -237,17 +239,11 @@ class LookPage(Tab):
                 press("Find beam and shaker", self.find, width=170),
                 press("Write the settings", self.write, width=170, button_type="primary"),
             ),
-            self.words, self.command,
+            self.words, command,
             sizing_mode="stretch_width", css_classes=["card", "right"],
         )  # fmt: skip
-        self.command.object = Markup("<pre>{}</pre>").format(self.command_line())
         body = pn.FlexBox(left, right, flex_wrap="wrap", css_classes=["body"], **wide)
         return pn.Column(Html(title, margin=0), body, css_classes=["whole"], **wide)
-
-    def command_line(self) -> str:
-        """The command that reads the file."""
-        words = ("snapbeam", "track", str(self.shared.path), "--settings", str(self.shared.output))
-        return shlex.join(words)
 
     # ------------------------------------------------------------------ the picture
 
@@ -299,7 +295,8 @@ class LookPage(Tab):
         at = self._at() - self.first
         if self.edges is not None and self.recording is not None and 0 <= at < len(self.recording):
             top, _, left, _ = self.recording.region
-            for name, color, style, rows, columns in edge_lines(*self.edges(at), self.recording.shape):
+            attrs, seen = self.edges(at)
+            for name, color, style, rows, columns in edge_lines(attrs, seen, self.recording.shape):
                 lines.append((columns + left, rows + top, color, "solid" if style == "-" else "dashed", name))
         for top, bottom, left, right in self.proposed:
             x, y = np.array([left, right]) - 0.5, np.array([top, bottom]) - 0.5
@@ -382,13 +379,13 @@ class LookPage(Tab):
             for section, values in made.items()
         }
 
-    def _ends(self) -> list[tuple[float, float]]:
+    def _ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """(row, column) of the ends of the line."""
-        data = self.line.data
-        return [(float(y), float(x)) for x, y in zip(data["x"], data["y"], strict=True)]
+        (x, u), (y, v) = self.line.data["x"], self.line.data["y"]
+        return (float(y), float(x)), (float(v), float(u))
 
     def _apart(self) -> float:
-        return float(np.hypot(*np.subtract(*self._ends())))
+        return math.dist(*self._ends())
 
     def _pixel(self) -> float | None:
         return self._number(self.field["pixel_size"], -6)
@@ -408,9 +405,9 @@ class LookPage(Tab):
         length = positive(self.length.name, length, "mm")
         size = length / positive("line", self._apart(), "px")
         if self.centred.value:
-            camera = {"frame_rate": 1.0, "pixel_size": 1e-5}
-            with opened_with(self.shared.path, {"camera": camera, "tracking": {}})[0] as recording:
-                size, _ = pixel_size_from_marks(recording, *self._ends(), length, frame=self._at())
+            first, second = self._ends()
+            with open_recording(self.shared.path, **_ANY) as recording:
+                size, _ = pixel_size_from_marks(recording, first, second, length, frame=self._at())
         self.field["pixel_size"].value = f"{1e6 * size:.6g}"
         self.source_of["pixel_size"].object = FAINT.format(f"from a line of {1e3 * length:g} mm")
         self._measure()

@@ -10,7 +10,7 @@ import typer
 import xarray as xr
 from typer.testing import CliRunner
 
-pytest.importorskip("panel", reason="the explorer's extra is not installed: make explorer-deps")
+pytest.importorskip("snapbeam.explorer.server", reason="the explorer or its extra is not installed")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from lab_waveforms import FRAME_RATE, PIXEL, impacts
 
@@ -84,7 +84,7 @@ def test_what_is_set_on_the_page_is_tracked_as_by_options(page, recorded, tmp_pa
     )  # fmt: skip
     xr.testing.assert_identical(found.drop_attrs(), wanted.drop_attrs())
     assert found.attrs["pixel_size"] == 26e-6 and found.sizes["time"] == 65 and float(found["time"][0]) == 0.0
-    for name in ("region", "threshold", "side", "contact_column", "location", "diagnostics"):
+    for name in ("region", "frames", "threshold", "side", "contact_column", "location", "diagnostics"):
         assert np.array_equal(found.attrs[name], wanted.attrs[name]), name
     assert found.attrs["location"] == pytest.approx(1 / 2.1)
 

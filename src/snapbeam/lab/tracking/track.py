@@ -211,6 +211,7 @@ def _attributes(
         "frame_rate": recording.frame_rate,
         "pixel_size": _pixel(recording, settings)[0],
         "region": list(recording.region),
+        "frames": list(recording.frames),
         "exposure": np.nan if recording.exposure is None else recording.exposure,
         "objects": "bright" if beam.bright else "dark",
         "contrast": beam.contrast,
