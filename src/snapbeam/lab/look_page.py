@@ -406,7 +406,7 @@ class LookPage(Tab):
         size = length / positive("line", self._apart(), "px")
         if self.centred.value:
             first, second = self._ends()
-            with open_recording(self.shared.path, **_ANY) as recording:
+            with open_recording(self.shared.path, frame_rate=1.0, pixel_size=1e-5) as recording:
                 size, _ = pixel_size_from_marks(recording, first, second, length, frame=self._at())
         self.field["pixel_size"].value = f"{1e6 * size:.6g}"
         self.source_of["pixel_size"].object = FAINT.format(f"from a line of {1e3 * length:g} mm")
