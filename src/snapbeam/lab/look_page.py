@@ -29,7 +29,7 @@ from snapbeam.lab.tracking.settings import SIDES, TrackingSettings
 from snapbeam.lab.tracking.track import edges_in
 from snapbeam.util.validation import InputError, file_path, positive, shown
 
-_WIDTH, _HEIGHT = 720, 540
+_WIDTH, _HEIGHT = 560, 540
 """Pixels of the page that a frame may take."""
 _NUMBERS = {
     "pixel_size": ("Pixel size, µm", -6), "frame_rate": ("Frame rate, Hz", 0),
@@ -117,26 +117,26 @@ class LookPage(Tab):
         self.field: dict[str, Any] = {}
         for name, (label, power) in _NUMBERS.items():
             text = _shown(given.get(name, stated.get(name)), power)
-            self.field[name] = pn.widgets.TextInput(name=label, value=text, width=170)
+            self.field[name] = pn.widgets.TextInput(name=label, value=text, width=160)
         self.stated = {name: _shown(value, _NUMBERS[name][1]) for name, value in stated.items()}
         for name, (label, form, _) in _WHOLE.items():
             value = given.get(name)
             text = "" if value is None else str(value) if isinstance(value, int) else ":".join(map(str, value[:2]))
             text += f",{value[2]}:{value[3]}" if name == "region" and value else ""
-            self.field[name] = pn.widgets.TextInput(name=label, value=text, placeholder=form, width=170)
+            self.field[name] = pn.widgets.TextInput(name=label, value=text, placeholder=form, width=160)
         for name, options in _CHOICES.items():
             value = given.get(name, usual[name])
-            self.field[name] = pn.widgets.Select(name=name.capitalize(), options=options, value=value, width=170)
+            self.field[name] = pn.widgets.Select(name=name.capitalize(), options=options, value=value, width=160)
         for name, label in _FLAGS.items():
-            self.field[name] = pn.widgets.Checkbox(name=label, value=given.get(name, usual[name]), width=170)
+            self.field[name] = pn.widgets.Checkbox(name=label, value=given.get(name, usual[name]), width=160)
         self.field["region"].param.watch(lambda _: self.post(self._draw_region), "value")
         self.source_of = {}
         for name, hint in (("pixel_size", source.pixel_size_hint), ("frame_rate", source.frame_rate_question)):
             words = "in the file" if stated[name] is not None else f"not in the file{'; ' if hint else ''}{hint}"
             words = "in the file of settings" if name in sections["camera"] else words
-            self.source_of[name] = Html(FAINT.format(words), width=170, margin=(0, 10))
-        self.length = pn.widgets.TextInput(name="Length of the line, mm", width=170)
-        self.centred = pn.widgets.Checkbox(name="between the centres of two marks", margin=(30, 10, 5, 10))
+            self.source_of[name] = Html(FAINT.format(words), width=160, margin=(0, 10))
+        self.length = pn.widgets.TextInput(name="Length of the line, mm", width=160)
+        self.centred = pn.widgets.Checkbox(name="between the centres of two marks", width=160, margin=(30, 10, 5, 10))
         self.frame = pn.widgets.IntSlider(
             name="Frame", start=0, end=max(self.count - 1, 1), sizing_mode="stretch_width"
         )
@@ -146,9 +146,10 @@ class LookPage(Tab):
     def _figure(self) -> None:
         """The frame, the tools over it, and the sources of what they change."""
         scale = min(_WIDTH / self.width, _HEIGHT / self.height)
+        wide, high = round(self.width * scale), round(self.height * scale)
         self.plot = plot = figure(
-            self.look, name="frame", sizing_mode="fixed", frame_width=round(self.width * scale),
-            frame_height=round(self.height * scale), x_range=Range1d(-0.5, self.width - 0.5),
+            self.look, name="frame", sizing_mode=None, frame_width=wide, frame_height=high, width=None,
+            height=None, x_range=Range1d(-0.5, self.width - 0.5),
             y_range=Range1d(self.height - 0.5, -0.5), tools="pan,wheel_zoom,reset", x_axis_label="column (px)",
             y_axis_label="row (px)",
         )  # fmt: skip
@@ -161,7 +162,7 @@ class LookPage(Tab):
             "xs", "ys", source=self.lines, line_color="color", line_dash="dash", line_width=2, legend_field="name"
         )
         third = [self.width / 3 - 0.5, 2 * self.width / 3 - 0.5]
-        self.line = ColumnDataSource({"x": third, "y": [self.height / 8] * 2}, name="line")
+        self.line = ColumnDataSource({"x": third, "y": [self.height / 16] * 2}, name="line")
         self.contact = ColumnDataSource({"x": [], "y": []}, name="contact")
         self.marks = ColumnDataSource({name: [] for name in ("left", "right", "top", "bottom")}, name="marks")
         accent = self.look.accent
@@ -206,8 +207,8 @@ class LookPage(Tab):
         self.way.param.watch(lambda event: setattr(self.hint, "object", NOTE.format(_WAYS[event.new])), "value")
         self.measured = Html("", sizing_mode="stretch_width", margin=0, css_classes=["look-measured"])
         left = pn.Column(
-            self.frame, self.way, self.hint, pn.pane.Bokeh(self.plot), self.found,
-            sizing_mode="stretch_width", css_classes=["card", "left"],
+            self.frame, self.way, self.hint, pn.pane.Bokeh(self.plot), self.found, sizing_mode="stretch_width",
+            css_classes=["card", "left"], styles={"min-width": f"{self.plot.frame_width + 90}px"},
         )  # fmt: skip
 
         def press(name: str, work: Any, **options: Any) -> Any:
@@ -219,10 +220,10 @@ class LookPage(Tab):
         def stated(name: str) -> Any:
             return pn.Column(field[name], self.source_of[name], margin=0)
 
-        scale = press("Set the pixel size", self.take_scale, width=150)
-        tip = press("Set tip to sticker", self.take_tip, width=150)
-        begin = press("First: this frame", lambda: self.take_frame(0), width=150)
-        end = press("Last: this frame", lambda: self.take_frame(1), width=150)
+        scale = press("Set the pixel size", self.take_scale, width=160)
+        tip = press("Set tip to sticker", self.take_tip, width=160)
+        begin = press("First: this frame", lambda: self.take_frame(0), width=160)
+        end = press("Last: this frame", lambda: self.take_frame(1), width=160)
         words = ("snapbeam", "track", str(self.shared.path), "--settings", str(self.shared.output))
         command = Html(Markup("<pre>{}</pre>").format(shlex.join(words)), sizing_mode="stretch_width")
         right = pn.Column(
@@ -236,8 +237,8 @@ class LookPage(Tab):
             row(field["shaker"], field["marker"]),
             row(field["tip_distance"], field["buckling_level"], field["location"]),
             row(
-                press("Find beam and shaker", self.find, width=170),
-                press("Write the settings", self.write, width=170, button_type="primary"),
+                press("Find beam and shaker", self.find, width=160),
+                press("Write the settings", self.write, width=160, button_type="primary"),
             ),
             self.words, command,
             sizing_mode="stretch_width", css_classes=["card", "right"],
