@@ -61,7 +61,13 @@ class Looked:
         self.path, self.output, self.sections = path, output, sections
         self.source = open_source(file_path("path", path))
         self.pages = 0
+        self.opened(sections)[0].close()
         begin_pages()
+
+    def opened(self, sections: dict[str, dict[str, Any]]) -> tuple[Recording, TrackingSettings]:
+        """The recording with checked settings, at any scale where none is known."""
+        missing = {name: value for name, value in _ANY.items() if getattr(self.source, name) is None}
+        return opened_with(self.path, sections | {"camera": missing | sections["camera"]})
 
     def page(self, arguments: dict[str, list[bytes]], doc: Any) -> LookPage:
         """A page for a session."""
@@ -313,7 +319,7 @@ class LookPage(Tab):
             self.recording = None
         try:
             sections = self.sections()
-            self.recording, settings = opened_with(self.shared.path, self._at_any_scale(sections))
+            self.recording, settings = self.shared.opened(sections)
             self.first = (sections["camera"].get("frames") or (0,))[0]
             try:
                 self.edges = edges_in(self.recording, settings)
@@ -331,10 +337,6 @@ class LookPage(Tab):
                 )
         finally:
             self._draw_found()
-
-    def _at_any_scale(self, sections: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        missing = {name: value for name, value in _ANY.items() if not self.stated[name]}
-        return sections | {"camera": missing | sections["camera"]}
 
     # ------------------------------------------------------------------ what was set
 

@@ -19,6 +19,7 @@ from snapbeam.lab.batch import read_settings
 from snapbeam.lab.cli.track import track
 from snapbeam.lab.look_page import Looked, LookPage
 from snapbeam.lab.synthetic import SyntheticCamera, SyntheticStage, render_recording
+from snapbeam.util.validation import InputError
 
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
 app = typer.Typer()
@@ -197,6 +198,49 @@ def test_a_file_of_other_settings_is_refused(recorded, tmp_path, text, message):
     (tmp_path / "look.toml").write_text(text)
     result = CliRunner().invoke(app, [str(recorded), "--settings", str(tmp_path / "look.toml")])
     assert result.exit_code == 2 and message in result.output
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[camera]\nregion = [1, 2]\n", "region"),
+        ("[camera]\npixel_size = 'small'\n", "pixel_size"),
+        ("[tracking]\nfixed_marks = [3]\n", "fixed_marks"),
+        ("[tracking]\ncontact_column = 500\n", "contact_column"),
+    ],
+)
+def test_a_page_does_not_begin_with_settings_that_are_not_valid(recorded, tmp_path, text, message):
+    (tmp_path / "bad.toml").write_text(text)
+    with pytest.raises(InputError, match=message):
+        opened(recorded, tmp_path / "look.toml", tmp_path / "bad.toml")
+
+
+@pytest.mark.parametrize("side", ["left", "above"])
+def test_contact_and_marks_are_those_of_the_picture_for_each_side(recorded, tmp_path, side):
+    page = opened(recorded, tmp_path / "look.toml")
+    page.field["side"].value, page.field["region"].value = side, "20:150,30:90"
+    page.contact.data = {"x": [41.5], "y": [73.25]}
+    page.marks.data = {"top": [29.5], "bottom": [49.5], "left": [39.5], "right": [59.5]}
+    tracking = page.sections()["tracking"]
+    assert tracking["contact_column"] == (53.25 if side == "left" else 11.5)
+    assert tracking["fixed_marks"] == [[10, 30, 10, 30]]
+    page.write()
+    page.close()
+    again = opened(recorded, tmp_path / "again.toml", tmp_path / "look.toml")
+    assert again.contact.data["y" if side == "left" else "x"] == [73.25 if side == "left" else 41.5]
+    assert again.sections()["tracking"] == tracking
+    again.close()
+
+
+def test_where_no_beam_is_found_regions_with_one_are_shown(recorded, tmp_path):
+    page = opened(recorded, tmp_path / "look.toml")
+    page.field["region"].value = "140:158,0:90"
+    page.find()
+    assert "alert" in page.found.object and "beam" in page.found.object and page.edges is None
+    page.field["region"].value = ""
+    page.find()
+    assert "Found: a beam" in page.found.object and "alert" not in page.found.object
+    page.close()
 
 
 def test_frames_of_a_recording_begin_at_time_zero_and_keep_their_holes(recorded):
