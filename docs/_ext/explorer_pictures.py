@@ -56,7 +56,7 @@ def look_at(browser: Any, where: str) -> None:
     """Draw the page of ``snapbeam look`` of a synthetic recording."""
     time = np.arange(200) / 10e3  # s
     beam, tip = np.full(200, -0.335e-3), -0.6e-3 + 0.1e-3 * np.sin(2.0 * np.pi * 100.0 * time)  # m
-    camera, stage = lab.SyntheticCamera(shape=(150, 220)), lab.SyntheticStage(shaker_width=0.5e-3)
+    camera, stage = lab.SyntheticCamera(shape=(150, 220), snr_db=50.0), lab.SyntheticStage(shaker_width=0.5e-3)
     lab.render_recording(time, beam, tip, camera=camera, stage=stage).write(Path(where) / "test.cihx")
     settings = "[camera]\nregion = [8, 140, 20, 205]\n[tracking]\nbuckling_level = 0.335e-3\ncontact_column = 90\n"
     (Path(where) / "test.toml").write_text(settings, encoding="utf-8")

@@ -54,9 +54,9 @@ def test_what_is_drawn_over_the_picture_is_written(recorded, serve, browser):
     page.get_by_text("Found: a beam 13.0 px").wait_for()
     drag((80, 119.5), (80, 113.6))  # the lower side of the region, to row 114
     page.wait_for_function("() => Bokeh.documents[0].get_model_by_name('region').bottom < 118")
-    third = 160 / 3 - 0.5
-    drag((third, 15), (20, 10))
-    drag((2 * third + 0.5, 15), (120, 10))
+    ends = page.evaluate("() => ['x', 'y'].map((k) => [...Bokeh.documents[0].get_model_by_name('line').data[k]])")
+    for start, end in zip(np.transpose(ends), ((20, 20), (120, 20)), strict=True):
+        drag(start, end)
     page.get_by_label("Length of the line, mm").fill("2")
     page.keyboard.press("Enter")
     page.get_by_role("button", name="Set the pixel size").click()
