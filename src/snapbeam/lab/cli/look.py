@@ -21,9 +21,10 @@ def look(
     port: Port = None,
     browser: Browser = True,
 ) -> None:
-    """Set region, marks, scale, frames and time base of a recording over its picture, in the browser.
+    """Set region and scales over the picture of a recording, in the browser.
 
-    The page shows what tracking finds by itself, and writes a file for snapbeam track --settings.
+    The page shows what tracking finds by itself. Region, marks, contact, pixel size, frames and frame rate are set over
+    the picture, and written to a file for snapbeam track --settings.
 
     Example: snapbeam look test.cihx -o test.toml
     """
