@@ -64,6 +64,12 @@ def test_the_explorer(tmp_path, refused):
 
 
 @EXPLORER
+def test_the_page_over_a_recording(tmp_path, refused):
+    np.save(tmp_path / "a.npy", np.zeros((3, 32, 32), dtype=np.uint8))
+    refused(tmp_path, [["look", "a.npy"]], "explorer")
+
+
+@EXPLORER
 def test_the_explorer_in_python(tmp_path):
     done = without_extras(tmp_path, WITHOUT + "import snapbeam; snapbeam.explorer.serve")
     assert 'pip install ".[explorer]"' in done.stderr.splitlines()[-1]

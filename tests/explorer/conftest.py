@@ -65,10 +65,10 @@ def folder(tmp_path_factory, small_map):
 class Served:
     """A server in a process of its own, as a person starts it."""
 
-    def __init__(self, folder: Path, *arguments: str, state: Path | None = None) -> None:
+    def __init__(self, folder: Path, *arguments: str, state: Path | None = None, command: str = "explore") -> None:
         code = "from snapbeam.cli import main; main()"
         self.process = subprocess.Popen(
-            [sys.executable, "-u", "-c", code, "explore", "--port", "0", *arguments, "--no-browser"],
+            [sys.executable, "-u", "-c", code, command, "--port", "0", *arguments, "--no-browser"],
             cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env=dict(os.environ, COLUMNS="400", XDG_STATE_HOME=str(state or tempfile.mkdtemp(dir=folder))),
         )  # fmt: skip
@@ -111,8 +111,8 @@ def serve(folder):
     """Start servers; all are ended in the end."""
     started = []
 
-    def start(*arguments: str, where: Path = folder, state: Path | None = None) -> Served:
-        started.append(Served(where, *arguments, state=state))
+    def start(*arguments: str, where: Path = folder, **how) -> Served:
+        started.append(Served(where, *arguments, **how))
         return started[-1]
 
     yield start

@@ -44,7 +44,7 @@ LONGEST = 10.0
 PACKAGE = str(Path(sb.__file__).parent)
 _NOT_WALKED = ("cli", "explorer", "__main__", "paper", "parts")
 """Commands are taken from the program itself; a server and the making of the paper take as long as they should."""
-_LONG_COMMANDS = ("reproduce", "explore")
+_LONG_COMMANDS = ("reproduce", "explore", "look")
 
 MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
 SHAKER = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3)

@@ -51,6 +51,7 @@ class _OutputOptions:
 
     quiet: bool = False
     json: Path | None = None
+    given: frozenset[str] = frozenset()
     found: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     """Warnings of the command, which its JSON contains too."""
@@ -191,7 +192,8 @@ def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
         )
         kwargs.pop("help_all", None)
         quiet, path, style = bool(kwargs.pop("quiet", False)), kwargs.pop("json", None), kwargs.pop("style", None)
-        asked = _OutputOptions(quiet, path if isinstance(path, Path) else None)
+        given = frozenset(name for name in kwargs if not _is_default(name, context))
+        asked = _OutputOptions(quiet, path if isinstance(path, Path) else None, given)
         token = _OUTPUT_OPTIONS.set(asked)
         try:
             with during_command(), warnings.catch_warnings(), kept:
@@ -296,11 +298,16 @@ _NO_PARAMETERS = frozenset(
 
 def _defaults(arguments: Mapping[str, Any], context: typer.Context) -> list[Path]:
     """The paths among the arguments of a command that were not given."""
-    return [
-        each
-        for name, each in arguments.items()
-        if isinstance(each, Path) and getattr(context.get_parameter_source(name), "name", "") == "DEFAULT"
-    ]
+    return [each for name, each in arguments.items() if isinstance(each, Path) and _is_default(name, context)]
+
+
+def _is_default(name: str, context: typer.Context) -> bool:
+    return getattr(context.get_parameter_source(name), "name", "") == "DEFAULT"
+
+
+def given_options() -> frozenset[str]:
+    """Names of the options that the user of the running command gave."""
+    return _OUTPUT_OPTIONS.get().given
 
 
 def _named(values: Iterable[Any]) -> list[Path]:

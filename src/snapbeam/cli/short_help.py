@@ -56,11 +56,12 @@ class ShortHelpGroup(TyperGroup):
         names = self.list_commands(ctx)
         column = max(len(name) for name in names) + 4
         about = {name: (self.get_command(ctx, name).help or "").split("\n\n")[0] for name in names}  # type: ignore[union-attr]
-        head = [self.get_usage(ctx), "", *_wrapped(self.help or "")]
+        purpose = _wrapped(self.help or "")
         rows = [f"  {name:<{column - 2}}{_clause(text, _width() - column)}" for name, text in about.items()]
         end = f"Options of a command: {ctx.command_path} COMMAND --help"
-        between = [""] if len(head) + len(rows) + 2 <= LINES else []
-        formatter.write("\n".join([*head, *between, *rows, end]))
+        spare = LINES - len(purpose) - len(rows) - 2  # for blank lines
+        first, second = ([""] if spare > least else [] for least in (0, 1))
+        formatter.write("\n".join([self.get_usage(ctx), *first, *purpose, *second, *rows, end]))
 
 
 def _width() -> int:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -14,6 +15,10 @@ from snapbeam.util.validation import InputError
 
 COMMANDS = {"explore": "snapbeam.explorer.cli:explore"}
 """Module and function of each command, by name."""
+Port = Annotated[
+    int | None, typer.Option(help="Port; by default 8760 or the next free one; 0 for any free one.", min=0, max=65535)
+]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
 
 
 @cli_command
@@ -30,10 +35,7 @@ def explore(
         Path | None,
         typer.Option("--against", help="Another map, whose difference from the first is shown.", metavar="MAP"),
     ] = None,
-    port: Annotated[
-        int | None,
-        typer.Option(help="Port; by default 8760 or the next free one; 0 for any free one.", min=0, max=65535),
-    ] = None,
+    port: Port = None,
     address: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
     allow_remote: Annotated[
         bool, typer.Option("--allow-remote", help="Allow an address that other machines can reach.")
@@ -44,7 +46,7 @@ def explore(
             help="Token in the address of the page; by default a stored one of this user, or a random one with --allow-remote."
         ),
     ] = None,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    browser: Browser = True,
 ) -> None:
     """Open a map in the browser; click on a point to simulate it and to see the beam.
 
@@ -66,6 +68,20 @@ def explore(
         settings = load_config(config)
         system, integration = settings.system, settings.integration
 
+    from snapbeam.explorer.server import serve
+
+    until_stopped(
+        lambda ready: serve(
+            file, address=address, port=port, allow_remote=allow_remote, token=token, system=system,
+            integration=integration, against=against, ready=ready,
+        ),
+        browser,
+    )  # fmt: skip
+
+
+def until_stopped(serve: Callable[[Callable[[str], None]], None], browser: bool) -> NoReturn:
+    """Serve until Ctrl+C; print the address of the page, and open it in the *browser*."""
+
     def ready(url: str) -> None:
         write_json_now(url=url)
         out().print(f"Explorer at {url}", markup=False)
@@ -75,12 +91,7 @@ def explore(
 
             webbrowser.open(url)
 
-    from snapbeam.explorer.server import serve
-
     with contextlib.suppress(KeyboardInterrupt):  # the server may also end by itself at Ctrl+C
-        serve(
-            file, address=address, port=port, allow_remote=allow_remote, token=token, system=system,
-            integration=integration, against=against, ready=ready,
-        )  # fmt: skip
+        serve(ready)
     out().print("stopped")
     raise typer.Exit(INTERRUPTED)

@@ -129,9 +129,9 @@ class Gate(Router):
         if request.path.startswith(f"{self._prefix}/static/") or request.path == _ICON:
             return None
         if request.path not in self._pages:
-            return 404, "there is no such page; open the address that snapbeam explore printed"
+            return 404, "there is no such page; open the address that the command printed"
         if not (self._in_address(request) or self._in_cookie(request)):
-            return 403, "this page needs its token; open the address that snapbeam explore printed"
+            return 403, "this page needs its token; open the address that the command printed"
         if request.path != f"{self._prefix}/ws" and self._shared.pages >= SESSIONS:
             wait = (UNUSED + CHECKED) // 1000
             return 503, f"{SESSIONS} pages are open, which is the limit; close one of them, and wait {wait} s"
@@ -240,17 +240,12 @@ def make_server(
 
 def _factory(shared: Shared) -> Callable[[], Any]:
     def page() -> Any:
-        from snapbeam.explorer.maps import ResultSource
-        from snapbeam.explorer.page import Page
-        from snapbeam.explorer.result_page import ResultPage
-
         shared.pages += 1
         doc = pn.state.curdoc
         doc.template = _TEMPLATE
         doc.template_variables.update(dist_url=_OWN, app_favicon=_ICON)
         try:
-            kind = ResultPage if isinstance(shared.source, ResultSource) else Page
-            made = kind(shared, dict(pn.state.session_args), doc)
+            made = shared.page(dict(pn.state.session_args), doc)
         except BaseException:
             shared.pages -= 1
             raise
@@ -316,9 +311,6 @@ def _own_addresses() -> tuple[str, ...]:
 # How the explorer is started: from a notebook or a script, and from the command line.
 
 
-_MISSING = "the explorer needs Panel: pip install 'snapbeam[explorer]'"
-
-
 class Explorer:
     """A page that is served beside a notebook; shown as a frame where one evaluates it.
 
@@ -342,19 +334,20 @@ class Explorer:
         return f"<Explorer at {self.url}>"
 
 
-def _shared(what: Any, system: System | None, integration: Integration | None, against: Any) -> Any:
-    try:
-        import panel as pn
-    except ImportError as error:
-        raise InputError(_MISSING) from error
+def begin_pages() -> None:
+    """Prepare Panel and Bokeh for pages that ask no other machine."""
     from bokeh.settings import settings
-
-    from snapbeam.explorer.maps import ResultSource, opened
-    from snapbeam.explorer.shared import Shared
 
     settings.resources = "server"  # whatever a page is made of comes from this machine
     settings.log_level = None  # to set it in this way is a message in the console of the browser
     pn.extension()
+
+
+def _shared(what: Any, system: System | None, integration: Integration | None, against: Any) -> Any:
+    from snapbeam.explorer.maps import ResultSource, opened
+    from snapbeam.explorer.shared import Shared
+
+    begin_pages()
     file = Path(what) if isinstance(what, (str, Path)) else None
     other = None if against is None else opened(against)
     if other is not None and (isinstance(other, ResultSource) or other.is_list):
@@ -451,6 +444,19 @@ def serve(
 
     matplotlib.use("Agg")  # pictures are drawn beside the page, for files alone
     shared = _shared(what, system, integration, against)
+    serve_shared(shared, address, port, allow_remote=allow_remote, token=token, ready=ready)
+
+
+def serve_shared(
+    shared: Any,
+    address: str = "127.0.0.1",
+    port: int | None = None,
+    *,
+    allow_remote: bool = False,
+    token: str | None = None,
+    ready: Callable[[str], None] = print,
+) -> None:
+    """Serve the pages that ``shared.page(arguments, document)`` makes; see :func:`serve`."""
     if token is None and is_loopback(address):
         token = kept_token()
     server, url = make_server(shared, address, port, allow_remote=allow_remote, token=token)

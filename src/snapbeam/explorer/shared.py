@@ -11,7 +11,7 @@ import numpy as np
 
 from snapbeam import InputError, Integration, System, simulate
 from snapbeam.explorer.jobs import RUN_SECONDS, Jobs, Token
-from snapbeam.explorer.maps import Source, Window, integration_of, system_of
+from snapbeam.explorer.maps import ResultSource, Source, Window, integration_of, system_of
 
 _WINDOWS = 48
 """Windows that are kept; of more the one that was looked at longest ago is dropped."""
@@ -36,6 +36,14 @@ class Shared:
             self.integration = integration_of(source.attrs)
         except (InputError, ValueError) as error:
             self.why_not = str(error)
+
+    def page(self, arguments: dict[str, list[bytes]], doc: Any) -> Any:
+        """A page for a session: a map's, or that of another result."""
+        from snapbeam.explorer.page import Page
+        from snapbeam.explorer.result_page import ResultPage
+
+        kind = ResultPage if isinstance(self.source, ResultSource) else Page
+        return kind(self, arguments, doc)
 
     def warm(self) -> None:
         """Load what a first run needs, while the browser starts."""

@@ -47,8 +47,9 @@ _WORDS = (
     r"(?![a-z])"
 )
 _COLUMNS = ("test", "recording", "vibrometer", "frequency_hz", "velocity_m_s", "location", "comment")
-_CAMERA = ("frame_rate", "pixel_size", "region")
+_CAMERA = ("frame_rate", "pixel_size", "region", "frames")
 _SIGNAL = ("channel", "units", "sensitivity", "sampling_frequency", "columns")
+_KNOWN = {"camera": _CAMERA, "signal": _SIGNAL}
 _NAN = math.nan
 COLUMNS = (
     "test", "recording", "vibrometer", "status", "frequency_hz", "frequency_se_hz", "velocity_m_s", "velocity_se_m_s",
@@ -190,10 +191,8 @@ class SeriesSettings:
     operator: str = ""
 
     def __post_init__(self) -> None:
-        for name, known in (("camera", _CAMERA), ("signal", _SIGNAL)):
-            for key in getattr(self, name):
-                if key not in known:
-                    raise InputError(f"{name} {key}: unknown; must be among {', '.join(known)}")
+        for name in _KNOWN:
+            _check_keys(name, getattr(self, name))
         object.__setattr__(self, "cycles", integer("cycles", self.cycles, LEAST_CYCLES))
         require_texts("operator", instance("operator", self.operator, str, "text"))
         if self.tracking.buckling_level is None:
@@ -214,8 +213,14 @@ class SeriesSettings:
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:24]
 
 
-def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -> SeriesSettings:
-    """Settings from a TOML file with sections camera, tracking, signal and test_series, and changes, which go first."""
+def _check_keys(name: str, values: Mapping[str, Any]) -> None:
+    for key in values:
+        if key not in _KNOWN[name]:
+            raise InputError(f"{name} {key}: unknown; must be among {', '.join(_KNOWN[name])}")
+
+
+def read_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Sections camera, tracking, signal and test_series of a TOML file, and changes, which go first."""
     sections: dict[str, dict[str, Any]] = {"camera": {}, "tracking": {}, "signal": {}, "test_series": {}}
     for name, values in () if path is None else read_toml("settings", path).items():
         if name not in sections or not isinstance(values, dict):
@@ -226,9 +231,16 @@ def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -
     for key in sections["test_series"]:
         if key not in ("cycles", "operator"):
             raise InputError(f"[test_series] {key}: unknown; must be cycles or operator")
-    region = sections["camera"].get("region")
-    if region is not None:
-        sections["camera"]["region"] = tuple(region)
+    for name in _KNOWN:
+        _check_keys(name, sections[name])
+    for name, value in sections["camera"].items():
+        sections["camera"][name] = tuple(value) if isinstance(value, list) else value
+    return sections
+
+
+def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -> SeriesSettings:
+    """Settings of a test series from a TOML file and changes; see :func:`read_settings`."""
+    sections = read_settings(path, changes)
     tracking = TrackingSettings().changed(**sections["tracking"])
     return SeriesSettings(sections["camera"], tracking, sections["signal"], **sections["test_series"])
 

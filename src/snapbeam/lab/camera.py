@@ -29,9 +29,10 @@ class Recording:
     :meth:`close`.
 
     ``path`` is the file, folder or pattern; ``shape`` the (height, width) of a frame in the region [px]; ``region``
-    (first row, last row + 1, first column, last column + 1) in the full frame; ``numbers`` the number of each frame
-    counted from the first, where a hole is a missing frame; ``frame_rate`` in Hz; ``pixel_size`` [m] the height of a pixel,
-    for motion along columns, and ``pixel_width`` its width; ``exposure`` the shutter time [s] or None; ``max_value`` the
+    (first row, last row + 1, first column, last column + 1) in the full frame; ``frames`` in use (first, last + 1);
+    ``numbers`` the number of each frame counted from the first in use, where a hole is a missing frame; ``frame_rate``
+    in Hz; ``pixel_size`` [m] the height of a pixel, for motion along columns, and ``pixel_width`` its width;
+    ``exposure`` the shutter time [s] or None; ``max_value`` the
     grey level at which a pixel is saturated; ``metadata`` and ``diagnostics`` those of the file, and ``edge_error`` the
     standard error [px] of every edge from the way the file stores pictures.
 
@@ -54,6 +55,7 @@ class Recording:
         region: tuple[int, int, int, int],
         diagnostics: tuple[Diagnostic, ...] = (),
         pixel_width: float | None = None,
+        frames: tuple[int, int] | None = None,
     ) -> None:
         instance("source", source, FrameSource, "a source of frames (open_recording opens a file)")
         if not isinstance(region, (tuple, list)) or len(region) != 4:
@@ -65,7 +67,8 @@ class Recording:
         self.pixel_width = pixel_size if pixel_width is None else pixel_width
         self.region = region
         self.shape = (region[1] - region[0], region[3] - region[2])
-        self.numbers = source.numbers
+        self.frames = frames or (0, source.numbers.size)
+        self.numbers = _numbers(source, self.frames)
         self.exposure = source.exposure
         self.max_value = source.max_value
         self.metadata: dict[str, Any] = dict(source.metadata)
@@ -104,7 +107,7 @@ class Recording:
 
     def _read(self, start: int, stop: int) -> NDArray[np.integer]:
         top, bottom, left, right = self.region
-        return self._source.read(start, stop, (top, bottom))[:, :, left:right]
+        return self._source.read(start + self.frames[0], stop + self.frames[0], (top, bottom))[:, :, left:right]
 
     def close(self) -> None:
         """Close the file."""
@@ -126,7 +129,7 @@ class Recording:
 def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> tuple[int, int, int, int]:
     if value is None:
         return (0, shape[0], 0, shape[1])
-    if len(value) != 4:
+    if not isinstance(value, (tuple, list)) or len(value) != 4:
         raise InputError(f"region = {shown(value)}: must be (first row, last row + 1, first column, last column + 1)")
     top = integer("region[0]", value[0], 0, shape[0] - 1)
     bottom = integer("region[1]", value[1], top + 1, shape[0])
@@ -134,10 +137,24 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
     return (top, bottom, left, integer("region[3]", value[3], left + 1, shape[1]))
 
 
-def _told_of(source: FrameSource, rate: float) -> tuple[Diagnostic, ...]:
+def _numbers(source: FrameSource, frames: tuple[int, int]) -> NDArray[np.int64]:
+    """Numbers of the frames in use, counted from the first of them."""
+    numbers = source.numbers[slice(*frames)]
+    return numbers - numbers[0] if frames[0] else numbers
+
+
+def _frames(value: tuple[int, int] | None, count: int) -> tuple[int, int]:
+    if value is None:
+        return 0, count
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise InputError(f"frames (--frames) = {shown(value)}: must be (first frame, last frame + 1)")
+    first = integer("frames[0]", value[0], 0, count - 1)
+    return first, integer("frames[1]", value[1], first + 1, count)
+
+
+def _told_of(source: FrameSource, rate: float, numbers: NDArray[np.int64]) -> tuple[Diagnostic, ...]:
     """Diagnostics of a file, whose frame rate [Hz] may be another than it states, and which may lack frames."""
     stated = source.frame_rate or rate
-    numbers = source.numbers
     before = numbers[:-1][np.diff(numbers) > 1]
     lost = {"frames": numbers[-1] + 1 - numbers.size, "places": before.size, "first": before[0] if before.size else 0}
     question = bool(source.frame_rate_question)
@@ -155,6 +172,7 @@ def open_recording(
     frame_rate: float | None = None,
     pixel_size: float | None = None,
     region: tuple[int, int, int, int] | None = None,
+    frames: tuple[int, int] | None = None,
 ) -> Recording:
     """Open a high-speed recording for reading frame by frame.
 
@@ -171,6 +189,8 @@ def open_recording(
         Metres per pixel in the plane of the beam, in place of that of the file (.cihx, ImageJ, OME).
     region
         Part of the frame: (first row, last row + 1, first column, last column + 1).
+    frames
+        Frames to use: (first, last + 1), counted from 0 over those in the file; the first of them is at time zero.
 
     Raises
     ------
@@ -208,7 +228,9 @@ def open_recording(
                 "in metres, such as 12e-6 for 12 um"
             )
         width = source.pixel_width if pixel_size is None else None
-        return Recording(path, source, rate, size, _region(region, source.shape), _told_of(source, rate), width)
+        part, used = _region(region, source.shape), _frames(frames, source.numbers.size)
+        told = _told_of(source, rate, _numbers(source, used))
+        return Recording(path, source, rate, size, part, told, width, used)
     except BaseException:
         source.close()
         raise

@@ -32,6 +32,13 @@ def option(about: str, panel: str, metavar: str | None = None, *names: str) -> A
     return typer.Option(*names, help=about, rich_help_panel=panel, metavar=metavar)
 
 
+RecordingFile = Annotated[
+    Path,
+    typer.Argument(
+        help="Photron .cih/.cihx, .cine, .avi, .mp4, .mov, TIFF, .npy, .h5, or a folder of numbered images.",
+        metavar="RECORDING",
+    ),
+]
 SignalFile = Annotated[
     Path,
     typer.Argument(
@@ -60,13 +67,13 @@ Operator = Annotated[str | None, option("Name of the person who measured, for th
 Strict = Annotated[bool, option("Treat warnings as errors: write no result.", OUTPUT, None, "--strict")]
 
 
-def check_files(suffixes: tuple[str, ...], **paths: Path | None) -> None:
+def check_files(suffixes: tuple[str, ...], begin: str = "", **paths: Path | None) -> None:
     """Refuse paths of options that cannot be written, or whose suffix is not one of *suffixes*."""
     from snapbeam.util.files import check_writable
 
     for name, path in paths.items():
         if path is not None:
-            check_writable(path, name, suffixes)
+            check_writable(path, name, suffixes, begin)
 
 
 def save_plot(figure: Figure, path: Path) -> None:
@@ -135,6 +142,16 @@ def whole_numbers(name: str, text: str, count: int) -> tuple[int, ...]:
         example = ("0", "0:20", "", "0:160,20:84")[count - 1] if count <= 4 else ""
         raise InputError(f"{name} = {text!r}: must be {count} whole numbers, such as {example}")
     return values
+
+
+def rest_of(text: str | None) -> int | tuple[int, int] | None:
+    """Return the frames at rest from "20" or "-40:0"."""
+    if text is None:
+        return None
+    if ":" in text:
+        first, last = whole_numbers("rest_frames", text, 2)
+        return first, last
+    return whole_numbers("rest_frames", text, 1)[0]
 
 
 def numbers(name: str, text: str | None) -> tuple[float, ...]:

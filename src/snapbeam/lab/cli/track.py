@@ -10,9 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
+from snapbeam.cli.console import add_json, cli_command, duration, file_line, given_options, out, progress
 from snapbeam.lab.cli import options as lab
 from snapbeam.lab.cli.options import option
 
@@ -32,18 +30,15 @@ def _option(name: str, kind: Any, default: Any, about: str = "", *more: Any) -> 
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
 
 
-_RECORDING = Annotated[
-    Path,
-    typer.Argument(
-        help="Photron .cih/.cihx, .cine, .avi, .mp4, .mov, TIFF, .npy, .h5, or a folder of numbered images.",
-        metavar="RECORDING",
-    ),
-]
 _REAL, _TEXT, _FILE = float | None, str | None, Path | None
 _OPTIONS = (
+    _option("settings", _FILE, None,
+            "TOML file with the sections [camera] and [tracking], such as snapbeam look writes; other options go first.",
+            _CAMERA, "FILE"),
     _option("frame_rate", _REAL, None, "Frame rate, Hz; required for videos and images.", _CAMERA),
     _option("pixel_size", _REAL, None, "Pixel size, m, such as 12e-6; required if the file has none.", _CAMERA),
     _option("region", _TEXT, None, "Part of the frame to use.", _CAMERA, "ROW:ROW,COLUMN:COLUMN"),
+    _option("frames", _TEXT, None, "Frames to use; the first is at time zero.", _CAMERA, "FIRST:LAST+1"),
     _option("side", str, "below", "Side of the beam on which the shaker is: below, above, left or right.", _SCENE),
     _option("objects", str, "auto", "Brightness of the objects against the background: bright, dark or auto.", _SCENE),
     _option("threshold", _REAL, None, "Grey level of the binarisation threshold; Otsu's by default.", _SCENE),
@@ -89,7 +84,7 @@ _OPTIONS = (
 
 
 def _with_options(command: Callable[..., None]) -> Callable[..., None]:
-    first = inspect.Parameter("recording", inspect.Parameter.KEYWORD_ONLY, annotation=_RECORDING)
+    first = inspect.Parameter("recording", inspect.Parameter.KEYWORD_ONLY, annotation=lab.RecordingFile)
     command.__signature__ = inspect.Signature([first, *_OPTIONS])  # type: ignore[attr-defined]
     return command
 
@@ -98,9 +93,9 @@ def _with_options(command: Callable[..., None]) -> Callable[..., None]:
 @_with_options
 def track(
     recording: Path, *, output: Path, picture: Path | None, report: Path | None, video: Path | None, frame: int,
-    video_every: int, frame_rate: float | None, pixel_size: float | None, region: str | None, scale_marks: str | None,
-    fixed_mark: list[str] | None, rest_frames: str | None, background: Path | None, operator: str | None, strict: bool,
-    **scene: Any,
+    video_every: int, settings: Path | None, frame_rate: float | None, pixel_size: float | None, region: str | None,
+    frames: str | None, scale_marks: str | None, fixed_mark: list[str] | None, rest_frames: str | None,
+    background: Path | None, operator: str | None, strict: bool, **scene: Any,
 ) -> None:  # fmt: skip
     """Track beam and shaker in every frame of a high-speed recording.
 
@@ -129,25 +124,35 @@ def track(
             import imageio_ffmpeg  # noqa: F401
     integer("frame", frame, 0)
     integer("video_every", video_every, 1)
+    from snapbeam.lab.batch import read_settings
     from snapbeam.lab.tracking.settings import TrackingSettings
     from snapbeam.lab.tracking.track import track as track_recording
     from snapbeam.lab.tracking.track import tracking_quality, tracking_report
     from snapbeam.util.diagnostics import diagnostics_of, refuse
 
-    marks: list[Any] = [lab.whole_numbers("fixed_mark", text, 4) for text in fixed_mark or ()]
-    settings = TrackingSettings(rest_frames=_rest(rest_frames), fixed_marks=marks, **scene)
+    scene["rest_frames"] = lab.rest_of(rest_frames)
+    scene["fixed_marks"] = [lab.whole_numbers("fixed_mark", text, 4) for text in fixed_mark or ()] or None
     part = None if region is None else lab.whole_numbers("region", region, 4)
+    used = None if frames is None else lab.whole_numbers("frames", frames, 2)
+    camera = {"frame_rate": frame_rate, "pixel_size": pixel_size, "region": part, "frames": used}
+    names = given_options() | {"fixed_marks"}
+    given = {name: value for name, value in scene.items() if name in names}
+    sections = read_settings(settings, {"camera": camera, "tracking": given})
+    left = {name: value for name, value in scene.items() if value is not None}
+    wanted = TrackingSettings().changed(**left | sections["tracking"])
     start = time.monotonic()
-    look = (settings, frame, picture or output)
-    with _first_look_at(recording, part, look):
-        opened = _opened(recording, frame_rate, pixel_size, part, scale_marks)
+    look = (wanted, frame, picture or output)
+    if scale_marks is not None and pixel_size is None:  # the option goes before the file
+        sections["camera"].pop("pixel_size", None)
+    with _first_look_at(recording, sections["camera"], look):
+        opened = _opened(recording, sections["camera"], scale_marks)
     with opened:
         if picture is not None:
             integer("frame", frame, 0, len(opened) - 1)
         if background is not None:
-            settings = settings.changed(background=_picture(background, opened))
-        with progress(len(opened), "track", "frames") as tell, _first_look_at(recording, part, look):
-            dataset = track_recording(opened, settings, progress=tell)
+            wanted = wanted.changed(background=_picture(background, opened))
+        with progress(len(opened), "track", "frames") as tell, _first_look_at(recording, sections["camera"], look):
+            dataset = track_recording(opened, wanted, progress=tell)
         elapsed = time.monotonic() - start
         files = []
         if picture is not None or report is not None:
@@ -185,31 +190,14 @@ def track(
         console.print(f"wrote {file_line(path)}")
 
 
-def _rest(text: str | None) -> int | tuple[int, int] | None:
-    """Return the frames at rest from "20" or "-40:0"."""
-    if text is None:
-        return None
-    if ":" in text:
-        first, last = lab.whole_numbers("rest_frames", text, 2)
-        return first, last
-    return lab.whole_numbers("rest_frames", text, 1)[0]
-
-
-def _opened(
-    path: Path,
-    frame_rate: float | None,
-    pixel_size: float | None,
-    region: tuple[int, ...] | None,
-    scale_marks: str | None,
-) -> Recording:
+def _opened(path: Path, camera: dict[str, Any], scale_marks: str | None) -> Recording:
     """Open a recording, with the pixel size from two marks if they are given."""
     from snapbeam.lab.camera import open_recording, pixel_size_from_marks
     from snapbeam.util.validation import InputError
 
-    part = None if region is None else (region[0], region[1], region[2], region[3])
     if scale_marks is None:
-        return open_recording(path, frame_rate=frame_rate, pixel_size=pixel_size, region=part)
-    if pixel_size is not None:
+        return open_recording(path, **camera)
+    if "pixel_size" in camera:
         raise InputError("pixel_size (--pixel-size) and scale_marks (--scale-marks): must be given only one")
     try:
         marks, length = scale_marks.split("=")
@@ -221,16 +209,14 @@ def _opened(
         raise InputError(
             f"scale_marks = {scale_marks!r}: must read ROW,COLUMN:ROW,COLUMN=METRES, such as 10,20:10,420=0.010"
         ) from None
-    with open_recording(path, frame_rate=frame_rate, pixel_size=1e-6, region=part) as once:
+    with open_recording(path, **camera, pixel_size=1e-6) as once:
         size, error = pixel_size_from_marks(once, (first[0], first[1]), (second[0], second[1]), distance)
     out().print(f"pixel size {size * 1e6:.4f} +- {error * 1e6:.4f} um from the marks")
-    return open_recording(path, frame_rate=frame_rate, pixel_size=size, region=part)
+    return open_recording(path, **camera, pixel_size=size)
 
 
 @contextmanager
-def _first_look_at(
-    path: Path, region: tuple[int, ...] | None, look: tuple[TrackingSettings, int, Path]
-) -> Iterator[None]:
+def _first_look_at(path: Path, camera: dict[str, Any], look: tuple[TrackingSettings, int, Path]) -> Iterator[None]:
     """Write the first look at a recording that cannot be opened or tracked beside the output, unless that is a figure."""
     from snapbeam.lab.camera import open_recording
     from snapbeam.util.validation import InputError
@@ -243,7 +229,7 @@ def _first_look_at(
 
         settings, frame, target = look
         try:  # with any scale
-            recording = open_recording(path, frame_rate=1.0, pixel_size=1e-5, region=region)  # type: ignore[arg-type]
+            recording = open_recording(path, **camera | {"frame_rate": 1.0, "pixel_size": 1e-5})
         except InputError:
             raise error from None
         with recording:

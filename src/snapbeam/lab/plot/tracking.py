@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,25 +40,29 @@ _STRIP = 96  # height of the waveform under the picture, pixels
 
 def found_edges(dataset: xr.Dataset, index: int, shape: tuple[int, int]) -> list[Line]:
     """The edges found in one frame: (name, colour, line style, rows, columns) in the picture as recorded."""
-    attrs = dataset.attrs
+    names = ("beam_row", "beam_slope", "tip_row", "marker_row")
+    return edge_lines(dataset.attrs, {name: float(dataset[name][index]) for name in names if name in dataset}, shape)
+
+
+def edge_lines(attrs: Mapping[str, Any], rows: Mapping[str, float], shape: tuple[int, int]) -> list[Line]:
+    """The edges of a frame from attributes and variables of a tracked recording."""
     turn = Orientation(attrs["side"], shape)
     centre = float(attrs["contact_column"])
     x = np.array([min(attrs["beam_columns"]), max(attrs["beam_columns"])], dtype=float)
-    row, slope = float(dataset["beam_row"][index]), float(dataset["beam_slope"][index])
     lines: list[Line] = []
 
-    def add(name: str, color: str, style: str, rows: NDArray, columns: NDArray) -> None:
-        if np.isfinite(rows).all():
-            lines.append((name, color, style, *turn.back(rows, columns)))
+    def add(name: str, color: str, style: str, at: NDArray, columns: NDArray) -> None:
+        if np.isfinite(at).all():
+            lines.append((name, color, style, *turn.back(at, columns)))
 
-    far = row + slope * (x - centre)
+    far = rows["beam_row"] + rows["beam_slope"] * (x - centre)
     add("beam, far edge", BEAM_MARK, "-", far, x)
     add("beam, near edge (far edge + thickness)", NEAR_MARK, "--", far + attrs["beam_thickness_px"], x)
-    if "tip_row" in dataset:
+    if "tip_row" in rows:
         reach = np.array([-0.25, 0.25]) * (x[1] - x[0]) + centre
-        add("shaker tip", SHAKER_MARK, "-", np.full(2, float(dataset["tip_row"][index])), reach)
-    if "marker_row" in dataset:
-        middle, half = float(dataset["marker_row"][index]), 0.5 * attrs["marker_thickness"]
+        add("shaker tip", SHAKER_MARK, "-", np.full(2, rows["tip_row"]), reach)
+    if "marker_row" in rows:
+        middle, half = rows["marker_row"], 0.5 * attrs["marker_thickness"]
         columns = np.asarray(attrs["marker_columns"], dtype=float)[[0, -1]]
         add("sticker", STICKER_MARK, "-", np.full(2, middle - half), columns)
         add("sticker", STICKER_MARK, "-", np.full(2, middle + half), columns)

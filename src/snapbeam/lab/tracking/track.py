@@ -211,10 +211,9 @@ def _attributes(
         "frame_rate": recording.frame_rate,
         "pixel_size": _pixel(recording, settings)[0],
         "region": list(recording.region),
+        "frames": list(recording.frames),
         "exposure": np.nan if recording.exposure is None else recording.exposure,
-        "side": settings.side,
         "objects": "bright" if beam.bright else "dark",
-        "threshold": beam.threshold,
         "contrast": beam.contrast,
         "noise": beam.noise,
         "snr_db": float(20.0 * np.log10(beam.contrast / beam.noise)),
@@ -223,9 +222,6 @@ def _attributes(
         "edge_gamma": scene.shape.gamma,
         "edge_shift_px": scene.shape.shift,
         "saturated_share": scene.shape.clipped,
-        "beam_thickness_px": beam.thickness,
-        "contact_column": beam.contact_column,
-        "beam_columns": beam.columns.tolist(),
         "shaker_mark": "none" if shaker is None else shaker.mark,
         "tip_offset": np.nan if shaker is None else shaker.tip_offset,
         "tip_source": "no shaker" if shaker is None else shaker.tip_source,
@@ -239,10 +235,7 @@ def _attributes(
     attrs |= {f"recording_{name}": value for name, value in stated.items()}
     if settings.buckling_level is not None:
         attrs["buckling_level"] = settings.buckling_level
-    if shaker is not None and shaker.sticker is not None:
-        attrs["marker_thickness"] = shaker.sticker.thickness
-        attrs["marker_columns"] = shaker.sticker.columns.tolist()
-    return attrs
+    return attrs | _of_scene(scene, settings)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -313,15 +306,9 @@ def track(
         instance("settings", settings, TrackingSettings, "TrackingSettings")
     wanted = (settings or TrackingSettings()).changed(**changes)
     wanted = wanted.checked_for(recording.shape, len(recording))
-    turn = Orientation(wanted.side, recording.shape)
     sample, head = _sample(recording)
-    noise = pixel_noise(turn.turn(sample).astype(np.float32))
-    saturated = saturation_level(sample, float(recording.max_value), noise)
-    prepare = _Prepare(recording, turn, wanted, saturated)
-    scene = survey(
-        prepare(sample), wanted, saturated=prepare.saturated, pixel_size=_pixel(recording, wanted)[0], head=head
-    )
-    marks = _FixedMarks(sample[:head], wanted, turn)
+    scene, prepare = _find_scene(recording, wanted, sample, head)
+    marks = _FixedMarks(sample[:head], wanted, prepare.turn)
     background = _Background(prepare(sample[:head]), measure_beam(scene.beam, prepare(sample)).row, scene, wanted)
     follower = Follower(scene, wanted.blur_limit)
     size = int(np.clip(_BATCH_PIXELS // (recording.shape[0] * recording.shape[1]), 4, 128))
@@ -340,6 +327,55 @@ def track(
     apart = fields_apart(recording, prepare, scene.beam, rows, wanted.side in ("below", "above"))
     fields = VideoFields(apart, alternation(rows.row))
     return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields, background.moves(recording.numbers))
+
+
+def _find_scene(
+    recording: Recording, settings: TrackingSettings, sample: NDArray[np.integer], head: int
+) -> tuple[Scene, _Prepare]:
+    """Find beam and shaker in a sample of frames, the first *head* of them neighbours, and how a frame is prepared."""
+    turn = Orientation(settings.side, recording.shape)
+    noise = pixel_noise(turn.turn(sample).astype(np.float32))
+    saturated = saturation_level(sample, float(recording.max_value), noise)
+    prepare = _Prepare(recording, turn, settings, saturated)
+    pixel_size = _pixel(recording, settings)[0]
+    return survey(prepare(sample), settings, saturated=prepare.saturated, pixel_size=pixel_size, head=head), prepare
+
+
+def edges_in(
+    recording: Recording, settings: TrackingSettings
+) -> Callable[[int], tuple[dict[str, Any], dict[str, float]]]:
+    """Find beam and shaker; return a function of a frame that gives attributes and variables of it as :func:`track` does."""
+    scene, prepare = _find_scene(recording, settings, *_sample(recording))
+    beam, shaker = scene.beam, scene.shaker
+
+    def measured(index: int) -> tuple[dict[str, Any], dict[str, float]]:
+        frames = prepare(recording.frame(index)[None])
+        seen = measure_beam(beam, frames)
+        rows = {"beam_row": float(seen.row[0]), "beam_slope": float(seen.slope[0])}
+        if shaker is not None:
+            row = float(measure_shaker(beam, shaker, frames, seen.row + beam.thickness, seen.slope).row[0])
+            rows["tip_row"] = row + shaker.tip_offset
+            if shaker.sticker is not None:
+                rows["marker_row"] = row
+        return _of_scene(scene, settings), rows
+
+    return measured
+
+
+def _of_scene(scene: Scene, settings: TrackingSettings) -> dict[str, Any]:
+    """The attributes by which the edges of a frame are drawn."""
+    beam, shaker = scene.beam, scene.shaker
+    attrs: dict[str, Any] = {
+        "side": settings.side,
+        "threshold": beam.threshold,
+        "beam_thickness_px": beam.thickness,
+        "contact_column": beam.contact_column,
+        "beam_columns": beam.columns.tolist(),
+    }
+    if shaker is not None and shaker.sticker is not None:
+        attrs["marker_thickness"] = shaker.sticker.thickness
+        attrs["marker_columns"] = shaker.sticker.columns.tolist()
+    return attrs
 
 
 def _pixel(recording: Recording, settings: TrackingSettings) -> tuple[float, float]:
