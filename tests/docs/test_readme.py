@@ -74,10 +74,7 @@ def test_numbers_of_the_comparison():
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines() if "e-0" in line]
     ratio = {row[0]: float(row[4]) for row in rows}
     seconds = float(rows[0][3].split()[0])
-    text = (ROOT / "docs" / "images" / "fixed_steps.inc").read_text(encoding="utf-8")
-    again = [float(line.split("|")[6]) for line in text.splitlines() if line.startswith("| 32 |")]
-    assert len(again) == 2  # of the same points
-    assert f"takes {1e3 * seconds:.0f} to {max(again):.0f} ms on one core, averaged over twelve test points" in PLAIN
+    assert f"takes {1e3 * seconds:.0f} ms on one core, averaged over twelve test points" in PLAIN
     page = (ROOT / "docs" / "accuracy_and_speed.md").read_text(encoding="utf-8")
     first, second = re.search(r"dop853 took ([\d.]+) and ([\d.]+) times", page).groups()
     assert float(second) == min(ratio["numbalsoda dop853"], ratio["numbalsoda lsoda"])

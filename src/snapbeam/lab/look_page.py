@@ -357,7 +357,7 @@ class LookPage(Tab):
         return whole_numbers(name, text, count) if count else rest_of(text)
 
     def sections(self) -> dict[str, dict[str, Any]]:
-        """What was set, as the sections of a file of settings."""
+        """Values that were set, as the sections of a file of settings."""
         camera: dict[str, Any] = {}
         tracking = dict(self.kept)
         for name, (_, power) in _NUMBERS.items():
