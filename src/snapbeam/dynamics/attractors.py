@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -70,12 +70,8 @@ class Ball:
     def holds(self, rows: _Array) -> NDArray[np.bool_]:
         """Mask of the states of shape (runs, d) that are within, each by itself."""
         away = rows - self.center
-        total = np.zeros(len(rows))
-        for column in self.factor.T:
-            part = (away * column).sum(axis=1)
-            total += part * part
-        found: NDArray[np.bool_] = total <= (_SHARE * self.radius) ** 2
-        return found
+        total = sum((away * column).sum(axis=1) ** 2 for column in self.factor.T)
+        return np.asarray(total <= (_SHARE * self.radius) ** 2)
 
 
 def balls_of(orbit: PeriodicOrbit) -> list[Ball]:
@@ -83,11 +79,9 @@ def balls_of(orbit: PeriodicOrbit) -> list[Ball]:
     size = orbit.coordinates.size
     directions = np.random.Generator(np.random.Philox(_SEED)).standard_normal((_TRIED, size))
     directions /= np.sqrt((directions**2).sum(axis=1))[:, None]
-    found = [_ball(orbit, orbit.coordinates, orbit.jacobian, directions)]
-    for point in orbit.points[1:]:
-        came = jacobian(Family(orbit.flow), point, orbit.period)
-        found.append(_ball(orbit, point, came.jacobian, directions))
-    return found
+    others = (jacobian(Family(orbit.flow), point, orbit.period).jacobian for point in orbit.points[1:])
+    slopes = [orbit.jacobian, *others]
+    return [_ball(orbit, point, slope, directions) for point, slope in zip(orbit.points, slopes, strict=True)]
 
 
 def _ball(orbit: PeriodicOrbit, point: _Array, slope: _Array, directions: _Array) -> Ball:
@@ -120,8 +114,7 @@ class Cloud:
         """Mask of the states that lie among the points."""
         known = np.asarray(np.isfinite(rows).all(axis=1))
         away, _ = self.tree.query(np.where(known[:, None], rows, 0.0))
-        found: NDArray[np.bool_] = known & (away <= self.reach)
-        return found
+        return np.asarray(known & (away <= self.reach))
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,47 +352,35 @@ def find_attractors(
     known = np.asarray(np.isfinite(seen.states).all(axis=1))
     repeats = np.where(known, minimal_period(np.where(known[:, None, None], seen.every, 0.0), _REPEATS), 0)
     verified, reasons = _orbits(flow, seen, repeats, allowed)
-    orbits = [orbit for orbit, _ in verified]
     report(2, _PARTS)
-    regular = [_periodic(orbit, verification) for orbit, verification in verified]
+    regular = [_periodic(*each) for each in verified.items()]
     labels = np.full(len(rows), UNDECIDED)
     for s in np.flatnonzero(repeats > 0):
-        labels[s] = _nearest(orbits, seen.states[s])
+        labels[s] = _nearest(verified, seen.states[s])
     irregular = np.flatnonzero(known & (repeats == 0))
-    chaotic, members = _chaotic(flow, rows, seen, irregular, most, lasts, orbits)
+    chaotic, members = _chaotic(flow, seen, irregular, most, lasts)
     report(3, _PARTS)
     found, order = _ordered([*regular, *chaotic])
     for number, group in enumerate(members):
         labels[group] = len(regular) + number
-    labels = np.where(labels >= 0, order[np.maximum(labels, 0)] if len(order) else UNDECIDED, UNDECIDED)
+    labels = np.append(order, UNDECIDED)[labels]
     report(4, _PARTS)
-    return Attractors(flow, found, labels, lasts, _reason(labels, known, repeats, leave, rule, most, reasons))
+    reason = "; ".join([f"{leave} periods left out ({rule})", *_undecided(labels, known, repeats, most, reasons)])
+    return Attractors(flow, found, labels, lasts, reason)
 
 
-def _reason(
-    labels: NDArray[np.int64],
-    known: NDArray[np.bool_],
-    repeats: NDArray[np.int64],
-    leave: int,
-    rule: str,
-    most: int,
-    reasons: list[str],
-) -> str:
-    """Reasons why the search stopped, and why states are undecided."""
-    lost = labels == UNDECIDED
-    words = [f"{leave} periods left out ({rule})"]
-    counts = (
-        (int((lost & ~known).sum()), "failed"),
-        (
-            int((lost & known & (repeats == 0)).sum()),
-            f"repeat after none of 1 to {most} periods and are not verified as chaotic",
-        ),
-        (
-            int((lost & (repeats > 0)).sum()),
-            f"repeat, but their orbit is not verified ({'; '.join(dict.fromkeys(reasons)) or 'another orbit is nearby'})",
-        ),
-    )
-    return "; ".join([*words, *(f"{count} states {text}" for count, text in counts if count)])
+def _undecided(
+    labels: NDArray[np.int64], known: NDArray[np.bool_], repeats: NDArray[np.int64], most: int, reasons: list[str]
+) -> list[str]:
+    """Reasons why states are undecided."""
+    why = "; ".join(dict.fromkeys(reasons)) or "another orbit is nearby"
+    groups = {
+        "failed": ~known,
+        f"repeat after none of 1 to {most} periods and are not verified as chaotic": known & (repeats == 0),
+        f"repeat, but their orbit is not verified ({why})": repeats > 0,
+    }
+    counts = {text: int(((labels == UNDECIDED) & group).sum()) for text, group in groups.items()}
+    return [f"{count} states {text}" for text, count in counts.items() if count]
 
 
 def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
@@ -415,10 +396,9 @@ def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
 
 def _orbits(
     flow: Flow, seen: AdvancedStates, repeats: NDArray[np.int64], tolerance: float
-) -> tuple[list[tuple[PeriodicOrbit, PeriodicOrbit]], list[str]]:
+) -> tuple[dict[PeriodicOrbit, PeriodicOrbit], list[str]]:
     """The stable orbits that states which repeat are on, each once and with its verification; why others are none."""
-    found: list[PeriodicOrbit] = []
-    verifications: list[PeriodicOrbit] = []
+    found: dict[PeriodicOrbit, PeriodicOrbit] = {}
     missed: list[_Array] = []
     reasons: list[str] = []
     for s in np.flatnonzero(repeats > 0):
@@ -439,9 +419,8 @@ def _orbits(
             missed.append(x)
             reasons.append("it is unstable, far away, or not confirmed at accuracy = 'reference'")
         elif not any(_is_same(orbit, other) for other in found):
-            found.append(orbit)
-            verifications.append(verification)
-    return list(zip(found, verifications, strict=True)), reasons
+            found[orbit] = verification
+    return found, reasons
 
 
 def _verify(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:
@@ -460,12 +439,10 @@ def _is_same(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
     return one.period == other.period and float(np.abs(other.points - one.coordinates).max(axis=1).min()) < _SAME
 
 
-def _nearest(orbits: list[PeriodicOrbit], x: _Array) -> int:
+def _nearest(orbits: Iterable[PeriodicOrbit], x: _Array) -> int:
     """Orbit of a state, within the tolerance of repeating states."""
-    for number, orbit in enumerate(orbits):
-        if float(np.abs(orbit.points - x).max(axis=1).min()) < 10.0 * _REPEATS:
-            return number
-    return UNDECIDED
+    near = (float(np.abs(orbit.points - x).max(axis=1).min()) < 10.0 * _REPEATS for orbit in orbits)
+    return next((number for number, is_near in enumerate(near) if is_near), UNDECIDED)
 
 
 def _periodic(orbit: PeriodicOrbit, verification: PeriodicOrbit) -> Attractor:
@@ -475,13 +452,7 @@ def _periodic(orbit: PeriodicOrbit, verification: PeriodicOrbit) -> Attractor:
 
 
 def _chaotic(
-    flow: Flow,
-    rows: _Array,
-    seen: AdvancedStates,
-    which: NDArray[np.int64],
-    most: int,
-    lasts: int,
-    orbits: list[PeriodicOrbit],
+    flow: Flow, seen: AdvancedStates, which: NDArray[np.int64], most: int, lasts: int
 ) -> tuple[list[Attractor], list[NDArray[np.int64]]]:
     """Groups of runs that never repeat, those of them that last and diverge."""
     if not which.size:
@@ -533,6 +504,4 @@ def _ordered(found: list[Attractor]) -> tuple[list[Attractor], NDArray[np.int64]
         return (KINDS.index(each.kind), each.period, *np.round(lowest, 6).tolist())
 
     order = sorted(range(len(found)), key=key)
-    position = np.empty(len(found), dtype=np.int64)
-    position[order] = np.arange(len(found))
-    return [found[i] for i in order], position
+    return [found[i] for i in order], np.argsort(np.array(order, dtype=np.int64))
