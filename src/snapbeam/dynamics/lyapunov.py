@@ -117,9 +117,9 @@ def lyapunov_spectrum(
             crossed[done] = _crossed(advanced)
         else:
             ahead = flow.advance(advanced, some, every=True, points=columns)
-            for i, found in enumerate(_derivatives(flow, advanced.beginnings(ahead), columns, some), done):
-                frame, growth[i] = _orthogonal(frame @ np.asarray(found.tangents))
-                crossed[i] = _crossed(found)
+            slopes, crossed[done : done + some] = _derivatives(flow, advanced.beginnings(ahead), columns, some)
+            for i, slope in enumerate(slopes, done):
+                frame, growth[i] = _orthogonal(frame @ slope)
             advanced = ahead
         done += some
         report(done, total)
@@ -154,23 +154,15 @@ def _runs(
 
 def _derivatives(
     flow: Flow, begun: AdvancedStates, columns: dict[str, _Array] | None, periods: int
-) -> list[AdvancedStates]:
-    """The derivative of the map over each of some periods, as tangents: row i is the change by the unit vector i."""
+) -> tuple[_Array, NDArray[np.bool_]]:
+    """Derivatives of the map over some periods, row i the change by the unit vector i, and the runs that crossed."""
     count, size = begun.states.shape
     unit = np.tile(np.eye(size), (count, 1, 1))
     points = None if columns is None else {name: np.tile(each, periods) for name, each in columns.items()}
     found = flow.advance(begun, 1, tangents=unit, points=points)
     assert found.tangents is not None
-    parts = [slice(i * count // periods, (i + 1) * count // periods) for i in range(periods)]
-    return [
-        AdvancedStates(
-            found.states[part],
-            None,
-            found.tangents[part],
-            {name: values[part] for name, values in found.statistics.items()},
-        )
-        for part in parts
-    ]
+    crossed = np.broadcast_to(_crossed(found), count)
+    return found.tangents.reshape(periods, -1, size, size), crossed.reshape(periods, -1)
 
 
 def _crossed(advanced: AdvancedStates) -> NDArray[np.bool_] | bool:
