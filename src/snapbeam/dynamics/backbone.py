@@ -229,8 +229,6 @@ class _Structure:
             row[self.model.modes + self.bodies.index(number)] = sides[1]
         return law, row, begin
 
-    # ------------------------------------------------------------------ forces
-
     def _stiffness(self, z: _Array) -> _Array:
         """Second derivative of the potential energy without contacts."""
         found, n = self.linear.copy(), self.model.modes
@@ -249,8 +247,7 @@ class _Structure:
             depth = begin + float(row @ z)
             if depth > 0.0:
                 force -= row * type(law).force(law, depth)
-        found: _Array = self.shapes.T @ force / (self.scale * self.unit**2)
-        return found
+        return np.asarray(self.shapes.T @ force / (self.scale * self.unit**2))
 
     def slope(self, y: _Array) -> _Array:
         """Derivative of the acceleration."""
@@ -260,8 +257,7 @@ class _Structure:
             depth = begin + float(row @ z)
             if depth > 0.0:
                 stiffness += np.outer(row, row) * type(law).slope(law, depth)
-        found: _Array = -self.shapes.T @ stiffness @ self.shapes / self.unit**2
-        return found
+        return np.asarray(-self.shapes.T @ stiffness @ self.shapes / self.unit**2)
 
     def energy(self, y: _Array) -> float:
         """Potential energy above the well, J."""
@@ -277,13 +273,10 @@ class _Structure:
     def centre(self, y: _Array) -> _Array:
         """Displacement of the centre over the length scale, for coordinates of shape (..., n)."""
         z = self.rest + y @ self.back.T
-        found: _Array = z[..., : self.model.modes] @ self.model.midspan_shape / self.model.length_scale
-        return found
+        return np.asarray(z[..., : self.model.modes] @ self.model.midspan_shape / self.model.length_scale)
 
-    # ------------------------------------------------------------------ half a period
-
-    def half(self, y: _Array, time: float, columns: int) -> tuple[_Array, _Array, _Array]:
-        """State after half a period from rest, and its derivative by the first *columns* of the initial state."""
+    def _run(self, y: _Array, time: float, columns: int = 0, times: _Array | None = None) -> _Array:
+        """Motion from rest and its derivative by the first *columns* of the initial state, shape (numbers, instants)."""
         from scipy.integrate import solve_ivp
 
         n = self.size
@@ -297,21 +290,18 @@ class _Structure:
             return np.concatenate((v, self.acceleration(y), carried[n:].ravel(), bent.ravel()))
 
         begun = np.concatenate((y, np.zeros(n), np.eye(2 * n)[:, :columns].ravel()))
-        done = solve_ivp(rate, (0.0, time), begun, method="DOP853", rtol=_RTOL, atol=_ATOL)
-        last = done.y[:, -1]
+        done = solve_ivp(rate, (0.0, time), begun, method="DOP853", t_eval=times, rtol=_RTOL, atol=_ATOL)
+        return np.asarray(done.y)
+
+    def half(self, y: _Array, time: float, columns: int) -> tuple[_Array, _Array, _Array]:
+        """State after half a period from rest, and its derivative by the first *columns* of the initial state."""
+        n, last = self.size, self._run(y, time, columns)[:, -1]
         return last[:n], last[n : 2 * n], last[2 * n :].reshape(2 * n, columns)
 
     def waveform(self, y: _Array, time: float) -> tuple[_Array, _Array]:
         """Coordinates and velocities at even instants of half a period, each of shape (instants, N)."""
-        from scipy.integrate import solve_ivp
-
-        n = self.size
-        times = np.linspace(0.0, time, _SAMPLES + 1)
-        done = solve_ivp(
-            lambda _, z: np.concatenate((z[n:], self.acceleration(z[:n]))),
-            (0.0, time), np.concatenate((y, np.zeros(n))), method="DOP853", t_eval=times, rtol=_RTOL, atol=_ATOL,
-        )  # fmt: skip
-        return done.y[:n].T, done.y[n:].T
+        found = self._run(y, time, 0, np.linspace(0.0, time, _SAMPLES + 1))
+        return found[: self.size].T, found[self.size :].T
 
 
 def _open_stiffness(harvester: Harvester, omega: float) -> float:
@@ -382,8 +372,6 @@ class _Motions(Equations):
             return "lowest_frequency_ratio", True
         return (_AT_REST, True) if not across and np.abs(point.y[:-1]).max() < 5e-4 else None
 
-    # ------------------------------------------------------------------ where curves begin
-
     def about_well(self, mode: int) -> Point:
         """A small motion of a linear mode, towards the other well."""
         structure = self.structure
@@ -446,21 +434,16 @@ def _vanishing(before: _Array, after: _Array) -> float | None:
     return part if np.linalg.norm(before + part * chord) < _NEAR_ZERO * np.sqrt(square) else None
 
 
-def _multipliers(structure: _Structure, point: _Array) -> NDArray[np.complex128]:
-    """Floquet multipliers over a whole period, from the tangents of half of one: the motion retraces itself."""
-    n = structure.size
-    _, _, half = structure.half(point[:-1], float(point[-1]), 2 * n)
-    mirror = np.diag([1.0] * n + [-1.0] * n)
-    found: NDArray[np.complex128] = np.linalg.eigvals(mirror @ np.linalg.solve(half, mirror @ half))
-    return found[np.argsort(-np.abs(found))]
-
-
 def _measures(structure: _Structure, of: Point) -> dict[str, Any]:
     """Numbers of the dataset for one point."""
-    point = of.y
+    point, n = of.y, structure.size
     y, v = structure.waveform(point[:-1], float(point[-1]))
     centre, kinetic = structure.centre(y), np.trapezoid(v**2, axis=0)
-    multipliers = _multipliers(structure, point)
+    # over a whole period, from the tangents of half of one: the motion retraces itself
+    _, _, half = structure.half(point[:-1], float(point[-1]), 2 * n)
+    mirror = np.diag([1.0] * n + [-1.0] * n)
+    multipliers = np.linalg.eigvals(mirror @ np.linalg.solve(half, mirror @ half))
+    multipliers = multipliers[np.argsort(-np.abs(multipliers))]
     others = np.delete(multipliers, np.argsort(np.abs(multipliers - 1.0))[:2])
     return {
         "frequency": structure.unit / (2.0 * point[-1]),
