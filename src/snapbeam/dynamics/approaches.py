@@ -141,8 +141,7 @@ def carried(flow: Stroboscope, coordinates: _Array, phase: float) -> _Array:
         return coordinates
     if flow.dimension > 2 * flow.space.modes:  # to a tick of the clock
         moved = advance(flow.system, flow.state(coordinates), part, integration=flow.integration)
-        found: _Array = flow.space.of(moved.flat)[0]
-        return found
+        return np.asarray(flow.space.of(moved.flat)[0])
     integration = flow.integration.replace(cycles=1, early_termination=False)
     times = [0.0, part * flow.clock.cycle]
     last = simulate(flow.starting(coordinates), integration, sample_times=times).dataset.isel(time=-1)

@@ -157,8 +157,7 @@ class OrbitEquations(Equations):
 
     def values(self, y: _Array) -> _Array:
         """Parameters of a point."""
-        found: _Array = y[..., -self.spans.size :] * self.spans
-        return found
+        return np.asarray(y[..., -self.spans.size :] * self.spans)
 
     def flow_at(self, y: _Array) -> Flow:
         """The flow at the parameters of a point."""

@@ -97,8 +97,7 @@ class _Curve(OrbitEquations):
 
     def _singular(self, came: Return) -> _Array:
         sign = 1.0 if self.kind == "fold" else -1.0
-        table: _Array = came.jacobian - sign * np.eye(len(came.x))
-        return table
+        return np.asarray(came.jacobian - sign * np.eye(len(came.x)))
 
     def null_vectors(self, came: Return) -> tuple[_Array, _Array, float]:
         """Right and left vector of the bordered systems, which are critical ones on the curve, and g."""
@@ -144,8 +143,7 @@ class _Curve(OrbitEquations):
         # across a touch the motion is another one: the derivative is that of the side without it
         alike = np.reshape([each.impacts == came.impacts for each in beside], (2, -1)) | (self.kind != "grazing")
         weights = np.where(alike.any(axis=0), alike, True)
-        slope: _Array = (sides * weights).sum(axis=0) / weights.sum(axis=0)
-        return slope
+        return np.asarray((sides * weights).sum(axis=0) / weights.sum(axis=0))
 
     def _seen(self, y: _Array) -> Stroboscope:
         flow = self.flow_at(y)

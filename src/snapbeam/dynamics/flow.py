@@ -6,10 +6,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -23,6 +22,8 @@ from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_st
 from snapbeam.util.validation import InputError, InputTypeError, flag, integer, nonnegative, shown
 
 _Array = NDArray[np.float64]
+_NOT_RUN: dict[str, Any] = {"tangent": None, "statistics": None, "modal": None}
+"""What a state has of the run that led to it."""
 
 # Many starts of one system, each from its own number alone: a beam that rings faintly, a drive at any phase.
 
@@ -72,13 +73,7 @@ class InitialConditions:
 
     def describe(self) -> dict[str, Any]:
         """Description of the initial conditions, for comparison."""
-        return {
-            "count": self.count,
-            "displacement": self.displacement,
-            "phase": self.phase,
-            "seed": self.seed,
-            "side": "away from the tip",
-        }
+        return asdict(self) | {"side": "away from the tip"}
 
     def state(
         self, system: System, number: int, state: State | None = None, location: ArrayLike | None = None
@@ -91,14 +86,8 @@ class InitialConditions:
         found = state if state is not None else system.start_state
         if location is not None and np.ndim(location):
             shape = (*np.broadcast_shapes(np.shape(location), found.batch), system.model.modes)
-            found = dataclasses.replace(
-                found,
-                amplitude=np.broadcast_to(found.amplitude, shape),
-                velocity=np.broadcast_to(found.velocity, shape),
-                tangent=None,
-                statistics=None,
-                modal=None,
-            )
+            amplitude, velocity = (np.broadcast_to(each, shape) for each in (found.amplitude, found.velocity))
+            found = replace(found, amplitude=amplitude, velocity=velocity, **_NOT_RUN)
         if self.displacement > 0.0:
             rung = perturbed_start(system, Replicates(1, self.displacement, seed=self.seed), number, found)
             found = leaving(system, found, rung, location)
@@ -111,9 +100,7 @@ class InitialConditions:
             )
         generator = np.random.Generator(np.random.Philox(key=[self.seed, number]).jumped())
         phase = math.pi * (1.0 + generator.random())
-        return dataclasses.replace(
-            found, phase=np.array(phase), contact_time=np.array(np.nan), tangent=None, statistics=None, modal=None
-        )
+        return replace(found, phase=np.array(phase), contact_time=np.array(np.nan), **_NOT_RUN)
 
 
 def leaving(system: System, rest: State, begun: State, location: ArrayLike | None = None) -> State:
@@ -126,15 +113,8 @@ def leaving(system: System, rest: State, begun: State, location: ArrayLike | Non
     away = 1.0 if striker.side == "below" else -1.0
     reach = np.sum(system.model.shape_at(at) * change[0], axis=-1)
     turn = np.where(away * reach < 0.0, -1.0, 1.0)[..., None]
-    return dataclasses.replace(
-        begun,
-        amplitude=rest.amplitude + turn * change[0],
-        velocity=rest.velocity + turn * change[1],
-        contact_time=np.array(np.nan),
-        tangent=None,
-        statistics=None,
-        modal=None,
-    )
+    amplitude, velocity = rest.amplitude + turn * change[0], rest.velocity + turn * change[1]
+    return replace(begun, amplitude=amplitude, velocity=velocity, contact_time=np.array(np.nan), **_NOT_RUN)
 
 
 def starts_of(given: InitialConditions | int) -> InitialConditions:

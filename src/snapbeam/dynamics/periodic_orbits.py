@@ -99,12 +99,8 @@ class PeriodicOrbit:
     @cached_property
     def minimal_period(self) -> int:
         """The fewest periods of the drive after which it closes already."""
-        for divisor in range(1, self.period):
-            if self.period % divisor == 0:
-                apart = np.abs(self.points[divisor] - self.points[0]).max()
-                if apart < _SAME:
-                    return divisor
-        return self.period
+        divisors = (divisor for divisor in range(1, self.period) if self.period % divisor == 0)
+        return next((m for m in divisors if np.abs(self.points[m] - self.points[0]).max() < _SAME), self.period)
 
     @property
     def state(self) -> State:

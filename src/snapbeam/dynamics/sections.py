@@ -148,8 +148,7 @@ def _passages(
     def off(times: _Array) -> _Array:
         """Distances from the level at instants in any order."""
         instants, back = np.unique(times, return_inverse=True)
-        found: _Array = (simulate(system, how, sample_times=instants).dataset[name].values - value)[back]
-        return found
+        return np.asarray((simulate(system, how, sample_times=instants).dataset[name].values - value)[back])
 
     found = find_root(off, (grid[at], grid[at + 1]), maxiter=_ROUNDS)
     words = f"{int(found.nit.max())} rounds of Chandrupatla's rule" + ("" if found.success.all() else ", the maximum")

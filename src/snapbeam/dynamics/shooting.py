@@ -87,8 +87,7 @@ class Family:
             np.stack([self.advance(x[None], periods, each).states[0] for each in values + sign * np.diag(step)])
             for sign in (1.0, -1.0)
         )
-        change: _Array = (above - below).T / (2.0 * step)
-        return change
+        return np.asarray((above - below).T / (2.0 * step))
 
 
 class Return(NamedTuple):

@@ -189,7 +189,10 @@ class Stroboscope:
         return found[0] if len(found) == 1 else joined(found)
 
     def _begun(self, states: ArrayLike) -> State:
-        rows = _rows(states)
+        try:
+            rows = np.atleast_2d(np.asarray(states, dtype=np.float64))
+        except (TypeError, ValueError, OverflowError):
+            raise InputTypeError(f"states = {shown(states)}: must be an array of numbers, a row a run") from None
         if rows.ndim != 2 or rows.shape[1] != self.dimension:
             raise InputError(f"states of shape {rows.shape}: must have the shape (runs, {self.dimension})")
         # a failed state stands still and stays lost
@@ -225,14 +228,12 @@ class Stroboscope:
             here, above, below = (self._ensemble(begun, 1, each) for each in points)
             if not (native.unchanged(above, below) and native.differentiable(above, below)):
                 ends = [self.advance(x[None], periods, points=each) for each in points[1:]]
-                change: _Array = (ends[0].states - ends[1].states)[0] / (2.0 * step)
-                return change
+                return np.asarray((ends[0].states - ends[1].states)[0] / (2.0 * step))
             moved = self._moved(here, moved, np.zeros(1, bool), (above, below, 2.0 * step))
             begun = self._advance_part(begun, 1, False, given, None).hidden
             # the gap says where the tip is, whatever the parameter moves
             begun = replace(begun, striker_position=np.array(np.nan), modal=None)
-        found: _Array = moved[0, 0]
-        return found
+        return np.asarray(moved[0, 0])
 
     def _advance_part(
         self, begun: State, periods: int, every: bool, points: Mapping[str, _Array] | None, tangents: _Array | None
@@ -331,11 +332,3 @@ def settling_periods(
     if wanted < least:
         return least, f"the minimum of {least} periods; {rule} are {wanted:.3g}"
     return math.ceil(wanted), rule
-
-
-def _rows(states: ArrayLike) -> _Array:
-    """States as rows of numbers, NaN in those that were lost."""
-    try:
-        return np.atleast_2d(np.asarray(states, dtype=np.float64))
-    except (TypeError, ValueError, OverflowError):
-        raise InputTypeError(f"states = {shown(states)}: must be an array of numbers, a row a run") from None

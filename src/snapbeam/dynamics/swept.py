@@ -293,7 +293,8 @@ def hysteresis(
     told = reported(progress, "hysteresis", "values")
     rows = rows_for(len(system.contacts))
     tables: dict[str, Any] = {
-        key: np.full((len(kinds), count), _missing(key, each.dtype), each.dtype) for key, each in rows.items()
+        key: np.full((len(kinds), count), _MISSING.get(key, np.nan if each.dtype == "float64" else 0), each.dtype)
+        for key, each in rows.items()
     }
     state = system.initial_state
     places = [(i, k) for i, kind in enumerate(kinds) for k in swept.order(kind)]
@@ -339,10 +340,5 @@ _OF_ONE_RUN = {"title", "response_class", "status", "system_hash", "parameter_ha
 """Attributes of a run that do not hold for all runs."""
 
 
-def _missing(name: str, kind: str) -> Any:
-    """Value of a statistic of a run that was not computed."""
-    if name == "response_class":
-        return int(ResponseClass.UNKNOWN)
-    if name == "status":
-        return int(RunStatus.NOT_RUN)
-    return np.nan if kind == "float64" else 0
+_MISSING = {"response_class": int(ResponseClass.UNKNOWN), "status": int(RunStatus.NOT_RUN)}
+"""Values of statistics of a run that was not computed."""
