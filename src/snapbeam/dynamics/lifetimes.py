@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from snapbeam.dynamics.flow import InitialConditions, held_in_space, starts_of
+from snapbeam.dynamics.results import in_unit
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -131,7 +132,7 @@ def fit_lifetime(
     batch = times.shape[:-1]
     times, ends = times.reshape(-1, times.shape[-1]), ends.reshape(-1, times.shape[-1])
     rows = [_fit_one(t[~np.isnan(t)], e[~np.isnan(t)], delay) for t, e in zip(times, ends, strict=True)]
-    begun, count, lasting, exposure, distance, used = (np.array(column) for column in zip(*rows, strict=True))
+    begun, count, lasting, exposure, goodness = (np.array(column) for column in zip(*rows, strict=True))
     shape = np.where(lasting == 0, count, count + _JEFFREYS)
     tail = 0.5 * (1.0 - share)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -139,23 +140,18 @@ def fit_lifetime(
         high = np.where(count > 0, exposure / stats.gamma.ppf(tail, np.maximum(shape, 1e-9)), np.inf)
         low = exposure / stats.gamma.ppf(1.0 - tail, np.maximum(shape, 1e-9))
     unknown = exposure <= 0.0
-    low = np.where(unknown, 0.0, low)
-    high = np.where(unknown, np.inf, high)
-    tau = np.where(unknown, np.nan, tau)
-    goodness = np.where(used >= 2, stats.kstwo.sf(distance, np.maximum(used, 1)), np.nan)
-    return LifetimeFit(
-        tau.reshape(batch), low.reshape(batch), high.reshape(batch), begun.reshape(batch),
-        count.astype(np.int64).reshape(batch), lasting.astype(np.int64).reshape(batch), goodness.reshape(batch),
-    )  # fmt: skip
+    low, high, tau = (np.where(unknown, other, each) for each, other in ((low, 0.0), (high, np.inf), (tau, np.nan)))
+    found: list[Any] = [tau, low, high, begun, count.astype(np.int64), lasting.astype(np.int64), goodness]
+    return LifetimeFit(*(each.reshape(batch) for each in found))
 
 
 def _fit_one(times: _Array, ends: NDArray[np.bool_], delay: float | None) -> tuple[float, ...]:
-    """Delay, ends, lasting, time at risk, distance from the exponential and the ends that it was measured with."""
+    """Delay, ends, lasting, time at risk, and goodness."""
     if delay is not None:
         kept = times >= delay
         return (delay, *_from(times[kept] - delay, ends[kept]))
     if not ends.any():
-        return np.nan, 0, times.size, float(times.sum()), np.nan, 0
+        return np.nan, 0, times.size, float(times.sum()), np.nan
     moments = np.sort(times[ends])
     most = moments.size - max(_FEWEST, moments.size // 2)
     found: tuple[float, ...] = ()
@@ -166,7 +162,7 @@ def _fit_one(times: _Array, ends: NDArray[np.bool_], delay: float | None) -> tup
         kept[first] = False
         tried = (begun, *_from(times[kept] - begun, ends[kept]))
         found = found or tried
-        if not tried[5] >= 2 or stats.kstwo.sf(tried[4], tried[5]) >= _REFUSED:
+        if not tried[4] < _REFUSED:
             return tried
     return found
 
@@ -183,11 +179,8 @@ def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
     lasting = int(times.size - count)
     if lasting == 0:
         marks = marks[:-1]
-    distance = np.nan
-    if marks.size >= 2:
-        steps = np.arange(marks.size + 1) / marks.size
-        distance = max(float((steps[1:] - marks).max()), float((marks - steps[:-1]).max()))
-    return count, lasting, exposure, distance, marks.size
+    goodness = float(stats.kstest(marks, "uniform", method="exact").pvalue) if marks.size >= 2 else np.nan
+    return count, lasting, exposure, goodness
 
 
 # What a sweep keeps of many starts at every point: when each snapped last, and where it ended.
@@ -409,23 +402,18 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
     dims = (*points.dims, START)
     kept = work.columns(table)
     failed = ~np.isin(kept["status"], _REACHED)
+    last, well = np.where(failed, np.nan, kept["last_snap"]), np.where(failed, 0, kept["well"])
+    sides = {"flag_values": np.array([-1, 0, 1], dtype=np.int8), "flag_meanings": "first unknown other"}
     columns: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
-        "last_snap": (kept["last_snap"], "1", "cycle of the last crossing; NaN: never, or not known", {}),
-        "snaps": (kept["zero_crossings"], "1", "crossings of the centre", {}),
-        "late_snaps": (kept["late_crossings"], "1", "crossings in the last quarter of the run", {}),
-        "end_well": (
-            np.where(failed, 0, kept["well"]), "1", "well that the run ended about",
-            {"flag_values": np.array([-1, 0, 1], dtype=np.int8), "flag_meanings": "first unknown other"},
-        ),
-        "final_well_proven": (kept["final"] != 0, "1", "whether the run provably ends there", {}),
-        "status": (kept["status"], "1", "status of the run", code_flags(RunStatus)),
-    }  # fmt: skip
-    kinds = {"last_snap": "float64", "snaps": "int32", "late_snaps": "int32", "final_well_proven": "bool"}
-    for name, (values, unit, words, labels) in columns.items():
-        if name == "last_snap":
-            values = np.where(failed, np.nan, values)
-        array = points.arranged(np.asarray(values).astype(kinds.get(name, "int8")))
-        dataset[name] = (dims, array, {"units": unit, "long_name": words} | labels)
+        "last_snap": (last, "float64", "cycle of the last crossing; NaN: never, or not known", {}),
+        "snaps": (kept["zero_crossings"], "int32", "crossings of the centre", {}),
+        "late_snaps": (kept["late_crossings"], "int32", "crossings in the last quarter of the run", {}),
+        "end_well": (well, "int8", "well that the run ended about", sides),
+        "final_well_proven": (kept["final"] != 0, "bool", "whether the run provably ends there", {}),
+        "status": (kept["status"], "int8", "status of the run", code_flags(RunStatus)),
+    }
+    for name, (values, kind, words, labels) in columns.items():
+        dataset[name] = (dims, points.arranged(values.astype(kind)), in_unit("1", words) | labels)
     return dataset
 
 
@@ -475,7 +463,7 @@ def refit(dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: 
         "runs_failed": ((~good).sum(axis=-1), "runs that failed"),
     }
     for name, (values, text) in words.items():
-        result[name] = (dims, values, {"units": "1", "long_name": text})
+        result[name] = (dims, values, in_unit("1", text))
 
     def enter(name: str, dim: str, hits: list[NDArray[np.int64]], words: str) -> None:
         table = np.stack(hits, axis=-1)
@@ -483,13 +471,13 @@ def refit(dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: 
         for ending, values, text in zip(
             ("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True
         ):
-            result[f"{name}{ending}"] = ((*dims, dim), values, {"units": "1", "long_name": f"{text}{words}"})
+            result[f"{name}{ending}"] = ((*dims, dim), values, in_unit("1", f"{text}{words}"))
 
     ended, well = good & ~lasting, runs["end_well"].values
     result[WELL] = ((WELL,), list(WELLS), {"long_name": "well that a run ends about"})
     hits = [(ended & (well == side)).sum(axis=-1) for side in (-1, 1)]
     enter("end_probability", WELL, hits, "probability of ending in a well")
-    result[AFTER] = ((AFTER,), cycles_after, {"units": "1", "long_name": "cycles"})
+    result[AFTER] = ((AFTER,), cycles_after, in_unit("1", "cycles"))
     hits = [(good & (time > cycle)).sum(axis=-1) + (lasting & (time == cycle)).sum(axis=-1) for cycle in cycles_after]
     enter("snapping_probability", AFTER, hits, "probability of snapping on after so many cycles")
     result.attrs |= {"settling_cycles": settings.settling_cycles, "confidence": settings.confidence}
