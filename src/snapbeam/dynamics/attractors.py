@@ -16,7 +16,7 @@ from scipy.stats import beta
 from snapbeam.dynamics.flow import AdvancedStates, Flow, minimal_period
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, in_unit, labelled, reported
+from snapbeam.dynamics.results import in_unit, of_flow, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, jacobian, orbit_tolerance, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
@@ -229,11 +229,11 @@ class Attractors:
         """Kinds, periods, exponents, shares and points, labelled."""
         unit = "1/s" if isinstance(self.flow, Stroboscope) else "1"
         of, every = "attractor", self.attractors
-        attrs = fixed_parameters(self.flow) | {
+        attrs = {
             "title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods,
             "unseen_share_95": self.unseen_share(), "termination_reason": self.termination_reason,
         }  # fmt: skip
-        variables: dict[str, tuple[Any, Any, Any]] = {
+        variables = {
             "kind": (of, [each.kind for each in every], {"long_name": "kind of attractor"}),
             "period": (of, [each.period for each in every], "periods; 0: chaotic"),
             "exponent": (of, [each.exponent for each in every], in_unit(unit, "largest exponent")),
@@ -242,7 +242,7 @@ class Attractors:
             "points": ((of, "point", "coordinate"), self.every_point, "the attractor once a period"),
             "label": ("state", self.labels, "attractor that a state goes to; -1: undecided"),
         }  # fmt: skip
-        return labelled(variables, {"coordinate": coordinate_names(self.flow)}, attrs)
+        return of_flow(self.flow, variables, attrs)
 
     @property
     def every_point(self) -> _Array:

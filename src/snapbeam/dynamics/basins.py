@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage, stats
+from scipy import ndimage, special, stats
 
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
 from snapbeam.dynamics.flow import Flow
@@ -22,10 +22,8 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, checked, 
 if TYPE_CHECKING:
     import xarray as xr
 
-_SIGMAS = 3.0
-
-
 _Array = NDArray[np.float64]
+_SIGMAS = 3.0
 _AMONG = 8
 """Looks in a row at which a state must lie among the points of a chaotic attractor."""
 _MANY = 0.05
@@ -189,10 +187,8 @@ def _plane(
         base = np.zeros(flow.dimension)
     else:
         base = state_of(flow, "fixed_coordinates", rest)
-    first, second = np.meshgrid(*columns, indexing="ij")
-    rows = np.repeat(base[None], first.size, axis=0)
-    rows[:, known.index(names[0])] = first.ravel()
-    rows[:, known.index(names[1])] = second.ravel()
+    rows = np.repeat(base[None], columns[0].size * columns[1].size, axis=0)
+    rows[:, [known.index(name) for name in names]] = np.stack(np.meshgrid(*columns, indexing="ij"), -1).reshape(-1, 2)
     return names, columns, rows
 
 
@@ -216,10 +212,8 @@ def _labelled(
                     continue
                 inside &= among[number, open_] >= _AMONG
             else:
-                inside = np.zeros(open_.size, dtype=bool)
-                for ball in captures:
-                    if ball.radius > 0.0:
-                        inside |= ball.holds(x)
+                held = [ball.holds(x) for ball in captures if ball.radius > 0.0]
+                inside = np.any([np.zeros(open_.size, dtype=bool), *held], axis=0)
             inside &= ~taken
             label[open_[inside]], after[open_[inside]] = number, done
             taken |= inside
@@ -244,16 +238,13 @@ def _dataset(
         for name, column in zip(names, columns, strict=True)
     }
     attrs = {"title": "basins of attraction", "periods": total, "undecided": float((label == UNDECIDED).mean())}
-    return labelled(
-        {
-            "basin": (names, label.reshape(shape), words),
-            "captured_after": (names, after.reshape(shape), "periods until certain"),
-            "attractor_points": (
-                ("attractor", "point", "coordinate"), found.every_point[..., places], "attractors there"
-            ),
-        },
-        coords, fixed_parameters(found.flow) | attrs,
-    )  # fmt: skip
+    points = found.every_point[..., places]
+    variables = {
+        "basin": (names, label.reshape(shape), words),
+        "captured_after": (names, after.reshape(shape), "periods until certain"),
+        "attractor_points": (("attractor", "point", "coordinate"), points, "attractors there"),
+    }
+    return labelled(variables, coords, fixed_parameters(found.flow) | attrs)
 
 
 def _long_name(name: str) -> str:
@@ -367,8 +358,7 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
 
 def _entropy(counts: NDArray[Any]) -> _Array:
     """Entropy of rows of counts; 0 where all are 0."""
-    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
-    return np.asarray(-np.where(share > 0.0, share * np.log(np.where(share > 0.0, share, 1.0)), 0.0).sum(axis=1))
+    return np.asarray(special.entr(counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)).sum(axis=1))
 
 
 def _extremes(counts: NDArray[Any], lost: NDArray[Any]) -> tuple[_Array, _Array, _Array]:

@@ -30,7 +30,7 @@ from snapbeam.dynamics.approaches import penetrations, turning_points
 from snapbeam.dynamics.arclength import OrbitEquations, Point, follow, tangent_of
 from snapbeam.dynamics.branches import SpecialPoint
 from snapbeam.dynamics.flow import Flow
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels, reported
+from snapbeam.dynamics.results import multiplier_rows, of_flow, parameter_labels, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, impacts_of, jacobian, orbit_tolerance
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.hertz import HertzContact
@@ -435,21 +435,18 @@ def _dataset(
     errors = np.array([curve.error(point, relative) for point in points])
     values = np.array([curve.values(point.y) for point in points])
     places = np.reshape([curve.values(point.y) for _, point in special], (-1, 2))
-    multipliers = np.array([np.linalg.eigvals(point.came.jacobian) for point in points])
     of_kind, kinds = {"long_name": "kind of the point of codimension two"}, [kind for kind, _ in special]
-    variables: dict[str, tuple[Any, Any, Any]] = {
+    multipliers = np.array([np.linalg.eigvals(point.came.jacobian) for point in points])
+    variables = multiplier_rows(multipliers, "point") | {
         "state": (
             ("point", "coordinate"), np.array([by.state(point.y, flow) for by, point in seen]),
             "state of the orbit at the phase of observation of the special point",
         ),
-        "multiplier_real": (("point", "multiplier"), multipliers.real, "Floquet multiplier"),
-        "multiplier_imag": (("point", "multiplier"), multipliers.imag, "its imaginary part"),
         "impacts": ("point", np.array([p.came.impacts for p in points], np.int32), "impacts within the period"),
         "residual": ("point", np.array([p.residual for p in points]), "of the return and of the condition"),
         "special_point_kind": ("special_point", np.array(kinds, dtype=str), of_kind),
     }  # fmt: skip
-    coords: dict[str, Any] = {"coordinate": coordinate_names(flow)}
-    shorts = []
+    coords, shorts = {}, []
     for k, name in enumerate(names):
         short, labels = parameter_labels(flow, name)
         shorts.append(short)
@@ -457,7 +454,7 @@ def _dataset(
         off = labels | {"long_name": f"by how much it may be off at these steps: {labels['long_name']}"}
         variables[f"{short}_error"] = ("point", errors[:, k], off)
         variables[f"special_point_{short}"] = ("special_point", places[:, k], labels)
-    attrs = fixed_parameters(flow, *shorts) | {
+    attrs: dict[str, Any] = {
         "title": f"bifurcation curve of periodic orbits: {curve.kind}", "kind": curve.kind, "parameters": shorts,
         "period": curve.period, "termination_reason": ends,
     }  # fmt: skip
@@ -465,4 +462,4 @@ def _dataset(
         assert isinstance(flow, Stroboscope)
         left_out = flow.system.contacts[0].law == HertzContact(_WITHOUT_FORCE)
         attrs |= {"kept_gap": curve.room, "contact_force": "left out" if left_out else "included"}
-    return labelled(variables, coords, attrs)
+    return of_flow(flow, variables, attrs, coords, shorts)

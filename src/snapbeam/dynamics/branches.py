@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from snapbeam.dynamics.arclength import OrbitEquations, Path, Point, follow, tangent_of
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, orbit_at
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels, reported
+from snapbeam.dynamics.results import multiplier_rows, of_flow, parameter_labels, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, jacobian, orbit_tolerance
 from snapbeam.dynamics.stroboscope import Stroboscope, jumps
 from snapbeam.util.display import plotter
@@ -138,11 +138,9 @@ class Branch:
         steps = np.linalg.norm(np.diff(states, axis=0), axis=1)
         there = [orbit_at(point.orbit, first.flow).coordinates for point in special]
         off = labels | {"long_name": f"by how much it may be off at these steps: {labels['long_name']}"}
-        coordinates, multipliers = ("orbit", "coordinate"), ("orbit", "multiplier")
-        variables: dict[str, tuple[Any, Any, Any]] = {
-            "state": (coordinates, states, "state of the orbit at the phase of observation of the first orbit"),
-            "multiplier_real": (multipliers, values.real, "Floquet multiplier"),
-            "multiplier_imag": (multipliers, values.imag, "its imaginary part"),
+        words = "state of the orbit at the phase of observation of the first orbit"
+        variables = multiplier_rows(values, "orbit") | {
+            "state": (("orbit", "coordinate"), states, words),
             "stable": ("orbit", self.is_stable, "whether every multiplier is inside the unit circle"),
             "impacts": ("orbit", np.array(self.impacts, np.int32), "impacts within the period"),
             "arclength": ("orbit", np.append(0.0, np.cumsum(steps)), "length of the branch in states"),
@@ -163,15 +161,12 @@ class Branch:
             variables["midspan_displacement"] = ("orbit", centers[:, 0], words)
             words = "centre displacement once a period of the drive, over b"
             variables["midspan_returns"] = (("orbit", "return"), centers, words)
-        coords = {
-            "coordinate": coordinate_names(first.flow),
-            short: ("orbit", self.values, labels | {"parameter": self.name}),
-        }
-        attrs = fixed_parameters(first.flow, short) | {
+        coords = {short: ("orbit", self.values, labels | {"parameter": self.name})}
+        attrs = {
             "title": "branch of periodic orbits", "parameter": short, "period": first.period,
             "termination_reason": self.termination_reason,
         }  # fmt: skip
-        return labelled(variables, coords, attrs)
+        return of_flow(first.flow, variables, attrs, coords, (short,))
 
 
 def _centers(orbit: PeriodicOrbit) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.flow import Flow, minimal_period
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot, state_of
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, reported
+from snapbeam.dynamics.results import multiplier_rows, of_flow, reported
 from snapbeam.dynamics.shooting import OrbitNotFoundError, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of
 from snapbeam.model.integration import Integration
@@ -71,22 +71,14 @@ class EdgeState:
         settled = np.empty((0, self.flow.dimension)) if self.orbit is None else self.orbit.points
         values = np.empty(0, dtype=complex) if self.orbit is None else self.orbit.multipliers
         words = "unstable orbit that it settles on, once a period"
-        return labelled(
-            {
-                "state": (("period", "coordinate"), self.states, "state on the border once a period"),
-                "distance": ("period", self.distance, "distance of the two that hold it"),
-                "orbit_state": (("orbit_period", "coordinate"), settled, words),
-                "multiplier_real": ("multiplier", values.real, "its multipliers"),
-                "multiplier_imag": ("multiplier", values.imag, "imaginary part"),
-            },
-            {"coordinate": coordinate_names(self.flow)},
-            fixed_parameters(self.flow)
-            | {
-                "title": "edge state",
-                "period": 0 if self.orbit is None else self.orbit.period,
-                "termination_reason": self.termination_reason,
-            },
-        )
+        variables = {
+            "state": (("period", "coordinate"), self.states, "state on the border once a period"),
+            "distance": ("period", self.distance, "distance of the two that hold it"),
+            "orbit_state": (("orbit_period", "coordinate"), settled, words),
+        }
+        period = 0 if self.orbit is None else self.orbit.period
+        attrs = {"title": "edge state", "period": period, "termination_reason": self.termination_reason}
+        return of_flow(self.flow, variables | multiplier_rows(values), attrs)
 
     def __repr__(self) -> str:
         end = "on no orbit" if self.orbit is None else f"on {self.orbit!r}".replace("<", "").replace(">", "")
@@ -163,10 +155,10 @@ def edge_tracking(
             f"u1, u2: the outcomes within {ahead} periods are {bool(told[0])} and {bool(told[1])}; must be "
             "False and True"
         )
-    if not far <= _FARTHEST * float(np.abs(high - low).max()):
+    apart = float(np.abs(high - low).max())
+    if not far <= _FARTHEST * apart:
         raise InputError(
-            f"diverge_threshold = {far:g}: must be at most {_FARTHEST:g} times the distance of u1 and u2, "
-            f"{float(np.abs(high - low).max()):.3g}"
+            f"diverge_threshold = {far:g}: must be at most {_FARTHEST:g} times the distance of u1 and u2, {apart:.3g}"
         )
     states: list[_Array] = []
     distances, closest = [], 0.0

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, periodic_orbit
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.results import labelled, of_flow
 from snapbeam.dynamics.shooting import OrbitNotFoundError
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
@@ -361,19 +361,19 @@ def _dataset(
     ages, states = (np.concatenate([each[k] for each in branches]) for k in (1, 2))
     sides = np.concatenate([np.full(age.size, side, np.int8) for side, age, *_ in branches])
     steps = [np.linalg.norm(np.diff(known, axis=0), axis=1) for _, _, known, _ in branches]
-    variables: dict[str, tuple[Any, Any, Any]] = {
+    variables = {
         "state": (("point", "coordinate"), states, "state"),
         "side": ("point", sides, "branch"),
         "arclength": ("point", np.concatenate([np.append(0.0, np.cumsum(own)) for own in steps]), "length of the branch"),
         "age": ("point", ages, "applications of the map since the fundamental segment"),
         "saddle": ("coordinate", orbit.coordinates, "state of the orbit"),
     }  # fmt: skip
-    attrs = fixed_parameters(orbit.flow) | {
+    attrs = {
         "title": f"{stability} manifold of a periodic orbit", "stability": stability,
         "multiplier": multiplier, "period": orbit.period, "chord_error": error,
         "termination_reason": "; ".join(reason for *_, reason in branches),
     }  # fmt: skip
-    return labelled(variables, {"coordinate": coordinate_names(orbit.flow)}, attrs)
+    return of_flow(orbit.flow, variables, attrs)
 
 
 @checked

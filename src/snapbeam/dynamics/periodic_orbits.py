@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.approaches import Passage, between_contacts, carried, passage_of
 from snapbeam.dynamics.flow import Flow
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.results import multiplier_rows, of_flow
 from snapbeam.dynamics.shooting import (
     Family,
     OrbitNotFoundError,
@@ -133,16 +133,9 @@ class PeriodicOrbit:
 
     def to_dataset(self) -> xr.Dataset:
         """The orbit once a period, and its multipliers, labelled."""
-        return labelled(
-            {
-                "state": (("period", "coordinate"), self.points, "state once a period"),
-                "multiplier_real": ("multiplier", self.multipliers.real, "Floquet multiplier"),
-                "multiplier_imag": ("multiplier", self.multipliers.imag, "its imaginary part"),
-            },
-            {"coordinate": coordinate_names(self.flow)},
-            fixed_parameters(self.flow)
-            | {"period": self.period, "residual": self.residual, "stable": int(self.is_stable)},
-        )
+        points = {"state": (("period", "coordinate"), self.points, "state once a period")}
+        attrs = {"period": self.period, "residual": self.residual, "stable": int(self.is_stable)}
+        return of_flow(self.flow, points | multiplier_rows(self.multipliers), attrs)
 
     def __repr__(self) -> str:
         kind = "stable" if self.is_stable else f"unstable ({self.unstable})"
