@@ -86,6 +86,25 @@ def _clock(max_seconds: float | None, progress: Callable[[float], object] | bool
     return _Clock(end, sharing(progress, what), 0.0, 1.0)
 
 
+class _Resolution(NamedTuple):
+    """Length and resolution of a branch."""
+
+    length: float
+    distance: float
+    turn: float
+    points: int
+
+
+def _resolution(max_arclength: float, max_distance: float, max_turn: float, max_points: int) -> _Resolution:
+    """The arguments of :func:`invariant_manifold`, checked."""
+    return _Resolution(
+        within("max_arclength", max_arclength, 0.0, 1e4, closed="right"),
+        within("max_distance", max_distance, 1e-6, 1.0, closed="both"),
+        within("max_turn", max_turn, 1e-3, 1.0, closed="both"),
+        integer("max_points", max_points, 10, 10**6),
+    )
+
+
 class _Segment(NamedTuple):
     """The fundamental segment of one branch."""
 
@@ -133,16 +152,13 @@ class _Segment(NamedTuple):
         return found
 
 
-def _grow(
-    segment: _Segment, max_arclength: float, max_distance: float, max_turn: float, max_points: int, clock: _Clock
-) -> tuple[_Array, _Array, str]:
+def _grow(segment: _Segment, fine: _Resolution, clock: _Clock) -> tuple[_Array, _Array, str]:
     """Age and state of the points of a branch, and the reason for its end."""
     ages = np.linspace(0.0, 1.0, _BEGUN)
     levels = [(ages, segment.begin(ages))]
     length = np.zeros(1)
     while True:
-        left = max_arclength - float(length[-1])
-        found = _next_level(segment, levels, left, max_distance, max_turn, max_points, clock)
+        found = _next_level(segment, levels, fine.length - float(length[-1]), fine, clock)
         if not isinstance(found, str):
             levels.append(found)
         age = np.concatenate(
@@ -150,8 +166,8 @@ def _grow(
         )
         states = np.concatenate([*(known[:-1] for _, known in levels), levels[-1][1][-1:]])
         length = np.linalg.norm(np.diff(states, axis=0), axis=1).cumsum()
-        end = 1 + int(np.searchsorted(length, max_arclength))
-        clock.tell(min(float(length[-1]) / max_arclength, 1.0))
+        end = 1 + int(np.searchsorted(length, fine.length))
+        clock.tell(min(float(length[-1]) / fine.length, 1.0))
         if isinstance(found, str) or end < len(states):
             return age[: end + 1], states[: end + 1], "max_arclength" if end < len(states) else str(found)
 
@@ -161,16 +177,10 @@ _Levels = list[tuple[_Array, _Array]]
 
 
 def _next_level(
-    segment: _Segment,
-    levels: _Levels,
-    length: float,
-    max_distance: float,
-    max_turn: float,
-    max_points: int,
-    clock: _Clock,
+    segment: _Segment, levels: _Levels, length: float, fine: _Resolution, clock: _Clock
 ) -> tuple[_Array, _Array] | str:
     """Ages and states of the image of the last level up to a length, points inserted, or the reason why there is none."""
-    room = max_points - sum(len(own) for own, _ in levels)
+    room = fine.points - sum(len(own) for own, _ in levels)
     ages, before = levels[-1]
     states = np.full_like(before, np.nan)
     while ages.size <= room:
@@ -201,7 +211,7 @@ def _next_level(
             places = np.flatnonzero(still[1:] != still[:-1])
             parts, words = np.full(places.size, _PARTS), "the inverse map does not converge"
         else:
-            places, parts = _gaps(ages, states, max_distance, max_turn)
+            places, parts = _gaps(states, fine)
             words = "the map jumps, or the curve bends too sharply for max_distance and max_turn"
             if not places.size:
                 return ages, states
@@ -228,21 +238,19 @@ def _between(wanted: _Array, ages: _Array, states: _Array) -> _Array:
     return found
 
 
-def _gaps(
-    ages: _Array, states: _Array, max_distance: float, max_turn: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _gaps(states: _Array, fine: _Resolution) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Places after which points must be inserted, and into how many parts they divide the chord there."""
     chords = np.diff(states, axis=0)
     size = np.linalg.norm(chords, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         cosine = np.sum(chords[1:] * chords[:-1], axis=1) / (size[1:] * size[:-1])
-        sharp = ~(cosine >= np.cos(max_turn)) & (size[1:] + size[:-1] > _CLOSEST * max_distance)
-    missing = size > max_distance
+        sharp = ~(cosine >= np.cos(fine.turn)) & (size[1:] + size[:-1] > _CLOSEST * fine.distance)
+    missing = size > fine.distance
     longer = size[1:] > size[:-1]
     missing[1:] |= sharp & longer
     missing[:-1] |= sharp & ~longer
     places = np.flatnonzero(missing)
-    return places, np.clip(np.ceil(size[places] / max_distance), 2, _MOST_PARTS).astype(np.intp)
+    return places, np.clip(np.ceil(size[places] / fine.distance), 2, _MOST_PARTS).astype(np.intp)
 
 
 @checked
@@ -312,17 +320,11 @@ def invariant_manifold(
     """
     instance("orbit", orbit, PeriodicOrbit, "an orbit, as periodic_orbit gives")
     inverse = choice("stability", stability, ("unstable", "stable")) == "stable"
-    length = within("max_arclength", max_arclength, 0.0, 1e4, closed="right")
-    distance = within("max_distance", max_distance, 1e-6, 1.0, closed="both")
-    turn = within("max_turn", max_turn, 1e-3, 1.0, closed="both")
-    most = integer("max_points", max_points, 10, 10**6)
-    clock = _clock(max_seconds, progress, f"{stability} manifold")
-    return _manifold(orbit, inverse, length, distance, turn, most, clock)
+    fine = _resolution(max_arclength, max_distance, max_turn, max_points)
+    return _manifold(orbit, inverse, fine, _clock(max_seconds, progress, f"{stability} manifold"))
 
 
-def _manifold(
-    orbit: PeriodicOrbit, inverse: bool, length: float, distance: float, turn: float, most: int, clock: _Clock
-) -> xr.Dataset:
+def _manifold(orbit: PeriodicOrbit, inverse: bool, fine: _Resolution, clock: _Clock) -> xr.Dataset:
     """Both branches of a manifold."""
     stability = "stable" if inverse else "unstable"
     flow = orbit.flow
@@ -347,17 +349,7 @@ def _manifold(
     for number, side in enumerate((1, -1)):
         begun = side * _NEAR_SADDLE * vector / np.linalg.norm(vector)
         segment = _Segment(flow, twice * orbit.period, orbit.coordinates, begun, factor, inverse)
-        branches.append((side, *_grow(segment, length, distance, turn, most, clock.half(number))))
-    return _dataset(orbit, stability, value, branches, distance * turn / 8.0)
-
-
-def _dataset(
-    orbit: PeriodicOrbit,
-    stability: str,
-    multiplier: float,
-    branches: list[tuple[int, _Array, _Array, str]],
-    error: float,
-) -> xr.Dataset:
+        branches.append((side, *_grow(segment, fine, clock.half(number))))
     ages, states = (np.concatenate([each[k] for each in branches]) for k in (1, 2))
     sides = np.concatenate([np.full(age.size, side, np.int8) for side, age, *_ in branches])
     steps = [np.linalg.norm(np.diff(known, axis=0), axis=1) for _, _, known, _ in branches]
@@ -370,7 +362,7 @@ def _dataset(
     }  # fmt: skip
     attrs = {
         "title": f"{stability} manifold of a periodic orbit", "stability": stability,
-        "multiplier": multiplier, "period": orbit.period, "chord_error": error,
+        "multiplier": value, "period": orbit.period, "chord_error": fine.distance * fine.turn / 8.0,
         "termination_reason": "; ".join(reason for *_, reason in branches),
     }  # fmt: skip
     return of_flow(orbit.flow, variables, attrs)
@@ -524,9 +516,7 @@ def homoclinic_tangency(
     instance("orbit", orbit, PeriodicOrbit, "an orbit, as periodic_orbit gives")
     low, high = interval("bounds", bounds)
     width = within("tolerance", tolerance, 1e-9, 0.5, closed="both") * (high - low)
-    length = within("max_arclength", max_arclength, 0.0, 1e4, closed="right")
-    distance = within("max_distance", max_distance, 1e-6, 1.0, closed="both")
-    turn = within("max_turn", max_turn, 1e-3, 1.0, closed="both")
+    fine = _resolution(max_arclength, max_distance, max_turn, _POINTS)
     total = 2 + int(np.ceil(np.log2((high - low) / width)))
     clock = _clock(max_seconds, progress, "homoclinic tangency")
     tried: dict[float, bool] = {}
@@ -540,10 +530,7 @@ def homoclinic_tangency(
         try:
             saddle = _continued(min(saddles, key=lambda each: abs(each.flow.value(name) - value)), name, value)
             saddles.append(saddle)
-            both = [
-                _manifold(saddle, inverse, length, distance, turn, _POINTS, part.half(int(inverse)))
-                for inverse in (False, True)
-            ]
+            both = [_manifold(saddle, inverse, fine, part.half(int(inverse))) for inverse in (False, True)]
         except (InputError, OrbitNotFoundError) as error:
             if not tried:
                 raise
@@ -588,7 +575,7 @@ def homoclinic_tangency(
         {"value": ("value", np.array(values), {"long_name": name}), "manifolds": ["apart", "crossing"]},
         {
             "title": "homoclinic tangency", "parameter": name, "termination_reason": reason,
-            "max_arclength": length, "max_distance": distance, "max_turn": turn,
+            "max_arclength": fine.length, "max_distance": fine.distance, "max_turn": fine.turn,
         },
     )  # fmt: skip
 
