@@ -18,6 +18,7 @@ from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, newton
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.util.singular_values import svd
+from snapbeam.util.validation import within
 
 _Array = NDArray[np.float64]
 _SHORTEST = 1e-7
@@ -200,6 +201,13 @@ class OrbitEquations(Equations):
         """Adapt the equations to a point nearby."""
 
 
+def distances(step: float, max_step: float, shortest: float) -> tuple[float, float]:
+    """The first and the longest distance between two points of a curve, checked."""
+    steps = {"step": step, "max_step": max_step}
+    first, longest = (within(name, value, shortest, 1.0, closed="both") for name, value in steps.items())
+    return first, longest
+
+
 E_ = TypeVar("E_", bound=Equations)
 
 
@@ -228,7 +236,7 @@ def follow(
     *limits*, of shape (k, 2), are those of the last k unknowns; *what* is the noun of a point, for the reason of the end.
     """
     path: Path[E_] = Path([(equations, first)])
-    points, count, length = path.points, len(limits), step
+    points, count, length = path.points, len(limits), min(step, max_step)
     while len(points) < max_points:
         try:
             points[-1] = points[-1][0].observed(points[-1][1])  # type: ignore[assignment]

@@ -143,7 +143,7 @@ def backbone_curve(
     def branch(way: float, before: int, most: int) -> Path[_Motions]:
         start = first._replace(tangent=way * first.tangent)
         path = follow(
-            motions, start, limits=np.empty((0, 2)), max_points=most, step=min(_FIRST, max_step), max_step=max_step,
+            motions, start, limits=np.empty((0, 2)), max_points=most, step=_FIRST, max_step=max_step,
             progress=lambda done, _: report(before + done, max_points), what="motion",
         )  # fmt: skip
         path.events = [*begun, *path.events][: len(path.points)]

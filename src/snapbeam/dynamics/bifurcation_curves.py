@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.dynamics.approaches import penetrations, turning_points
-from snapbeam.dynamics.arclength import OrbitEquations, Point, follow, tangent_of
+from snapbeam.dynamics.arclength import OrbitEquations, Point, distances, follow, tangent_of
 from snapbeam.dynamics.branches import SpecialPoint
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.results import multiplier_rows, of_flow, parameter_labels, reported
@@ -45,7 +45,8 @@ if TYPE_CHECKING:
 _Array = NDArray[np.float64]
 CURVES = ("fold", "flip", "Neimark-Sacker", "grazing")
 _TOLERANCE = 1e-9
-_SHORTEST, _LONGEST = 1e-6, 1.0
+_SHORTEST = 1e-6
+"""Minimum distance between points."""
 _DIFFERENCE = 1e-5
 """Step of differences, in units of the well's amplitude and of the ranges of the parameters."""
 _HALVINGS = 40
@@ -391,10 +392,7 @@ def bifurcation_curve(
     for k, name in enumerate(names):
         within(name, float(begun[k]), *limits[k], closed="both")
     count = integer("max_points", max_points, 2, 10**6)
-    length, longest = (
-        within(words, value, _SHORTEST, _LONGEST, closed="both")
-        for words, value in (("step", step), ("max_step", max_step))
-    )
+    step, max_step = distances(step, max_step, _SHORTEST)
     spans = limits[:, 1] - limits[:, 0]
     orbit, family = special_point.orbit, Family(flow, *names)
     curve = _Curve(family, orbit.period, spans, orbit_tolerance(tolerance), special_point.kind)
@@ -410,8 +408,8 @@ def bifurcation_curve(
             first._replace(tangent=sign * first.tangent),
             limits=limits / spans[:, None],
             max_points=count,
-            step=min(length, longest),
-            max_step=longest,
+            step=step,
+            max_step=max_step,
             progress=report,
             what="point",
         )

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.arclength import OrbitEquations, Path, Point, follow, tangent_of
+from snapbeam.dynamics.arclength import OrbitEquations, Point, distances, follow, tangent_of
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, orbit_at
 from snapbeam.dynamics.results import multiplier_rows, of_flow, parameter_labels, reported
@@ -375,8 +375,8 @@ def _grazing_end(points: list[tuple[_Orbits, Point]]) -> SpecialPoint | None:
     return SpecialPoint("grazing", orbit, orbits._value(last.y), len(points) - 1, error)
 
 
-_SHORTEST, _LONGEST = 1e-8, 1.0
-"""Allowed range of the distance between orbits."""
+_SHORTEST = 1e-8
+"""Minimum distance between orbits."""
 _DIFFERENCE = 2e-6
 """Step of the difference by the parameter, over its range."""
 
@@ -444,10 +444,7 @@ def continuation(
         raise InputError(f"bounds = ({low:g}, {high:g}): must contain the orbit's own {name} = {begun:g}")
     choice("direction", direction, ("up", "down"))
     count = integer("max_points", max_points, 2, 10**6)
-    length, max_step = (
-        within(words, value, _SHORTEST, _LONGEST, closed="both")
-        for words, value in (("step", step), ("max_step", max_step))
-    )
+    step, max_step = distances(step, max_step, _SHORTEST)
     span = np.array([high - low])
     orbits = _Orbits(Family(orbit.flow, name), orbit.period, span, orbit_tolerance(tolerance))
     y = np.append(orbit.coordinates, begun / span)
@@ -459,23 +456,18 @@ def continuation(
         Point(y, tangent_of(table, towards), came, table, orbit.iterations, orbit.residual),
         limits=np.array([[low, high]]) / span,
         max_points=count,
-        step=min(length, max_step),
+        step=step,
         max_step=max_step,
         progress=report,
     )
     if len(path.points) < count:
         report(len(path.points), len(path.points))
-    return _branch(name, path)
-
-
-def _branch(name: str, path: Path[_Orbits]) -> Branch:
     points, special, end = path.points, path.events, path.end
     grazing = _grazing_end(points) if end.startswith("no further") else None
     if grazing is not None:
         special, end = [*special, grazing], "grazing"
-    impacts = [point.came.impacts for _, point in points]
-    tangents = [point.tangent for _, point in points]
-    return Branch(name, [by.orbit(point) for by, point in points], special, end, impacts, tangents)
+    impacts, followed = [point.came.impacts for _, point in points], [by.orbit(point) for by, point in points]
+    return Branch(name, followed, special, end, impacts, [point.tangent for _, point in points])
 
 
 def switch_branch(
@@ -531,6 +523,6 @@ def switch_branch(
     vector = vectors[:, np.argmin(np.abs(values - (-1.0 if doubled else 1.0)))].real
     row = np.append(vector / np.linalg.norm(vector), 0.0)
     orbits = _Orbits(Family(orbit.flow, name), orbit.period * (2 if doubled else 1), span, _TOLERANCE)
-    away = within("size", size, _SHORTEST, _LONGEST, closed="both") * row
+    away = within("size", size, _SHORTEST, 1.0, closed="both") * row
     guess = np.append(orbit.coordinates, special_point.value / span) + away
     return orbits.orbit(orbits.correct(guess, row, row))
