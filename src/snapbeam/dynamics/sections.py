@@ -107,11 +107,21 @@ def poincare_section(
     else:
         times, off, words = _passages(held, how, level, end, flow.period)
         reason += f"; {words}"
-    result = _dataset(held, how, np.minimum(times, end), flow, section)
-    result.attrs |= {"transient": before, "termination_reason": reason}
-    if off is not None:
-        result.attrs["level_error"] = off
-    return result
+    if not times.size:
+        raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
+    times = np.minimum(times, end)
+    data = simulate(held, how, sample_times=times).dataset
+    kept = data[["displacement_at_striker", "velocity_at_striker", "midspan_displacement", "midspan_velocity", "modal_amplitude",
+                 "modal_velocity"]]  # fmt: skip
+    kept = kept.rename(time="point").reset_coords(drop=True)
+    phases = (flow.clock.striker_phase + 2.0 * np.pi * times / flow.clock.cycle) % (2.0 * np.pi)
+    attrs = {"title": "Poincare section", "section": str(section), "transient": before, "termination_reason": reason}
+    return labelled(
+        {str(name): (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars}
+        | {"drive_phase": ("point", phases, in_unit("rad", "phase of the drive"))},
+        {"time": ("point", times, in_unit("s", "time since the transient"))},
+        data.attrs | attrs | ({} if off is None else {"level_error": off}),
+    )
 
 
 def _level(section: Any) -> tuple[str, float, str] | None:
@@ -153,19 +163,3 @@ def _passages(
     found = find_root(off, (grid[at], grid[at + 1]), maxiter=_ROUNDS)
     words = f"{int(found.nit.max())} rounds of Chandrupatla's rule" + ("" if found.success.all() else ", the maximum")
     return np.unique(found.x), float(np.abs(found.f_x).max()), words
-
-
-def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope, section: Any) -> xr.Dataset:
-    if not times.size:
-        raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
-    data = simulate(system, how, sample_times=times).dataset
-    kept = data[["displacement_at_striker", "velocity_at_striker", "midspan_displacement", "midspan_velocity", "modal_amplitude",
-                 "modal_velocity"]]  # fmt: skip
-    kept = kept.rename(time="point").reset_coords(drop=True)
-    phase = (flow.clock.striker_phase + 2.0 * np.pi * times / flow.clock.cycle) % (2.0 * np.pi)
-    return labelled(
-        {str(name): (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars}
-        | {"drive_phase": ("point", phase, in_unit("rad", "phase of the drive"))},
-        {"time": ("point", times, in_unit("s", "time since the transient"))},
-        data.attrs | {"title": "Poincare section", "section": str(section)},
-    )

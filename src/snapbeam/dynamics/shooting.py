@@ -148,7 +148,7 @@ def newton(
     for count in range(iterations + 1):
         if not np.isfinite(size):
             raise OrbitNotFoundError("a run failed on the way; begin nearer to the orbit")
-        if size <= tolerance and not (deflate and _near(x, deflate)):
+        if size <= tolerance and not any(float(np.abs(x - other).max()) < 1e-6 for other in deflate):
             return Shot(x, size, count)
         if count == iterations:
             break
@@ -200,10 +200,6 @@ def orbit_tolerance(value: float) -> float:
     return within("tolerance", value, 0.0, LARGEST_TOLERANCE, closed="right")
 
 
-def _near(x: _Array, known: tuple[_Array, ...]) -> bool:
-    return any(float(np.abs(x - other).max()) < 1e-6 for other in known)
-
-
 def _deflated(x: _Array, step: _Array, known: tuple[_Array, ...]) -> _Array:
     """Newton's step of the residual times a product of (1 + 1/|x - root|^2)."""
     along = 0.0
@@ -213,6 +209,4 @@ def _deflated(x: _Array, step: _Array, known: tuple[_Array, ...]) -> _Array:
         if square == 0.0:
             raise OrbitNotFoundError("the guess is an orbit that is to be left out; begin elsewhere")
         along += -2.0 * float(away @ step) / (square * (square + 1.0))
-    if along == 1.0:
-        return step
-    return step / (1.0 - along)
+    return step if along == 1.0 else step / (1.0 - along)
