@@ -61,10 +61,7 @@ class Equations:
         raise NotImplementedError
 
     def correct(self, guess: _Array, row: _Array, before: _Array, known: _Array | None = None) -> Point:
-        """The point on the plane through *guess* across *row*; its tangent goes on as *before* does.
-
-        *known* is a derivative to begin with.
-        """
+        """The point on the plane through *guess* across *row*, its tangent like *before*; *known*: first derivative."""
 
         def residual(y: _Array) -> _Array:
             return np.append(self.residual(y), row @ (y - guess))
@@ -144,10 +141,7 @@ def tangent_of(table: _Array, before: _Array) -> _Array:
 
 @dataclass(eq=False)
 class OrbitEquations(Equations):
-    """Equations of the periodic orbits of a flow over one or two parameters, P^m(x) = x, and further ones.
-
-    The last unknowns are the parameters over their ranges.
-    """
+    """Equations of periodic orbits, P^m(x) = x, and further ones; the last unknowns: parameters over their ranges."""
 
     family: Family
     period: int
@@ -231,10 +225,7 @@ def follow(
     progress: Callable[[int, int], object],
     what: str = "orbit",
 ) -> Path[E_]:
-    """Follow a curve from a point along its tangent, in steps from *step* to *max_step*.
-
-    *limits*, of shape (k, 2), are those of the last k unknowns; *what* is the noun of a point, for the reason of the end.
-    """
+    """Follow a curve in steps up to *max_step*; *limits*, (k, 2), are of the last k unknowns, *what* a point's noun."""
     path: Path[E_] = Path([(equations, first)])
     points, count, length = path.points, len(limits), min(step, max_step)
     while len(points) < max_points:

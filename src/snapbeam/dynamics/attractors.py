@@ -55,11 +55,10 @@ _FEW = 8
 
 @dataclass(frozen=True, eq=False)
 class Ball:
-    """States about one point of a stable orbit that the flow brings nearer with every return.
+    """States about a point of a stable orbit that come nearer with every return, by |e|_Q^2 = e.Q e.
 
-    Nearness is |e|_Q^2 = e.Q e with Q - M^T Q M = 1 for the derivative M of the return map: in it the linear part
-    contracts.  The radius is the largest at which, and at all smaller ones of a row of shells, every one of 48 states
-    came back nearer: tried, not proved; half of it is used.
+    Q - M^T Q M = 1 for the derivative M of the return map.  Up to the radius 48 states on every shell came back nearer:
+    tried, not proved; half of it is used.
     """
 
     center: _Array
@@ -255,12 +254,7 @@ class Attractors:
 
 
 def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
-    """Random states about both wells and between.
-
-    ``amplitude[1]`` is uniform in [-1.4, 1.4] and ``velocity[1]`` in [-0.6, 0.6]; a random vibration of each linear mode
-    is added, of at most 0.2 omega_1/omega_j in amplitude and 0.2 in velocity.  State s comes from Philox with the key
-    (seed, s) alone.
-    """
+    """Random states of the region of :func:`find_attractors`; state s comes from Philox with key (seed, s) alone."""
     model, n = flow.system.struck_model, flow.space.modes
     rows = np.zeros((count, flow.dimension))
     reach = 0.2 * flow.space.scales[0] / np.sqrt((model.linear_modes**2).sum(axis=0))

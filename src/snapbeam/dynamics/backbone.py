@@ -160,10 +160,7 @@ def backbone_curve(
 
 
 class _Structure:
-    """Equations of free motion in the linear modes about a well, in units of its amplitude and of 1/omega_1.
-
-    The generalised coordinates are the amplitudes of the buckling modes and the displacements of strikers with mass.
-    """
+    """Equations of free motion of the beam and of strikers with mass, in linear modes about a well, over 1/omega_1."""
 
     def __init__(self, system: System, well: str) -> None:
         self.system = system = instance("system", system, System, "a System")
@@ -276,7 +273,7 @@ class _Structure:
         return np.asarray(z[..., : self.model.modes] @ self.model.midspan_shape / self.model.length_scale)
 
     def _run(self, y: _Array, time: float, columns: int = 0, times: _Array | None = None) -> _Array:
-        """Motion from rest and its derivative by the first *columns* of the initial state, shape (numbers, instants)."""
+        """Motion from rest, and its derivative by the first *columns* of the start, shape (numbers, instants)."""
         from scipy.integrate import solve_ivp
 
         n = self.size

@@ -208,10 +208,7 @@ class _Curve(OrbitEquations):
 
 
 def _without_contact_force(grazing: SpecialPoint, names: tuple[str, str]) -> Flow:
-    """The flow of a grazing orbit, with contacts that exert no force where the orbit has no other impact.
-
-    Such an orbit is the one without contact on both sides of the curve, and the curve the same under every law.
-    """
+    """The flow of a grazing orbit, without contact forces if it has no other impact: the curve is that of every law."""
     orbit = grazing.orbit
     flow = orbit.flow
     if not isinstance(flow, Stroboscope):
@@ -275,10 +272,7 @@ _SIGNS = {"fold": 1.0, "flip": -1.0}
 
 
 def _flip_coefficient(curve: _Curve, point: Point) -> float:
-    """The cubic coefficient of the normal form of a flip; NaN where the states beside the orbit have other impacts.
-
-    A doubled orbit is stable if it is positive.
-    """
+    """Cubic coefficient of a flip, positive if the doubled orbit is stable; NaN if states nearby have other impacts."""
     right, left, _ = curve.null_vectors(point.came)
     x, v, w = point.y[:-2], right / np.linalg.norm(right), left * np.linalg.norm(right) / (left @ right)
 

@@ -39,9 +39,6 @@ _Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
 
 
-# A branch of periodic orbits and its special points, as datasets.
-
-
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
     """A special point of a branch: a bifurcation or a grazing orbit.
@@ -323,10 +320,7 @@ def _derivative_error(flow: Flow) -> float:
 
 
 def _moved(orbits: _Orbits, spots: tuple[Point, Point, Point], part: float, off: float) -> float:
-    """Change of the parameter if the location between the first and the last orbit is off by *off*.
-
-    It is read off the parabola through the three, since at a fold the parameter moves with the square alone.
-    """
+    """Change of the parameter, by the parabola through three orbits, if the place of the middle one is off by *off*."""
     first, middle, last = (float(spot.y[-1]) for spot in spots)
     if not 1e-6 < part < 1.0 - 1e-6:
         return abs(last - first) * float(orbits.spans[0]) * off
@@ -354,10 +348,7 @@ def _grazing(orbits: _Orbits, one: Point, other: Point, at: int) -> SpecialPoint
 
 
 def _grazing_end(points: list[tuple[_Orbits, Point]]) -> SpecialPoint | None:
-    """The grazing that a branch ends at, if its last orbit passes the tip without room to spare.
-
-    The room left, over how fast it went along the branch, is by how much the place is off.
-    """
+    """The grazing that a branch ends at, if its last orbit passes the tip; the error is the room left over its rate."""
     orbits, last = points[-1]
     if not isinstance(orbits.family.flow, Stroboscope):
         return None

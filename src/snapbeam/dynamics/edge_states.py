@@ -204,10 +204,7 @@ def edge_tracking(
 
 
 def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array, _Array]:
-    """The start of a system, and the same with a velocity of the first mode that makes it snap.
-
-    *size* is that velocity over omega_1 times the well's amplitude; without one it is doubled until the beam snaps.
-    """
+    """The start of a system, and the same with a velocity of the first mode, *size* or doubled until the beam snaps."""
     quiet = flow.coordinates()[0]
     towards = -np.sign(quiet[0]) or 1.0
     sizes = [0.1 * 2.0**k for k in range(8)] if size is None else [positive("kick", size)]
@@ -246,10 +243,7 @@ def _bisect(
     horizon: int,
     decide: Callable[[Flow, _Array, int], NDArray[np.bool_]],
 ) -> tuple[_Array, _Array] | None:
-    """Two states on a line, *near* each other, the first quiet, the second not; None if the ends have one outcome.
-
-    It stops where rounding leaves no state between the two.
-    """
+    """Two states on a line, *near* or up to rounding, of which the second snaps; None if the ends have one outcome."""
     parts = np.linspace(0.0, 1.0, _PIECES + 1)
     for _ in range(_ROUNDS):
         size = float(np.abs(high - low).max())
@@ -267,10 +261,7 @@ def _bisect(
 
 
 def _settled(flow: Flow, path: _Array) -> tuple[PeriodicOrbit | None, str]:
-    """The unstable orbit that the last stretch of periods repeats that repeats at all, and what was found.
-
-    A border between basins that are interlaced has motions that leave the orbit on it and come back to it.
-    """
+    """The unstable orbit of the last stretch that repeats (motions may leave it and come back), and what was found."""
     long = int(np.clip(len(path) // 3, 4, 40))
     if len(path) < 4:
         return None, "too few periods to look for an orbit"

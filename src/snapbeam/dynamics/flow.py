@@ -78,11 +78,7 @@ class InitialConditions:
     def state(
         self, system: System, number: int, state: State | None = None, location: ArrayLike | None = None
     ) -> State:
-        """Start *number* of a system, or that start added to *state* or a batch of states.
-
-        *location* is where the tip strikes, x_s/L, or that of each of several runs; the system's by default.  With several
-        locations the result is a batch, also where they do not matter.
-        """
+        """Start *number*, or that added to *state*, of a system, or of runs if *location*, x_s/L, has several."""
         found = state if state is not None else system.start_state
         if location is not None and np.ndim(location):
             shape = (*np.broadcast_shapes(np.shape(location), found.batch), system.model.modes)
@@ -127,10 +123,7 @@ def starts_of(given: InitialConditions | int) -> InitialConditions:
 
 
 def held_in_space(system: System) -> System:
-    """The system with the mid-position of its first tip fixed in space, where it is at its own start.
-
-    A tip that touches the beam wherever that is makes another system of every start.  Further tips are fixed already.
-    """
+    """The system with the mid-position of its first tip fixed in space, where it is at its own start, for any start."""
     if system.striker is None:
         return system
     offset, without_gap = (
@@ -222,11 +215,7 @@ class Flow(Protocol):
         every: bool = False,
         points: Mapping[str, _Array] | None = None,
     ) -> AdvancedStates:
-        """Take states of shape (runs, d), or where they came to, some periods on.
-
-        *tangents*, small changes that are advanced too, have the shape (runs, k, d); *points* are parameters that differ
-        between the runs.
-        """
+        """Take states (runs, d) and *tangents* (runs, k, d) some periods on; *points*: parameters of the runs."""
         ...
 
     def changed(self, values: Mapping[str, float]) -> Flow:

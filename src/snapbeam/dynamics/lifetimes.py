@@ -44,8 +44,6 @@ CYCLES = 1000
 WELLS = ("first", "other")
 
 
-# How long something lasts that ends at random: censored maximum likelihood with intervals, and whether it fits.
-#
 # After a delay t0 a transient that forgets its past ends at a constant rate kappa = 1/tau: the share that lasts longer
 # than t is exp(-(t - t0)/tau).  The rate is estimated from d ends in a total time at risk E by kappa = d/E (Lawless,
 # Statistical Models and Methods for Lifetime Data, 2nd ed., 2003, section 4.1).
@@ -118,10 +116,8 @@ def fit_lifetime(
     """Fit exp(-(t - t0)/tau) to times of runs, of which some, not *ended*, are only known to be longer; NaN: no run.
 
     Without a given *delay*, t0 is the first end from which on the exponential is not refused at 1 % (at most half of
-    the ends are left out; if it is refused still, t0 is the first end and ``goodness`` says so).  Since the exponential
-    forgets, what lasts longer is, counted from t0, a sample without a delay, and the interval is that of complete data
-    where every run ended, with 2 d kappa E distributed as chi squared.  With censored times the rate has the posterior
-    of Jeffreys' prior, gamma(d + 1/2, E), whose intervals cover as they say to a percent or so.
+    the ends are left out; if it is refused still, t0 is the first end).  If every run ended, 2 d kappa E is distributed
+    as chi squared; with censored times the rate has the posterior of Jeffreys' prior, gamma(d + 1/2, E).
     """
     times, ends = np.broadcast_arrays(np.asarray(time, dtype=np.float64), np.asarray(ended, dtype=bool))
     if times.ndim == 0:
@@ -181,9 +177,6 @@ def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
         marks = marks[:-1]
     goodness = float(stats.kstest(marks, "uniform", method="exact").pvalue) if marks.size >= 2 else np.nan
     return count, lasting, exposure, goodness
-
-
-# What a sweep keeps of many starts at every point: when each snapped last, and where it ended.
 
 
 @dataclass(frozen=True, eq=False)

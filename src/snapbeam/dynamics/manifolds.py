@@ -122,10 +122,7 @@ class _Segment(NamedTuple):
         return self.saddle + self.factor ** ages[:, None] * self.vector
 
     def image(self, states: _Array, near: _Array) -> _Array:
-        """Images of states; under the inverse map Newton's method seeks them from *near*, and they are NaN where it fails.
-
-        The map of a flow is one to one, so that a state that is found is the inverse image.
-        """
+        """Images of states; under an inverse map without a flow by Newton's method from *near*; NaN where it fails."""
         backward = self.flow.inverse if self.inverse and isinstance(self.flow, Stroboscope) else None
         if not self.inverse or backward is not None:
             return (backward or self.flow).advance(states, self.periods).states

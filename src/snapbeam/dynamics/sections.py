@@ -20,13 +20,7 @@ if TYPE_CHECKING:
 
 _Array = NDArray[np.float64]
 SECTIONS = ("stroboscopic", "impact")
-_LEVELS = (
-    "displacement_at_striker",
-    "midspan_displacement",
-    "velocity_at_striker",
-    "midspan_velocity",
-    "penetration_normalised",
-)
+_STATES = ("displacement_at_striker", "midspan_displacement", "velocity_at_striker", "midspan_velocity")
 _DIRECTIONS = ("up", "down", "both")
 _SAMPLES = 128
 """A period of the drive or, where that is shorter, of the first mode, to find passages in."""
@@ -111,8 +105,7 @@ def poincare_section(
         raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
     times = np.minimum(times, end)
     data = simulate(held, how, sample_times=times).dataset
-    kept = data[["displacement_at_striker", "velocity_at_striker", "midspan_displacement", "midspan_velocity", "modal_amplitude",
-                 "modal_velocity"]]  # fmt: skip
+    kept = data[[*_STATES, "modal_amplitude", "modal_velocity"]]
     kept = kept.rename(time="point").reset_coords(drop=True)
     phases = (flow.clock.striker_phase + 2.0 * np.pi * times / flow.clock.cycle) % (2.0 * np.pi)
     attrs = {"title": "Poincare section", "section": str(section), "transient": before, "termination_reason": reason}
@@ -134,17 +127,14 @@ def _level(section: Any) -> tuple[str, float, str] | None:
         raise InputTypeError(
             f"section = {shown(section)}: must be one of {', '.join(SECTIONS)}, or (variable, level, direction)"
         ) from None
-    choice("section[0]", name, _LEVELS)
+    choice("section[0]", name, (*_STATES, "penetration_normalised"))
     return name, finite("section[1]", value), choice("section[2]", direction, _DIRECTIONS)
 
 
 def _passages(
     system: System, how: Integration, level: tuple[str, float, str], end: float, period: float
 ) -> tuple[_Array, float, str]:
-    """Instants at which a variable passes its level, the maximum distance from it there, and why the search stopped.
-
-    They are found between samples, then on the run itself.
-    """
+    """Instants at which a run passes a level, the maximum distance from it there, and why the search stopped."""
     name, value, direction = level
     spacing = min(period, 1.0 / system.model.reference_frequency) / _SAMPLES
     grid = np.linspace(0.0, end, int(np.ceil(end / spacing)) + 1)

@@ -134,10 +134,9 @@ def newton(
     first: _Array | None = None,
     deflate: tuple[_Array, ...] = (),
 ) -> Shot:
-    """A root of *residual* by Newton's method, its derivative kept by Broyden's updates as long as steps gain by it.
+    """A root by Newton's method, its derivative (at first *first*) kept by Broyden's updates as long as steps gain.
 
-    *residual* gives r(x), *derivative* r(x) and its derivative, *first* is a derivative to begin with. It stays away from
-    the roots *deflate* (Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026).
+    It avoids the roots *deflate* (Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026).
     """
     fresh = first is None
     if first is None:

@@ -39,11 +39,7 @@ _LONGEST = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Stroboscope:
-    """The map of a system over the common period of its motions, the tips' mid-positions fixed in space.
-
-    It takes and gives :class:`~snapbeam.dynamics.coordinates.Coordinates`, at a phase of the primary excitation, rad,
-    by default the one at which a run of the system begins.
-    """
+    """The map of a system over the common period of its motions, at a phase, rad, its tips held at mid-positions."""
 
     system: System
     integration: Integration = field(default_factory=Integration)
@@ -216,16 +212,13 @@ class Stroboscope:
         return found
 
     def slope(self, x: _Array, periods: int, values: Mapping[str, float], name: str, step: float) -> _Array:
-        """Derivative by one of the parameters of the runs of where the map brings one state, shape (d,).
-
-        The numbers of a run are differentiated by a difference over twice the *step*, the run itself exactly.  Only where the parameter
-        changes how many pieces a motion has, or in which order it jumps, differences between runs are taken.
-        """
+        """Derivative of the map of one state by a parameter, shape (d,): of a run's numbers a difference, or exact."""
         begun, moved = self._begun(x[None]), np.zeros((1, 1, self.dimension))
         given = {key: np.array([value]) for key, value in values.items()}
         points = [given, *(given | {name: np.array([values[name] + sign * step])} for sign in (1.0, -1.0))]
         for _ in range(periods):
             here, above, below = (self._ensemble(begun, 1, each) for each in points)
+            # a motion with other pieces, or jumps in another order: a difference between runs
             if not (native.unchanged(above, below) and native.differentiable(above, below)):
                 ends = [self.advance(x[None], periods, points=each) for each in points[1:]]
                 return np.asarray((ends[0].states - ends[1].states)[0] / (2.0 * step))
@@ -310,11 +303,7 @@ def settling_periods(
     name: str = "transient",
     fewest: int = 0,
 ) -> tuple[int, str]:
-    """The number of periods after which a motion of *flow* counts as settled, if none is *given*, and the rule that gave it.
-
-    It is 16 time constants of the slowest mode, 1/min(zeta_j omega_j), or of further decay *rates*, 1/s (per period of
-    a map, which has no modes), but at least *least* and at most 20,000 periods.
-    """
+    """Periods after which a motion is settled, and the rule: *given*, or by the slowest mode or decay *rates*, 1/s."""
     if given is not None:
         return integer(name, given, fewest, 10**7), "as given"
     known = [float(rate) for rate in np.ravel(np.asarray(rates, dtype=np.float64))]
