@@ -20,7 +20,7 @@ from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, orbit_at
 from snapbeam.dynamics.results import multiplier_rows, of_flow, parameter_labels, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, jacobian, orbit_tolerance
-from snapbeam.dynamics.stroboscope import Stroboscope, jumps
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, choice, integer, interval, shown, within
 
@@ -153,9 +153,8 @@ class Branch:
             ),
         }  # fmt: skip
         if isinstance(first.flow, Stroboscope):
-            centers = np.array([_centers(orbit) for orbit in seen])
-            words = "centre displacement there, over b"
-            variables["midspan_displacement"] = ("orbit", centers[:, 0], words)
+            centers = np.array([orbit._centres for orbit in seen])
+            variables["midspan_displacement"] = ("orbit", centers[:, 0], "centre displacement there, over b")
             words = "centre displacement once a period of the drive, over b"
             variables["midspan_returns"] = (("orbit", "return"), centers, words)
         coords = {short: ("orbit", self.values, labels | {"parameter": self.name})}
@@ -164,15 +163,6 @@ class Branch:
             "termination_reason": self.termination_reason,
         }  # fmt: skip
         return of_flow(first.flow, variables, attrs, coords, (short,))
-
-
-def _centers(orbit: PeriodicOrbit) -> NDArray[np.float64]:
-    """Centre displacement over b, once a period of the drive."""
-    flow = orbit.flow
-    assert isinstance(flow, Stroboscope)
-    n = flow.space.modes
-    amplitudes = orbit.points[:, :n] * flow.space.scales[:n]
-    return np.asarray(amplitudes @ flow.system.model.midspan_shape / flow.system.scale.length)
 
 
 # Special points, located between two orbits of a branch, with an error.
@@ -212,7 +202,8 @@ class _Orbits(OrbitEquations):
 
     def require_next(self, last: Point, point: Point) -> None:
         """Refuse another number of impacts where the derivatives jump between such orbits."""
-        if jumps(self.family.flow) and point.came.impacts != last.came.impacts:
+        flow = self.family.flow
+        if isinstance(flow, Stroboscope) and flow.jumps and point.came.impacts != last.came.impacts:
             raise OrbitNotFoundError("another number of impacts: it grazes")
 
     def events(self, last: Point, point: Point, number: int) -> list[SpecialPoint]:

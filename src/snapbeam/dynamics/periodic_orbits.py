@@ -103,6 +103,13 @@ class PeriodicOrbit:
         return next((m for m in divisors if np.abs(self.points[m] - self.points[0]).max() < _SAME), self.period)
 
     @property
+    def _centres(self) -> _Array:
+        """Displacement of the centre over b, once a period of the drive."""
+        system, space = self._stroboscope.system, self._stroboscope.space
+        amplitudes = self.points[:, : space.modes] * space.scales[: space.modes]
+        return np.asarray(amplitudes @ system.model.midspan_shape / system.scale.length)
+
+    @property
     def state(self) -> State:
         """The state that comes back, for :func:`snapbeam.advance` and as a system's start."""
         return self._stroboscope.state(self.coordinates)
@@ -237,28 +244,24 @@ def periodic_orbit(
     if not all(isinstance(orbit, PeriodicOrbit) for orbit in deflate):
         raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
     most = integer("iterations", iterations, 1, 10_000)
-    orbit = None
+
+    def shot(flow: Flow, x: _Array) -> PeriodicOrbit:
+        left_out = tuple(point for orbit in deflate for point in orbit_at(orbit, flow).points)
+        return shoot(flow, x, periods, allowed, most, deflate=left_out)
+
     try:
-        orbit = shoot(flow, x, periods, allowed, most, deflate=_points(deflate, flow))
+        orbit = shot(flow, x)
+        x = orbit.coordinates
     except OrbitNotFoundError as error:
         if phase is not None or between_contacts(flow, x, periods) is None:
-            coarse = isinstance(flow, Stroboscope) and flow.integration.accuracy != "reference"
-            if not coarse:
+            if not isinstance(flow, Stroboscope) or flow.integration.accuracy == "reference":
                 raise
             raise OrbitNotFoundError(f"{error}, or use accuracy = 'reference'") from None
-    if phase is None:
-        x = x if orbit is None else orbit.coordinates
-        moved = between_contacts(flow, x, periods)
-        if moved is not None:
-            assert isinstance(flow, Stroboscope) and moved.phase is not None
-            x = carried(flow, x, moved.phase)
-            orbit = shoot(moved, x, periods, allowed, most, deflate=_points(deflate, moved))
-    assert orbit is not None
+    moved = between_contacts(flow, x, periods) if phase is None else None
+    if moved is not None:
+        assert isinstance(flow, Stroboscope) and moved.phase is not None
+        orbit = shot(moved, carried(flow, x, moved.phase))
     return orbit
-
-
-def _points(orbits: Sequence[PeriodicOrbit], flow: Flow) -> tuple[_Array, ...]:
-    return tuple(point for orbit in orbits for point in orbit_at(orbit, flow).points)
 
 
 def state_of(flow: Flow, name: str, given: State | ArrayLike | None) -> _Array:
