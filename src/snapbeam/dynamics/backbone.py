@@ -67,14 +67,13 @@ def backbone_curve(
     directions. DOP853 of SciPy integrates half a period with tangents; Newton's method and steps of arc length follow
     the curve; Floquet multipliers give the stability.
 
-    Local forces act with their conservative parts. Circuits of harvesters are open: piezoelectric layers stiffen the
-    beam, a coil has no force. Strikers stand still; one with a mass moves on its suspension.
+    Local forces are conservative, circuits of harvesters open: piezoelectric layers stiffen the beam, a coil has no
+    force. Strikers stand still; one with a mass moves on its suspension.
 
     Parameters
     ----------
     system : System
-        System without excitation; damping is ignored. Each striker is a :class:`~snapbeam.FixedStop` under an elastic
-        law.
+        System without excitation; damping is ignored. Strikers are :class:`~snapbeam.FixedStop` under elastic laws.
     well : {"lower", "upper", "both"}
         Motion about a well, or across both.
     mode : int
@@ -82,8 +81,7 @@ def backbone_curve(
     amplitude_limit : float
         Displacement of the centre from its middle position, in length scales, at which the curve ends.
     lowest_frequency_ratio : float
-        Frequency over the first natural frequency at which the curve ends: towards the barrier the period grows without
-        bound.
+        Frequency over the first natural frequency at which the curve ends: towards the barrier it vanishes.
     max_points : int
         Maximum number of points of the curve.
     max_step : float
@@ -99,8 +97,7 @@ def backbone_curve(
         ``min_midspan`` and ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``.
         ``participation`` over ``point`` and ``mode`` is the share of each linear mode in the mean kinetic energy.
         ``initial_amplitude`` over ``point`` and ``buckling_mode`` and, for strikers with mass, ``initial_shift`` over
-        ``striker`` are those at rest; size and angle of the multipliers are over ``multiplier``. The attribute ``end``
-        is the reason why the curve ends.
+        ``striker`` are those at rest; ``multiplier_size`` and ``multiplier_angle``. Attribute ``end``: the reason.
 
     Raises
     ------
@@ -117,8 +114,7 @@ def backbone_curve(
     -----
     With one mode the periods are elliptic integrals: for U = -k x^2/2 + g x^4/4 and the mass m, about a well
     2 K(1 - x_1^2/x_0^2) / (x_0 sqrt(g/2m)), with turning points x_1 < x_0 (Kovacic and Brennan, The Duffing Equation,
-    Wiley, 2011, chapter 4).  The cost grows with the square of the number of modes and with the highest frequency; use up
-    to about 12.
+    Wiley, 2011, chapter 4). Use up to about 12 modes: the cost grows with their square and the highest frequency.
 
     Examples
     --------
@@ -232,6 +228,11 @@ class _Structure:
         found[:n, :n] += self.potential._tangent(z[:n])
         return found
 
+    def _closed(self, z: _Array) -> list[tuple[Any, _Array, float]]:
+        """Law, row and penetration of the contacts that are closed."""
+        depths = ((law, row, begin + float(row @ z)) for law, row, begin in self.stops)
+        return [each for each in depths if each[2] > 0.0]
+
     def acceleration(self, y: _Array) -> _Array:
         """y'' of coordinates about the well, per omega_1^2."""
         away = self.back @ y
@@ -240,20 +241,16 @@ class _Structure:
             raise OrbitNotFoundError("the motion leaves the range of the law of a local force")
         force = -self.linear @ away
         force[:n] -= self.potential._gradient(z[:n])
-        for law, row, begin in self.stops:
-            depth = begin + float(row @ z)
-            if depth > 0.0:
-                force -= row * type(law).force(law, depth)
+        for law, row, depth in self._closed(z):
+            force -= row * type(law).force(law, depth)
         return np.asarray(self.shapes.T @ force / (self.scale * self.unit**2))
 
     def slope(self, y: _Array) -> _Array:
         """Derivative of the acceleration."""
         z = self.rest + self.back @ y
         stiffness = self._stiffness(z)
-        for law, row, begin in self.stops:
-            depth = begin + float(row @ z)
-            if depth > 0.0:
-                stiffness += np.outer(row, row) * type(law).slope(law, depth)
+        for law, row, depth in self._closed(z):
+            stiffness += np.outer(row, row) * type(law).slope(law, depth)
         return np.asarray(-self.shapes.T @ stiffness @ self.shapes / self.unit**2)
 
     def energy(self, y: _Array) -> float:
@@ -262,10 +259,7 @@ class _Structure:
         z = self.rest + away
         found = float(self.potential.energy(z[:n]) - self.potential.energy(self.rest[:n]))
         found += 0.5 * float(away @ self.linear @ away)
-        for law, row, begin in self.stops:
-            depth = begin + float(row @ z)
-            found += float(type(law).energy(law, depth)) if depth > 0.0 else 0.0
-        return found
+        return found + sum(float(type(law).energy(law, depth)) for law, _, depth in self._closed(z))
 
     def centre(self, y: _Array) -> _Array:
         """Displacement of the centre over the length scale, for coordinates of shape (..., n)."""
