@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -206,9 +206,8 @@ class Attractors:
     def unseen_share(self, confidence: float = 0.95) -> float:
         """Upper bound of the share of initial states that go to attractors that were not found.
 
-        It bounds the basin volume in the sampled region, for random states, not the number of attractors. If all *n*
-        states are decided it is 1 - (1 - *confidence*)^(1/n), about 3/n at 95 % (the rule of three). Undecided states
-        count as unseen (Clopper and Pearson).
+        It bounds the volume of basins in the region of random states, by Clopper and Pearson: about 3/n at 95 % if all
+        *n* states are decided (the rule of three). Undecided states count as unseen.
         """
         level = within("confidence", confidence, 0.0, 1.0)
         lost, count = int((self.labels == UNDECIDED).sum()), self.labels.size
@@ -307,10 +306,8 @@ def find_attractors(
         Seed of the initial states, or a generator that gives one.
     tolerance : float
         Tolerance of the orbits, as in :func:`periodic_orbit`.
-    integration : Integration, optional
-        Solver settings.
-    progress : callable or bool, optional
-        Report of parts of the work, as in :func:`snapbeam.sweep`.
+    integration, progress : optional
+        Solver settings, and report of parts of the work as in :func:`snapbeam.sweep`.
 
     Returns
     -------
@@ -421,8 +418,9 @@ def _verify(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:
     """The same orbit by fine steps, if it is there and stable: tangents of coarse ones are a per cent off."""
     if not isinstance(orbit.flow, Stroboscope) or orbit.flow.integration.accuracy == "reference":
         return orbit
+    settings = orbit.flow.integration.replace(accuracy="reference", step=None)
     try:
-        fine = shoot(orbit.flow.refined, orbit.coordinates, orbit.period, tolerance)
+        fine = shoot(replace(orbit.flow, integration=settings), orbit.coordinates, orbit.period, tolerance)
     except OrbitNotFoundError:
         return None
     near = float(np.abs(fine.coordinates - orbit.coordinates).max()) < 10.0 * _REPEATS

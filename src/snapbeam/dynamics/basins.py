@@ -53,9 +53,8 @@ def basins_of_attraction(
     warning. The tip's mid-position is fixed in space.
 
     Near a fractal border the error of the integration changes labels. Every state with a neighbour of another label,
-    and 300 random others, are therefore integrated at half the step too. ``sensitive`` marks changed labels;
-    ``sensitive_share`` is their share of the plane, with its 95 % interval (Wilson, for the sampled part). Above 1 % it
-    gives a warning.
+    and 300 random others, are integrated at half the step too. ``sensitive`` marks changed labels; ``sensitive_share``
+    is their share of the plane, with its 95 % interval (Wilson, for the sampled part); above 1 % it gives a warning.
 
     Parameters
     ----------
@@ -304,8 +303,7 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     """Basin entropy and boundary basin entropy (Daza et al., Sci. Rep. 6 (2016) 31416).
 
     In each box of *box* points a side, with shares p_j of the labels, the entropy is S = -sum p_j ln p_j. S_b is its
-    mean over all boxes, S_bb over those that hold a border. Undecided points are left out; the bounds hold for any of
-    the present labels in their place.
+    mean over all boxes, S_bb over those that hold a border. Undecided points are left out, except of the bounds.
 
     Parameters
     ----------

@@ -308,8 +308,7 @@ def bifurcation_curve(
 
     Points of codimension two are located: cusps, fold-flips (multipliers +1 and -1), generalized flips, the resonances
     1:1 to 1:4, and grazing at a bifurcation. If the grazing approach is the only contact, a grazing curve leaves its
-    force out, so that the orbit is defined on both sides. With other impacts under Newton's law the orbit keeps a gap
-    of 1e-6 b.
+    force out: the orbit exists on both sides. With other impacts under Newton's law the orbit keeps a gap of 1e-6 b.
 
     Parameters
     ----------
@@ -325,8 +324,7 @@ def bifurcation_curve(
         First and maximum distance between points, in units of the well's amplitude for the state and of the range for
         each parameter; between 1e-6 and 1.
     tolerance : float
-        Tolerance of the orbit and of the condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light
-        impacts make the multipliers rough.
+        Tolerance, as in :func:`periodic_orbit`; up to 1,000 times as much where light impacts roughen multipliers.
     progress : callable or bool, optional
         Report of points, as in :func:`snapbeam.sweep`.
 
@@ -335,8 +333,7 @@ def bifurcation_curve(
     xarray.Dataset
         Variables over ``point``: both parameters, their errors, the state, the multipliers, impacts, residual. Over
         ``special_point``: kind and parameters of points of codimension two. On a grazing curve the attribute
-        ``kept_gap`` is the gap over b; ``contact_force`` is "left out" if the
-        multipliers are those of the motion without contact.
+        ``kept_gap`` is the gap over b; ``contact_force`` is "left out" if the multipliers are those without contact.
 
     Raises
     ------

@@ -115,14 +115,11 @@ def edge_tracking(
     horizon : int
         Periods until the outcome is evaluated.
     bisect_threshold, diverge_threshold : float
-        Distances in units of the well's amplitude; the second is at most a tenth of the distance between *u1* and *u2*.
-        The bisection also stops at rounding.
+        Distances over the well's amplitude, the second at most a tenth of that of *u1* and *u2*; or rounding stops it.
     outcome : callable, optional
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
-    integration : Integration, optional
-        Solver settings.
-    progress : callable or bool, optional
-        Report of periods, as in :func:`snapbeam.sweep`.
+    integration, progress : optional
+        Solver settings, and report of periods as in :func:`snapbeam.sweep`.
 
     Returns
     -------

@@ -23,7 +23,7 @@ from snapbeam.util.validation import InputError, InputTypeError, flag, integer, 
 
 _Array = NDArray[np.float64]
 _NOT_RUN: dict[str, Any] = {"tangent": None, "statistics": None, "modal": None}
-"""What a state has of the run that led to it."""
+"""Fields of a state that belong to the run that led to it."""
 
 # Many starts of one system, each from its own number alone: a beam that rings faintly, a drive at any phase.
 
@@ -38,8 +38,7 @@ class InitialConditions:
         Number of initial conditions, at least 1.
     displacement : float
         Root mean square of the mid-span displacement, m, with equal mean energy in every linear mode; by default the
-        error of reading a position to a pixel of the paper's camera. A start that would press the beam into the tip is
-        mirrored about the beam at rest.
+        reading error of the paper's camera. A start that would press the beam into the tip is mirrored about rest.
     phase : bool
         Sample the phase of a sinusoidal drive of a single striker, in the half cycle in which the tip moves away.
     seed : int

@@ -60,11 +60,10 @@ class LifetimeSettings:
     Parameters
     ----------
     delay : float, optional
-        Delay t0, cycles: earlier ends are not counted. By default the first end after which a test does not reject the
-        exponential at 1 %; at most half of the ends are left out.
+        Delay t0, cycles, before which ends are not counted: by default the first end from which a test does not refuse
+        the exponential at 1 %, at most half of them.
     settling_cycles : float
-        Cycles without a zero crossing after which snap-through counts as ended, greater than 0. A later crossing
-        censors a run: its lifetime is longer.
+        Cycles, more than 0, without a zero crossing after which snap-through has ended; a later one censors a run.
     confidence : float
         Confidence level of the intervals, in (0, 1).
 
@@ -106,8 +105,7 @@ class LifetimeFit(NamedTuple):
     lasting: NDArray[np.int64]
     """Runs that outlived the observation."""
     goodness: _Array
-    """Probability of so great a distance from the exponential if it holds (Kolmogorov and Smirnov); NaN for fewer
-    than three ends."""
+    """Probability of so great a distance from an exponential (Kolmogorov and Smirnov); NaN if fewer than three."""
 
 
 def fit_lifetime(

@@ -47,9 +47,8 @@ def lyapunov_spectrum(
 ) -> xr.Dataset:
     """The largest Lyapunov exponents, by tangents with a QR factorisation at every whole period.
 
-    The linearised time steps advance k small changes, orthonormalised once a period (Benettin, Galgani, Giorgilli and
-    Strelcyn, Meccanica 15 (1980) 9); the exponents are the rates of their logarithmic growth. A run that snaps and then
-    settles has exponents of the transient and of the settled motion; ``transient=0`` gives both.
+    The exponents are the rates of logarithmic growth of k small changes (Benettin, Galgani, Giorgilli and Strelcyn,
+    Meccanica 15 (1980) 9). Of a run that snaps and then settles, ``transient=0`` gives those of both parts.
 
     Parameters
     ----------
@@ -65,10 +64,8 @@ def lyapunov_spectrum(
         Starts of the runs; the system's start by default.
     axes : mapping, optional
         Parameters that may differ between runs, each with its values: a map of exponents, all from the first state.
-    integration : Integration, optional
-        Solver settings.
-    progress : callable or bool, optional
-        Report of periods, as in :func:`snapbeam.sweep`.
+    integration, progress : optional
+        Solver settings, and report of periods as in :func:`snapbeam.sweep`.
 
     Returns
     -------
@@ -76,8 +73,7 @@ def lyapunov_spectrum(
         ``exponent`` (1/s, over ``exponent_number`` and the axes or runs) with ``exponent_error``, one standard error
         from the means of blocks. ``exponent_snapping`` and ``exponent_settled`` are of the periods before and after the
         last crossing (NaN if none), with ``periods_snapping``. Without axes, ``running`` is the estimate after each
-        period and the attribute ``period`` is in s; with axes ``excitation_period`` (s) is that of each point. Exponent
-        times period is the exponent per period.
+        period and the attribute ``period`` is in s; with axes ``excitation_period`` (s) is that of each point.
 
     Raises
     ------

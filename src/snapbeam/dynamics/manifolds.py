@@ -264,8 +264,7 @@ def invariant_manifold(
 ) -> xr.Dataset:
     """One-dimensional stable or unstable manifold of a saddle orbit, in the stroboscopic section.
 
-    Neighbours are at most *max_distance* apart and the curve turns by at most *max_turn* between them; it is then off
-    the chord by about max_distance max_turn/8.
+    The curve is off the chords of its points by about max_distance max_turn/8.
 
     Parameters
     ----------
@@ -282,8 +281,8 @@ def invariant_manifold(
     max_points : int
         Maximum number of points of each branch.
     max_seconds : float, optional
-        Time limit, s, after which both branches end; none by default. A stable manifold takes longer where the motion has
-        no inverse in time (circuits, damped contacts, friction) or where *orbit* is that of a map: Newton's method.
+        Time limit, s, of both branches. A stable manifold takes longer where the motion has no inverse in time
+        (circuits, damped contacts, friction) or where *orbit* is that of a map: Newton's method.
     progress : callable, optional
         Called as ``progress(share)`` with the share of the length; True prints it with the time left.
 
@@ -298,8 +297,7 @@ def invariant_manifold(
     Raises
     ------
     InputError
-        If the manifold does not have one dimension, or is a stable one under Newton's law, whose map has no inverse
-        where the beam sticks to the tip.
+        If the manifold has more dimensions or none, or is a stable one under Newton's law, whose map has no inverse.
 
     See Also
     --------
@@ -377,8 +375,7 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Variables over ``point``, along the unstable manifold: ``state``, known to the attribute ``chord_error``, and
-        the ``arclength`` of both.
+        ``state`` over ``point``, known to the attribute ``chord_error``, ``arclength`` and ``stable_arclength``.
 
     See Also
     --------
@@ -403,7 +400,7 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
         if given.attrs.get("stability") != name or given.sizes.get("coordinate") != 2:
             raise InputError(f"{name}: must be the {name} manifold of an orbit of a map of the plane")
     u, s = (_chords(each) for each in (unstable, stable))
-    found = []
+    found: list[list[float]] = []
     share = max(1, _SHARE // max(len(s[0]), 1))
     for at in range(0, len(u[0]), share):
         begin, way, length = (each[at : at + share, None] for each in u)
@@ -414,11 +411,9 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
             a = (apart[..., 0] * s[1][None, :, 1] - apart[..., 1] * s[1][None, :, 0]) / cross
             b = (apart[..., 0] * way[..., 1] - apart[..., 1] * way[..., 0]) / cross
             i, j = np.nonzero((a >= 0.0) & (a < 1.0) & (b >= 0.0) & (b < 1.0))
-        for one, other in zip(i.tolist(), j.tolist(), strict=True):
-            part = float(a[one, other])
-            along = float(length[one, 0] + part * np.linalg.norm(way[one, 0]))
-            along_stable = float(s[2][other] + b[one, other] * np.linalg.norm(s[1][other]))
-            found.append((along, along_stable, *(begin[one, 0] + part * way[one, 0])))
+        along = length[i, 0] + a[i, j] * np.hypot(*way[i, 0].T)
+        along_stable = s[2][j] + b[i, j] * np.hypot(*s[1][j].T)
+        found += np.column_stack([along, along_stable, begin[i, 0] + a[i, j, None] * way[i, 0]]).tolist()
     table = np.array(sorted(found)).reshape(-1, 4)
     return labelled(
         {
@@ -484,8 +479,7 @@ def homoclinic_tangency(
         Variables over ``value``, each value that was tried: ``crosses``. ``bracket`` over ``manifolds`` ("apart",
         "crossing"): the nearest values, NaN where none was found. The attribute ``termination_reason`` is
         ``tolerance``; otherwise the bracket is wider, with a :class:`~snapbeam.DiagnosticWarning`: ``max_seconds``, a
-        crossing at both *bounds* or at neither, a manifold that ended before *max_arclength*, or a later value without
-        the saddle.
+        crossing at both *bounds* or neither, a manifold that ends before *max_arclength*, a value without the saddle.
 
     Raises
     ------

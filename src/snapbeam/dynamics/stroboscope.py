@@ -87,11 +87,6 @@ class Stroboscope:
         """True if the derivatives of the map may jump, by a contact force that does, depends on the velocity or has a memory."""
         return any(each.law.is_dissipative for each in self.system.contacts)
 
-    @property
-    def refined(self) -> Stroboscope:
-        """The flow at accuracy level "reference"."""
-        return replace(self, integration=self.integration.replace(accuracy="reference", step=None))
-
     @cached_property
     def inverse(self) -> Stroboscope | None:
         """The inverse map; None if a part of the system, as a damped contact, cannot be integrated backwards in time."""
@@ -288,11 +283,6 @@ def flow_of(system: System | Flow, integration: Integration | None = None, accur
     if integration is not None:
         raise InputTypeError("integration: is for a System; a Flow brings its own")
     return system
-
-
-def jumps(flow: Flow) -> bool:
-    """Return whether the derivatives of a map may jump between orbits with other numbers of impacts."""
-    return isinstance(flow, Stroboscope) and flow.jumps
 
 
 def settling_periods(

@@ -74,8 +74,7 @@ def bifurcation_diagram(
 ) -> xr.Dataset:
     """Compute a bifurcation diagram: states once a period over one parameter that is swept up and down.
 
-    Each sweep continues from the last state: sweeps differ where attractors coexist. Random initial conditions show
-    further attractors.
+    Each sweep continues from the last state: sweeps differ where attractors coexist; random starts show further ones.
 
     Parameters
     ----------
@@ -92,8 +91,7 @@ def bifurcation_diagram(
     initial_conditions : InitialConditions or int
         Further starts at every value; none by default.
     periods : pair of int
-        Periods to discard and to record at each value. None discards 16 time constants of the slowest mode, in [200,
-        20,000].
+        Periods to discard (None: 16 time constants of the slowest mode, in [200, 20,000]) and to record, at each value.
     grazing : bool
         Sample every approach in four of the recorded periods densely: ``clearance``, ``min_penetration``.
     progress : callable or bool, optional
@@ -104,8 +102,7 @@ def bifurcation_diagram(
     xarray.Dataset
         Variables over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of
         the centre and of the contact point, at the phase of the start. Over ``sweep`` and the parameter:
-        ``impacts_per_period``, ``crossings_per_period``, ``minimal_period`` (0: none seen) and ``failed``. Failed runs
-        and those after them in their sweep are NaN.
+        ``impacts_per_period``, ``crossings_per_period``, ``minimal_period`` (0: none seen), ``failed``; NaN follow.
 
     See Also
     --------
@@ -237,8 +234,7 @@ def hysteresis(
 
     Each value is one run of :func:`snapbeam.simulate` from the last state before it: modes, phase of the excitation,
     strikers and circuit. An excitation that does not repeat (a record, a chirp, noise) restarts at each value, and only
-    the state of the structure is carried on. Statistics named ``last_quarter`` leave out a transient that is over after
-    three quarters of a run.
+    the state of the structure is carried on. Statistics named ``last_quarter`` leave out a transient.
 
     Parameters
     ----------
@@ -258,8 +254,7 @@ def hysteresis(
     Returns
     -------
     xarray.Dataset
-        The :data:`snapbeam.STATISTICS` over ``sweep`` and the parameter. The runs after a failed one have the status
-        NOT_RUN, the class UNKNOWN, and NaN.
+        The :data:`snapbeam.STATISTICS` over ``sweep`` and the parameter; after a failed run NOT_RUN, UNKNOWN and NaN.
 
     Raises
     ------
