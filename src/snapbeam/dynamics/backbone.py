@@ -119,8 +119,7 @@ def backbone_curve(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+    >>> model = sb.ReducedModel.from_beam(sb.paper.BEAM, modes=1)
     >>> curve = sb.dynamics.backbone_curve(sb.System(model), amplitude_limit=0.3)
     >>> bool(curve.frequency[0] > curve.frequency[-1])  # the motion about a well softens
     True

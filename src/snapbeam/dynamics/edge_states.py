@@ -45,8 +45,7 @@ class EdgeState:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
     >>> edge.orbit.period, edge.orbit.is_stable
     (1, False)
@@ -133,8 +132,7 @@ def edge_tracking(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
     >>> edge.termination_reason
     '25 periods; it settled on an orbit of period 1'

@@ -313,8 +313,7 @@ def lifetime_map(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> ds = sb.dynamics.lifetime_map(
     ...     system,
     ...     {"drive.velocity_amplitude": [0.1, 0.2]},

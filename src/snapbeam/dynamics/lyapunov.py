@@ -87,8 +87,7 @@ def lyapunov_spectrum(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> result = sb.dynamics.lyapunov_spectrum(system, 2, periods=40, transient=20)
     >>> result.exponent.dims, result.exponent.attrs["units"]
     (('run', 'exponent_number'), '1/s')
@@ -289,8 +288,7 @@ def largest_lyapunov(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> result = sb.dynamics.largest_lyapunov(system, 40, transient=20)
     >>> bool(result.exponent < 0.0)
     True

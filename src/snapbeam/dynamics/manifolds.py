@@ -306,8 +306,7 @@ def invariant_manifold(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> curve = sb.dynamics.invariant_manifold(saddle, max_arclength=1.0)
     >>> curve.sizes["coordinate"], bool(curve["arclength"].max() <= 1.05)
@@ -384,8 +383,7 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> both = [
     ...     sb.dynamics.invariant_manifold(saddle, kind, max_arclength=1.0) for kind in ("unstable", "stable")
@@ -495,8 +493,7 @@ def homoclinic_tangency(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> found = sb.dynamics.homoclinic_tangency(
     ...     saddle, "velocity_amplitude", (0.02, 0.03), max_arclength=0.5, max_seconds=1e-3

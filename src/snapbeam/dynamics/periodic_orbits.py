@@ -49,8 +49,7 @@ class PeriodicOrbit:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> orbit.is_stable, bool(abs(orbit.multipliers).max() < 1.0)
     (True, True)
@@ -218,8 +217,7 @@ def periodic_orbit(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> orbit.period, orbit.residual < 1e-10
     (1, True)

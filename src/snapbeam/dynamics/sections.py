@@ -72,8 +72,7 @@ def poincare_section(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> section = sb.dynamics.poincare_section(system, "impact", 20, transient=20)
     >>> sorted(section.data_vars)[:3]
     ['displacement_at_striker', 'drive_phase', 'midspan_displacement']

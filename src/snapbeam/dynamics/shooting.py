@@ -36,8 +36,7 @@ class OrbitNotFoundError(RuntimeError):
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> try:
     ...     sb.dynamics.periodic_orbit(system, [5.0, 3.0], iterations=2)
     ... except sb.dynamics.OrbitNotFoundError as error:
