@@ -7,8 +7,8 @@ Bifurcation Theory, 1977).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any, Generic, NamedTuple, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -202,20 +202,16 @@ def distances(step: float, max_step: float, shortest: float) -> tuple[float, flo
     return first, longest
 
 
-E_ = TypeVar("E_", bound=Equations)
+class Path(NamedTuple):
+    """Points of a curve, each with the equations at whose phase it is seen, special points, and reason of the end."""
 
-
-@dataclass
-class Path(Generic[E_]):
-    """Points of a curve as it is followed, each with the equations at whose phase it is seen."""
-
-    points: list[tuple[E_, Point]]
-    events: list[Any] = field(default_factory=list)
-    end: str = ""
+    points: list[tuple[Any, Point]]
+    events: list[Any]
+    end: str
 
 
 def follow(
-    equations: E_,
+    equations: Equations,
     first: Point,
     *,
     limits: _Array,
@@ -224,13 +220,14 @@ def follow(
     max_step: float,
     progress: Callable[[int, int], object],
     what: str = "orbit",
-) -> Path[E_]:
+) -> Path:
     """Follow a curve in steps up to *max_step*; *limits*, (k, 2), are of the last k unknowns, *what* a point's noun."""
-    path: Path[E_] = Path([(equations, first)])
-    points, count, length = path.points, len(limits), min(step, max_step)
+    points: list[tuple[Equations, Point]] = [(equations, first)]
+    events: list[Any] = []
+    count, length = len(limits), min(step, max_step)
     while len(points) < max_points:
         try:
-            points[-1] = points[-1][0].observed(points[-1][1])  # type: ignore[assignment]
+            points[-1] = points[-1][0].observed(points[-1][1])
         except (OrbitNotFoundError, np.linalg.LinAlgError):
             pass  # the next point is sought at the phase of this one
         equations, last = points[-1]
@@ -259,23 +256,20 @@ def follow(
         except (OrbitNotFoundError, np.linalg.LinAlgError) as error:
             length *= 0.5
             if length < _SHORTEST * max_step:
-                path.end = f"no further {what}: {error}"
-                return path
+                return Path(points, events, f"no further {what}: {error}")
             continue
-        path.events += equations.events(last, point, len(points) - 1)
+        events += equations.events(last, point, len(points) - 1)
         ended = equations.end_at(last, point)
         if ended is None or ended[1]:
             points.append((equations, point))
             progress(len(points), max_points)
         if ended is not None or crossed:
-            path.end = f"limit of {'the' if count == 1 else 'a'} parameter" if ended is None else ended[0]
-            return path
+            end = f"limit of {'the' if count == 1 else 'a'} parameter" if ended is None else ended[0]
+            return Path(points, events, end)
         if len(points) > _CLOSED and equations.has_returned(point, points[0], 0.75 * length):
-            path.end = "closed"
-            return path
+            return Path(points, events, "closed")
         if point.iterations <= equations.easy and turned > 0.95:
             length = min(1.4 * length, max_step)
         elif point.iterations >= equations.hard or turned < 0.8:
             length *= 0.6
-    path.end = f"{max_points} {what}s, the maximum (max_points)"
-    return path
+    return Path(points, events, f"{max_points} {what}s, the maximum (max_points)")

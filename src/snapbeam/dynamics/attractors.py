@@ -326,7 +326,7 @@ def find_attractors(
     """
     flow = flow_of(system, integration)
     require_isolated_orbits(flow)
-    leave, rule = settling_periods(flow, transient, least=_TRANSIENT, fewest=1)
+    leave, rule = settling_periods(flow, transient, least=_TRANSIENT, low=1)
     most, lasts = (integer("max_periods", max_periods, 1, 512), integer("check_periods", check_periods, 20, 10**7))
     rows = _states_of(flow, states, seed_of(rng))
     allowed = orbit_tolerance(tolerance)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.arclength import Equations, Path, Point, follow
+from snapbeam.dynamics.arclength import Equations, Point, follow
 from snapbeam.dynamics.results import beam_attributes, in_unit, labelled, reported
 from snapbeam.dynamics.shooting import OrbitNotFoundError
 from snapbeam.model.drive.fixed_stop import FixedStop
@@ -135,23 +135,19 @@ def backbone_curve(
     report = reported(progress, "backbone curve", "points")
     first = motions.about_well(mode) if well != "both" else motions.across()
 
-    def branch(way: float, before: int, most: int) -> Path[_Motions]:
+    def branch(way: float, before: int, most: int) -> tuple[list[Any], str]:
         start = first._replace(tangent=way * first.tangent)
         path = follow(
             motions, start, limits=np.empty((0, 2)), max_points=most, step=_FIRST, max_step=max_step,
             progress=lambda done, _: report(before + done, max_points), what="motion",
         )  # fmt: skip
-        path.events = [*begun, *path.events][: len(path.points)]
-        return path
+        return [*begun, *path.events][: len(path.points)], path.end
 
     begun = [_measures(structure, first)]
     report(1, max_points)
-    if well != "both":
-        path = branch(1.0, 0, max_points)
-        return _dataset(structure, path.events, path.end)
-    back = branch(-1.0, 0, max_points // 2).events
-    ahead = branch(1.0, len(back) - 1, max_points - len(back) + 1)
-    return _dataset(structure, [*reversed(back[1:]), *ahead.events], ahead.end)
+    back = branch(-1.0, 0, max_points // 2)[0] if well == "both" else begun
+    ahead, end = branch(1.0, len(back) - 1, max_points - len(back) + 1)
+    return _dataset(structure, [*reversed(back[1:]), *ahead], end)
 
 
 class _Structure:

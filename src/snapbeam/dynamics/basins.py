@@ -96,7 +96,7 @@ def basins_of_attraction(
     flow = attractors.flow
     step = integer("every", every, 1, 10**4)
     rates = [-each.exponent for each in attractors.attractors if each.orbit is not None]
-    total, rule = settling_periods(flow, periods, rates, name="periods", fewest=1)
+    total, rule = settling_periods(flow, periods, rates, name="periods", low=1)
     names, columns, rows = _plane(flow, grid, fixed_coordinates)
     label, after = _labelled(attractors, flow, rows, total, step, reported(progress, "basins", "periods"))
     dataset = _dataset(attractors, names, columns, label, after, total)

@@ -406,18 +406,13 @@ def bifurcation_curve(
         for sign in (-1.0, 1.0)
     )
     points = [*reversed(back.points[1:]), *ahead.points]
-    ends = f"{back.end}; {ahead.end}"
-    return _dataset(curve, names, points, [*back.events, *ahead.events], ends, flow)
+    return _dataset(curve, points, [*back.events, *ahead.events], f"{back.end}; {ahead.end}")
 
 
 def _dataset(
-    curve: _Curve,
-    names: tuple[str, str],
-    seen: list[tuple[_Curve, Point]],
-    special: list[tuple[str, Point]],
-    ends: str,
-    flow: Flow,
+    curve: _Curve, seen: list[tuple[_Curve, Point]], special: list[tuple[str, Point]], ends: str
 ) -> xr.Dataset:
+    flow = curve.family.flow
     points = [point for _, point in seen]
     relative = _FINE if isinstance(flow, Stroboscope) else 1e-9
     errors = np.array([curve.error(point, relative) for point in points])
@@ -435,7 +430,7 @@ def _dataset(
         "special_point_kind": ("special_point", np.array(kinds, dtype=str), of_kind),
     }  # fmt: skip
     coords, shorts = {}, []
-    for k, name in enumerate(names):
+    for k, name in enumerate(curve.family.names):
         short, labels = parameter_labels(flow, name)
         shorts.append(short)
         coords[short] = ("point", values[:, k], labels | {"parameter": name})

@@ -142,10 +142,13 @@ def edge_tracking(
     near, far = (positive("bisect_threshold", bisect_threshold), positive("diverge_threshold", diverge_threshold))
     if not near < far:
         raise InputError(f"bisect_threshold = {near:g}: must be less than diverge_threshold = {far:g}")
-    decide = _snaps if outcome is None else outcome
+
+    def snaps(states: _Array) -> NDArray[np.bool_]:
+        return np.asarray((_snaps if outcome is None else outcome)(flow, states, ahead), dtype=bool)
+
     low, high = state_of(flow, "u1", u1), state_of(flow, "u2", u2)
-    told = decide(flow, np.stack([low, high]), ahead)
-    if bool(told[0]) or not bool(told[1]):
+    told = snaps(np.stack([low, high]))
+    if told[0] or not told[1]:
         raise InputError(
             f"u1, u2: the outcomes within {ahead} periods are {bool(told[0])} and {bool(told[1])}; must be "
             "False and True"
@@ -162,7 +165,7 @@ def edge_tracking(
     report = reported(progress, "edge tracking", "periods")
     for period in range(total):
         if begin:
-            bracket = _bisect(flow, low, high, near, ahead, decide)
+            bracket = _bisect(low, high, near, snaps)
             if bracket is None:
                 stopped = (
                     f"after {period} periods the two states have the same outcome within {ahead} periods; "
@@ -171,8 +174,7 @@ def edge_tracking(
                 break
             low, high = bracket
             closest = max(closest, float(np.abs(high - low).max()))
-        both = flow.advance(np.stack([low, high]), 1).states
-        low, high = both[0], both[1]
+        low, high = flow.advance(np.stack([low, high]), 1).states
         size = float(np.abs(high - low).max())
         if not np.isfinite(size):
             if not states:
@@ -231,12 +233,7 @@ def _snaps(flow: Flow, states: _Array, horizon: int) -> NDArray[np.bool_]:
 
 
 def _bisect(
-    flow: Flow,
-    low: _Array,
-    high: _Array,
-    near: float,
-    horizon: int,
-    decide: Callable[[Flow, _Array, int], NDArray[np.bool_]],
+    low: _Array, high: _Array, near: float, snaps: Callable[[_Array], NDArray[np.bool_]]
 ) -> tuple[_Array, _Array] | None:
     """Two states on a line, *near* or up to rounding, of which the second snaps; None if the ends have one outcome."""
     parts = np.linspace(0.0, 1.0, _PIECES + 1)
@@ -244,7 +241,7 @@ def _bisect(
         size = float(np.abs(high - low).max())
         rows = low + parts[:, None] * (high - low)
         rows[-1] = high
-        told = np.asarray(decide(flow, rows, horizon), dtype=bool)
+        told = snaps(rows)
         if told[0] or not told[-1]:
             return None
         at = int(np.argmax(told))

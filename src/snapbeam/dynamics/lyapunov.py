@@ -295,7 +295,7 @@ def largest_lyapunov(
     """
     flow = flow_of(system, integration)
     total = integer("periods", periods, _BLOCKS, 10**7)
-    before, rule = settling_periods(flow, transient, fewest=1)
+    before, rule = settling_periods(flow, transient, low=1)
     size = within("distance", distance, *_DISTANCES, closed="both")
     begun, _, _ = _runs(flow, states, None)
     here = flow.advance(begun, before).states

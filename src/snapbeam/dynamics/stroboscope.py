@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -286,21 +286,16 @@ def flow_of(system: System | Flow, integration: Integration | None = None, accur
 
 
 def settling_periods(
-    flow: Flow,
-    given: int | None = None,
-    rates: ArrayLike = (),
-    least: int = 200,
-    name: str = "transient",
-    fewest: int = 0,
+    flow: Flow, given: Any = None, rates: Iterable[float] = (), least: int = 200, name: str = "transient", low: int = 0
 ) -> tuple[int, str]:
     """Periods after which a motion is settled, and the rule: *given*, or by the slowest mode or decay *rates*, 1/s."""
     if given is not None:
-        return integer(name, given, fewest, 10**7), "as given"
-    known = [float(rate) for rate in np.ravel(np.asarray(rates, dtype=np.float64))]
+        return integer(name, given, low, 10**7), "as given"
+    known = list(rates)
     if isinstance(flow, Stroboscope):
         model = flow.system.struck_model
-        rates = model.damping_ratio * model.omega if model.damping is None else -flow.system.poles().real
-        known.append(float(np.min(rates)))
+        decay = model.damping_ratio * model.omega if model.damping is None else -flow.system.poles().real
+        known.append(float(np.min(decay)))
     if not known:
         return least, f"{least} periods"
     slowest = min(known)

@@ -124,9 +124,8 @@ def bifurcation_diagram(
         raise InputTypeError(f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep") from None
     integer("periods[1]", keep, 2, 10**6)
     flag("grazing", grazing)
-    many = None
-    if isinstance(initial_conditions, InitialConditions) or initial_conditions:
-        many = starts_of(initial_conditions)
+    asked = isinstance(initial_conditions, InitialConditions) or initial_conditions
+    many = starts_of(initial_conditions) if asked else None
     if not kinds and many is None:
         raise InputError("sweeps = (): must be at least one, or initial_conditions at least 1")
     flow = Stroboscope(system, Integration() if integration is None else integration)
@@ -147,17 +146,13 @@ def bifurcation_diagram(
         location = swept.values if swept.name == "contact.location" else None
         state = many.state(flow.system, number, flow.system.start_state, location)
         begun = np.broadcast_to(flow.coordinates(state), (count, flow.dimension))
-        rows[len(kinds) + number], counts[len(kinds) + number] = _recorded(
-            flow, swept, begun, np.arange(count), leave, keep
-        )
+        place = len(kinds) + number
+        rows[place], counts[place] = _recorded(flow, swept, begun, np.arange(count), leave, keep)
         report(count * (bool(kinds) + number + 1), total)
     labels = [*kinds, *(f"start {number}" for number in range(further))]
     dataset = _diagram(flow, swept, labels, rows, counts, grazing)
-    dataset.attrs |= {
-        "periods_left_out": leave,
-        "termination_reason": f"{leave} periods left out ({rule}) and {keep} kept at each value",
-    }
-    return dataset
+    reason = f"{leave} periods left out ({rule}) and {keep} kept at each value"
+    return dataset.assign_attrs(periods_left_out=leave, termination_reason=reason)
 
 
 def _recorded(
