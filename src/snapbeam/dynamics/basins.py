@@ -127,16 +127,16 @@ def _diagnostics(dataset: xr.Dataset, attractors: Attractors) -> tuple[Diagnosti
     share, low, high = numbers.values()
     if share > _SENSITIVE:
         assert isinstance(attractors.flow, Stroboscope)
-        finer = attractors.flow.integration.accuracy != "reference"
-        message = (
-            f"basins: the labels of {100 * share:.2g} % of the states ({100 * low:.2g} to {100 * high:.2g} % at 95 %) change "
-            "if the step is halved, so near are they to a border; the variable sensitive marks those that were found; "
-            + (
+        remedy = "at this accuracy only shares and entropies are reliable, not single labels"
+        if attractors.flow.integration.accuracy != "reference":
+            remedy = (
                 "find the attractors with integration = Integration(accuracy='reference') (--accuracy reference) for a "
                 "smaller error"
-                if finer
-                else "at this accuracy only shares and entropies are reliable, not single labels"
             )
+        message = (
+            f"basins: the labels of {100 * share:.2g} % of the states ({100 * low:.2g} to {100 * high:.2g} % at 95 %) "
+            "change if the step is halved, so near are they to a border; the variable sensitive marks those that were "
+            f"found; {remedy}"
         )
         found.append(Diagnostic("dynamics.basins_sensitive", message, numbers))
     return tuple(found)

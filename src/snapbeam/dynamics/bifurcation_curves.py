@@ -420,11 +420,9 @@ def _dataset(
     places = np.reshape([curve.values(point.y) for _, point in special], (-1, 2))
     of_kind, kinds = {"long_name": "kind of the point of codimension two"}, [kind for kind, _ in special]
     multipliers = np.array([np.linalg.eigvals(point.came.jacobian) for point in points])
-    variables = multiplier_rows(multipliers, "point") | {
-        "state": (
-            ("point", "coordinate"), np.array([by.state(point.y, flow) for by, point in seen]),
-            "state of the orbit at the phase of observation of the special point",
-        ),
+    states = np.array([by.state(point.y, flow) for by, point in seen])
+    words = "state of the orbit at the phase of observation of the special point"
+    variables = {"state": (("point", "coordinate"), states, words)} | multiplier_rows(multipliers, "point") | {
         "impacts": ("point", np.array([p.came.impacts for p in points], np.int32), "impacts within the period"),
         "residual": ("point", np.array([p.residual for p in points]), "of the return and of the condition"),
         "special_point_kind": ("special_point", np.array(kinds, dtype=str), of_kind),

@@ -134,8 +134,7 @@ class Branch:
         there = [orbit_at(point.orbit, first.flow).coordinates for point in special]
         off = labels | {"long_name": f"by how much it may be off at these steps: {labels['long_name']}"}
         words = "state of the orbit at the phase of observation of the first orbit"
-        variables = multiplier_rows(values, "orbit") | {
-            "state": (("orbit", "coordinate"), states, words),
+        variables = {"state": (("orbit", "coordinate"), states, words)} | multiplier_rows(values, "orbit") | {
             "stable": ("orbit", self.is_stable, "whether every multiplier is inside the unit circle"),
             "impacts": ("orbit", np.array(self.impacts, np.int32), "impacts within the period"),
             "arclength": ("orbit", np.append(0.0, np.cumsum(steps)), "length of the branch in states"),

@@ -209,7 +209,10 @@ class LifetimeWork(PointWork):
         size, count = next(iter(points.values())).size, self.initial_conditions.count
         integers = np.zeros((len(_PER_START), count, size), dtype=np.int32)
         numbers = np.full((count, size), np.nan)
-        cycle = self._cycles(points)
+        cycle = np.empty(size)
+        for system, _, which, own in self.setup.groups(points):
+            columns = {name: values for name, values in own.items() if not name.startswith("initial_state.")}
+            cycle[which] = cycles_of(system, run_columns(system, columns))
         side = -1 if self.setup.system.striker is None or self.setup.system.striker.side == "below" else 1
         for s in range(count):
 
@@ -228,14 +231,6 @@ class LifetimeWork(PointWork):
             integers[4, s] = found["final_well_proven"]
             numbers[s] = found["last_zero_crossing"] / cycle
         return ResultTable(integers.reshape(-1, size).T.copy(), numbers.T.copy())
-
-    def _cycles(self, points: Columns) -> NDArray[np.float64]:
-        """Seconds of a cycle of each point."""
-        cycle = np.empty(next(iter(points.values())).size)
-        for system, _, which, own in self.setup.groups(points):
-            columns = {name: values for name, values in own.items() if not name.startswith("initial_state.")}
-            cycle[which] = cycles_of(system, run_columns(system, columns))
-        return cycle
 
     def unfinished(self, size: int, status: RunStatus = RunStatus.NOT_RUN) -> ResultTable:
         """Rows of points that were not computed."""

@@ -104,7 +104,7 @@ def poincare_section(
         raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
     times = np.minimum(times, end)
     data = simulate(held, how, sample_times=times).dataset
-    kept = data[[*_STATES, "modal_amplitude", "modal_velocity"]]
+    kept = data[[*_STATES[::2], *_STATES[1::2], "modal_amplitude", "modal_velocity"]]
     kept = kept.rename(time="point").reset_coords(drop=True)
     phases = (flow.clock.striker_phase + 2.0 * np.pi * times / flow.clock.cycle) % (2.0 * np.pi)
     attrs = {"title": "Poincare section", "section": str(section), "transient": before, "termination_reason": reason}
