@@ -92,11 +92,7 @@ def penetrations(flow: Stroboscope, coordinates: _Array, periods: int, times: _A
 
 
 def turning_points(flow: Stroboscope, coordinates: _Array, periods: int, *, periodic: bool = True) -> TurningPoints:
-    """Turning points of the gaps of a motion, by the quartic through the five nearest samples, sampled once more there.
-
-    Of a *periodic* motion the samples go on from its end to its beginning.  An impact that lasts no time is no turning point: the
-    velocity jumps.
-    """
+    """Turning points of the gaps of a motion, *periodic* or not, by quartics through five samples, sampled again."""
     end, count = periods * flow.period, _SAMPLES * periods
     _, depth, impacts = _followed(flow, coordinates, periods)
     depth, spacing = depth[:-1] if periodic else depth, end / count
@@ -105,7 +101,7 @@ def turning_points(flow: Stroboscope, coordinates: _Array, periods: int, *, peri
         turns[[0, -1]] = False
     at, contact = np.nonzero(turns)
     for onset, duration, touched in impacts:
-        if duration == 0.0:
+        if duration == 0.0:  # the velocity jumps: no turning point
             apart = np.abs((spacing * at - onset + 0.5 * end) % end - 0.5 * end)
             at, contact = (each[(contact != touched) | (apart > 2.0 * spacing)] for each in (at, contact))
     if not at.size:
@@ -141,8 +137,7 @@ def carried(flow: Stroboscope, coordinates: _Array, phase: float) -> _Array:
         return coordinates
     if flow.dimension > 2 * flow.space.modes:  # to a tick of the clock
         moved = advance(flow.system, flow.state(coordinates), part, integration=flow.integration)
-        found: _Array = flow.space.of(moved.flat)[0]
-        return found
+        return np.asarray(flow.space.of(moved.flat)[0])
     integration = flow.integration.replace(cycles=1, early_termination=False)
     times = [0.0, part * flow.clock.cycle]
     last = simulate(flow.starting(coordinates), integration, sample_times=times).dataset.isel(time=-1)
@@ -150,10 +145,7 @@ def carried(flow: Stroboscope, coordinates: _Array, phase: float) -> _Array:
 
 
 def between_contacts(flow: Flow, coordinates: _Array, periods: int) -> Stroboscope | None:
-    """The map at the phase of the primary excitation at which a periodic motion is farthest from its contacts.
-
-    None where that is not needed: the map is smooth, or no contact is near the phase at which it takes states.
-    """
+    """The map at the phase farthest from the contacts of a periodic motion; None if smooth or no contact is near."""
     if not isinstance(flow, Stroboscope) or not flow.jumps or flow.system.striker is None:
         return None
     end, cycle, begin = periods * flow.period, flow.clock.cycle, flow.clock.striker_phase

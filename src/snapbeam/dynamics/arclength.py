@@ -7,8 +7,8 @@ Bifurcation Theory, 1977).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any, Generic, NamedTuple, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, newton
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.util.singular_values import svd
+from snapbeam.util.validation import within
 
 _Array = NDArray[np.float64]
 _SHORTEST = 1e-7
@@ -60,10 +61,7 @@ class Equations:
         raise NotImplementedError
 
     def correct(self, guess: _Array, row: _Array, before: _Array, known: _Array | None = None) -> Point:
-        """The point on the plane through *guess* across *row*; its tangent goes on as *before* does.
-
-        *known* is a derivative to begin with.
-        """
+        """The point on the plane through *guess* across *row*, its tangent like *before*; *known*: first derivative."""
 
         def residual(y: _Array) -> _Array:
             return np.append(self.residual(y), row @ (y - guess))
@@ -143,10 +141,7 @@ def tangent_of(table: _Array, before: _Array) -> _Array:
 
 @dataclass(eq=False)
 class OrbitEquations(Equations):
-    """Equations of the periodic orbits of a flow over one or two parameters, P^m(x) = x, and further ones.
-
-    The last unknowns are the parameters over their ranges.
-    """
+    """Equations of periodic orbits, P^m(x) = x, and further ones; the last unknowns: parameters over their ranges."""
 
     family: Family
     period: int
@@ -157,8 +152,7 @@ class OrbitEquations(Equations):
 
     def values(self, y: _Array) -> _Array:
         """Parameters of a point."""
-        found: _Array = y[..., -self.spans.size :] * self.spans
-        return found
+        return np.asarray(y[..., -self.spans.size :] * self.spans)
 
     def flow_at(self, y: _Array) -> Flow:
         """The flow at the parameters of a point."""
@@ -201,20 +195,23 @@ class OrbitEquations(Equations):
         """Adapt the equations to a point nearby."""
 
 
-E_ = TypeVar("E_", bound=Equations)
+def distances(step: float, max_step: float, shortest: float) -> tuple[float, float]:
+    """The first and the longest distance between two points of a curve, checked."""
+    steps = {"step": step, "max_step": max_step}
+    first, longest = (within(name, value, shortest, 1.0, closed="both") for name, value in steps.items())
+    return first, longest
 
 
-@dataclass
-class Path(Generic[E_]):
-    """Points of a curve as it is followed, each with the equations at whose phase it is seen."""
+class Path(NamedTuple):
+    """Points of a curve, each with the equations at whose phase it is seen, special points, and reason of the end."""
 
-    points: list[tuple[E_, Point]]
-    events: list[Any] = field(default_factory=list)
-    end: str = ""
+    points: list[tuple[Any, Point]]
+    events: list[Any]
+    end: str
 
 
 def follow(
-    equations: E_,
+    equations: Equations,
     first: Point,
     *,
     limits: _Array,
@@ -223,16 +220,14 @@ def follow(
     max_step: float,
     progress: Callable[[int, int], object],
     what: str = "orbit",
-) -> Path[E_]:
-    """Follow a curve from a point along its tangent, in steps from *step* to *max_step*.
-
-    *limits*, of shape (k, 2), are those of the last k unknowns; *what* is the noun of a point, for the reason of the end.
-    """
-    path: Path[E_] = Path([(equations, first)])
-    points, count, length = path.points, len(limits), step
+) -> Path:
+    """Follow a curve in steps up to *max_step*; *limits*, (k, 2), are of the last k unknowns, *what* a point's noun."""
+    points: list[tuple[Equations, Point]] = [(equations, first)]
+    events: list[Any] = []
+    count, length = len(limits), min(step, max_step)
     while len(points) < max_points:
         try:
-            points[-1] = points[-1][0].observed(points[-1][1])  # type: ignore[assignment]
+            points[-1] = points[-1][0].observed(points[-1][1])
         except (OrbitNotFoundError, np.linalg.LinAlgError):
             pass  # the next point is sought at the phase of this one
         equations, last = points[-1]
@@ -261,23 +256,20 @@ def follow(
         except (OrbitNotFoundError, np.linalg.LinAlgError) as error:
             length *= 0.5
             if length < _SHORTEST * max_step:
-                path.end = f"no further {what}: {error}"
-                return path
+                return Path(points, events, f"no further {what}: {error}")
             continue
-        path.events += equations.events(last, point, len(points) - 1)
+        events += equations.events(last, point, len(points) - 1)
         ended = equations.end_at(last, point)
         if ended is None or ended[1]:
             points.append((equations, point))
             progress(len(points), max_points)
         if ended is not None or crossed:
-            path.end = f"limit of {'the' if count == 1 else 'a'} parameter" if ended is None else ended[0]
-            return path
+            end = f"limit of {'the' if count == 1 else 'a'} parameter" if ended is None else ended[0]
+            return Path(points, events, end)
         if len(points) > _CLOSED and equations.has_returned(point, points[0], 0.75 * length):
-            path.end = "closed"
-            return path
+            return Path(points, events, "closed")
         if point.iterations <= equations.easy and turned > 0.95:
             length = min(1.4 * length, max_step)
         elif point.iterations >= equations.hard or turned < 0.8:
             length *= 0.6
-    path.end = f"{max_points} {what}s, the maximum (max_points)"
-    return path
+    return Path(points, events, f"{max_points} {what}s, the maximum (max_points)")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from scipy.stats import beta
 from snapbeam.dynamics.flow import AdvancedStates, Flow, minimal_period
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, in_unit, labelled, reported
+from snapbeam.dynamics.results import in_unit, of_flow, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, jacobian, orbit_tolerance, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of, settling_periods
 from snapbeam.model.integration import Integration
@@ -55,11 +55,10 @@ _FEW = 8
 
 @dataclass(frozen=True, eq=False)
 class Ball:
-    """States about one point of a stable orbit that the flow brings nearer with every return.
+    """States about a point of a stable orbit that come nearer with every return, by |e|_Q^2 = e.Q e.
 
-    Nearness is |e|_Q^2 = e.Q e with Q - M^T Q M = 1 for the derivative M of the return map: in it the linear part
-    contracts.  The radius is the largest at which, and at all smaller ones of a row of shells, every one of 48 states
-    came back nearer: tried, not proved; half of it is used.
+    Q - M^T Q M = 1 for the derivative M of the return map.  Up to the radius 48 states on every shell came back nearer:
+    tried, not proved; half of it is used.
     """
 
     center: _Array
@@ -70,12 +69,8 @@ class Ball:
     def holds(self, rows: _Array) -> NDArray[np.bool_]:
         """Mask of the states of shape (runs, d) that are within, each by itself."""
         away = rows - self.center
-        total = np.zeros(len(rows))
-        for column in self.factor.T:
-            part = (away * column).sum(axis=1)
-            total += part * part
-        found: NDArray[np.bool_] = total <= (_SHARE * self.radius) ** 2
-        return found
+        total = sum((away * column).sum(axis=1) ** 2 for column in self.factor.T)
+        return np.asarray(total <= (_SHARE * self.radius) ** 2)
 
 
 def balls_of(orbit: PeriodicOrbit) -> list[Ball]:
@@ -83,11 +78,9 @@ def balls_of(orbit: PeriodicOrbit) -> list[Ball]:
     size = orbit.coordinates.size
     directions = np.random.Generator(np.random.Philox(_SEED)).standard_normal((_TRIED, size))
     directions /= np.sqrt((directions**2).sum(axis=1))[:, None]
-    found = [_ball(orbit, orbit.coordinates, orbit.jacobian, directions)]
-    for point in orbit.points[1:]:
-        came = jacobian(Family(orbit.flow), point, orbit.period)
-        found.append(_ball(orbit, point, came.jacobian, directions))
-    return found
+    others = (jacobian(Family(orbit.flow), point, orbit.period).jacobian for point in orbit.points[1:])
+    slopes = [orbit.jacobian, *others]
+    return [_ball(orbit, point, slope, directions) for point, slope in zip(orbit.points, slopes, strict=True)]
 
 
 def _ball(orbit: PeriodicOrbit, point: _Array, slope: _Array, directions: _Array) -> Ball:
@@ -120,8 +113,7 @@ class Cloud:
         """Mask of the states that lie among the points."""
         known = np.asarray(np.isfinite(rows).all(axis=1))
         away, _ = self.tree.query(np.where(known[:, None], rows, 0.0))
-        found: NDArray[np.bool_] = known & (away <= self.reach)
-        return found
+        return np.asarray(known & (away <= self.reach))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +127,7 @@ class Attractor:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> [(each.kind, each.period) for each in found.attractors]
     [('periodic', 1), ('periodic', 1), ('periodic', 1)]
@@ -184,8 +175,7 @@ class Attractors:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> found.undecided
     0.0
@@ -214,9 +204,8 @@ class Attractors:
     def unseen_share(self, confidence: float = 0.95) -> float:
         """Upper bound of the share of initial states that go to attractors that were not found.
 
-        It bounds the basin volume in the sampled region, for random states, not the number of attractors. If all *n*
-        states are decided it is 1 - (1 - *confidence*)^(1/n), about 3/n at 95 % (the rule of three). Undecided states
-        count as unseen (Clopper and Pearson).
+        It bounds the volume of basins in the region of random states, by Clopper and Pearson: about 3/n at 95 % if all
+        *n* states are decided (the rule of three). Undecided states count as unseen.
         """
         level = within("confidence", confidence, 0.0, 1.0)
         lost, count = int((self.labels == UNDECIDED).sum()), self.labels.size
@@ -236,11 +225,11 @@ class Attractors:
         """Kinds, periods, exponents, shares and points, labelled."""
         unit = "1/s" if isinstance(self.flow, Stroboscope) else "1"
         of, every = "attractor", self.attractors
-        attrs = fixed_parameters(self.flow) | {
+        attrs = {
             "title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods,
             "unseen_share_95": self.unseen_share(), "termination_reason": self.termination_reason,
         }  # fmt: skip
-        variables: dict[str, tuple[Any, Any, Any]] = {
+        variables = {
             "kind": (of, [each.kind for each in every], {"long_name": "kind of attractor"}),
             "period": (of, [each.period for each in every], "periods; 0: chaotic"),
             "exponent": (of, [each.exponent for each in every], in_unit(unit, "largest exponent")),
@@ -249,7 +238,7 @@ class Attractors:
             "points": ((of, "point", "coordinate"), self.every_point, "the attractor once a period"),
             "label": ("state", self.labels, "attractor that a state goes to; -1: undecided"),
         }  # fmt: skip
-        return labelled(variables, {"coordinate": coordinate_names(self.flow)}, attrs)
+        return of_flow(self.flow, variables, attrs)
 
     @property
     def every_point(self) -> _Array:
@@ -262,12 +251,7 @@ class Attractors:
 
 
 def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
-    """Random states about both wells and between.
-
-    ``amplitude[1]`` is uniform in [-1.4, 1.4] and ``velocity[1]`` in [-0.6, 0.6]; a random vibration of each linear mode
-    is added, of at most 0.2 omega_1/omega_j in amplitude and 0.2 in velocity.  State s comes from Philox with the key
-    (seed, s) alone.
-    """
+    """Random states of the region of :func:`find_attractors`; state s comes from Philox with key (seed, s) alone."""
     model, n = flow.system.struck_model, flow.space.modes
     rows = np.zeros((count, flow.dimension))
     reach = 0.2 * flow.space.scales[0] / np.sqrt((model.linear_modes**2).sum(axis=0))
@@ -320,10 +304,8 @@ def find_attractors(
         Seed of the initial states, or a generator that gives one.
     tolerance : float
         Tolerance of the orbits, as in :func:`periodic_orbit`.
-    integration : Integration, optional
-        Solver settings.
-    progress : callable or bool, optional
-        Report of parts of the work, as in :func:`snapbeam.sweep`.
+    integration, progress : optional
+        Solver settings, and report of parts of the work as in :func:`snapbeam.sweep`.
 
     Returns
     -------
@@ -337,15 +319,14 @@ def find_attractors(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> f"{found.unseen_share():.2f}"  # upper bound at 95 % of the fraction of states that go to other attractors
     '0.22'
     """
     flow = flow_of(system, integration)
     require_isolated_orbits(flow)
-    leave, rule = settling_periods(flow, transient, least=_TRANSIENT, fewest=1)
+    leave, rule = settling_periods(flow, transient, least=_TRANSIENT, low=1)
     most, lasts = (integer("max_periods", max_periods, 1, 512), integer("check_periods", check_periods, 20, 10**7))
     rows = _states_of(flow, states, seed_of(rng))
     allowed = orbit_tolerance(tolerance)
@@ -359,47 +340,35 @@ def find_attractors(
     known = np.asarray(np.isfinite(seen.states).all(axis=1))
     repeats = np.where(known, minimal_period(np.where(known[:, None, None], seen.every, 0.0), _REPEATS), 0)
     verified, reasons = _orbits(flow, seen, repeats, allowed)
-    orbits = [orbit for orbit, _ in verified]
     report(2, _PARTS)
-    regular = [_periodic(orbit, verification) for orbit, verification in verified]
+    regular = [_periodic(*each) for each in verified.items()]
     labels = np.full(len(rows), UNDECIDED)
     for s in np.flatnonzero(repeats > 0):
-        labels[s] = _nearest(orbits, seen.states[s])
+        labels[s] = _nearest(verified, seen.states[s])
     irregular = np.flatnonzero(known & (repeats == 0))
-    chaotic, members = _chaotic(flow, rows, seen, irregular, most, lasts, orbits)
+    chaotic, members = _chaotic(flow, seen, irregular, most, lasts)
     report(3, _PARTS)
     found, order = _ordered([*regular, *chaotic])
     for number, group in enumerate(members):
         labels[group] = len(regular) + number
-    labels = np.where(labels >= 0, order[np.maximum(labels, 0)] if len(order) else UNDECIDED, UNDECIDED)
+    labels = np.append(order, UNDECIDED)[labels]
     report(4, _PARTS)
-    return Attractors(flow, found, labels, lasts, _reason(labels, known, repeats, leave, rule, most, reasons))
+    reason = "; ".join([f"{leave} periods left out ({rule})", *_undecided(labels, known, repeats, most, reasons)])
+    return Attractors(flow, found, labels, lasts, reason)
 
 
-def _reason(
-    labels: NDArray[np.int64],
-    known: NDArray[np.bool_],
-    repeats: NDArray[np.int64],
-    leave: int,
-    rule: str,
-    most: int,
-    reasons: list[str],
-) -> str:
-    """Reasons why the search stopped, and why states are undecided."""
-    lost = labels == UNDECIDED
-    words = [f"{leave} periods left out ({rule})"]
-    counts = (
-        (int((lost & ~known).sum()), "failed"),
-        (
-            int((lost & known & (repeats == 0)).sum()),
-            f"repeat after none of 1 to {most} periods and are not verified as chaotic",
-        ),
-        (
-            int((lost & (repeats > 0)).sum()),
-            f"repeat, but their orbit is not verified ({'; '.join(dict.fromkeys(reasons)) or 'another orbit is nearby'})",
-        ),
-    )
-    return "; ".join([*words, *(f"{count} states {text}" for count, text in counts if count)])
+def _undecided(
+    labels: NDArray[np.int64], known: NDArray[np.bool_], repeats: NDArray[np.int64], most: int, reasons: list[str]
+) -> list[str]:
+    """Reasons why states are undecided."""
+    why = "; ".join(dict.fromkeys(reasons)) or "another orbit is nearby"
+    groups = {
+        "failed": ~known,
+        f"repeat after none of 1 to {most} periods and are not verified as chaotic": known & (repeats == 0),
+        f"repeat, but their orbit is not verified ({why})": repeats > 0,
+    }
+    counts = {text: int(((labels == UNDECIDED) & group).sum()) for text, group in groups.items()}
+    return [f"{count} states {text}" for text, count in counts.items() if count]
 
 
 def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
@@ -415,10 +384,9 @@ def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
 
 def _orbits(
     flow: Flow, seen: AdvancedStates, repeats: NDArray[np.int64], tolerance: float
-) -> tuple[list[tuple[PeriodicOrbit, PeriodicOrbit]], list[str]]:
+) -> tuple[dict[PeriodicOrbit, PeriodicOrbit], list[str]]:
     """The stable orbits that states which repeat are on, each once and with its verification; why others are none."""
-    found: list[PeriodicOrbit] = []
-    verifications: list[PeriodicOrbit] = []
+    found: dict[PeriodicOrbit, PeriodicOrbit] = {}
     missed: list[_Array] = []
     reasons: list[str] = []
     for s in np.flatnonzero(repeats > 0):
@@ -439,17 +407,17 @@ def _orbits(
             missed.append(x)
             reasons.append("it is unstable, far away, or not confirmed at accuracy = 'reference'")
         elif not any(_is_same(orbit, other) for other in found):
-            found.append(orbit)
-            verifications.append(verification)
-    return list(zip(found, verifications, strict=True)), reasons
+            found[orbit] = verification
+    return found, reasons
 
 
 def _verify(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:
     """The same orbit by fine steps, if it is there and stable: tangents of coarse ones are a per cent off."""
     if not isinstance(orbit.flow, Stroboscope) or orbit.flow.integration.accuracy == "reference":
         return orbit
+    settings = orbit.flow.integration.replace(accuracy="reference", step=None)
     try:
-        fine = shoot(orbit.flow.refined, orbit.coordinates, orbit.period, tolerance)
+        fine = shoot(replace(orbit.flow, integration=settings), orbit.coordinates, orbit.period, tolerance)
     except OrbitNotFoundError:
         return None
     near = float(np.abs(fine.coordinates - orbit.coordinates).max()) < 10.0 * _REPEATS
@@ -460,12 +428,10 @@ def _is_same(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
     return one.period == other.period and float(np.abs(other.points - one.coordinates).max(axis=1).min()) < _SAME
 
 
-def _nearest(orbits: list[PeriodicOrbit], x: _Array) -> int:
+def _nearest(orbits: Iterable[PeriodicOrbit], x: _Array) -> int:
     """Orbit of a state, within the tolerance of repeating states."""
-    for number, orbit in enumerate(orbits):
-        if float(np.abs(orbit.points - x).max(axis=1).min()) < 10.0 * _REPEATS:
-            return number
-    return UNDECIDED
+    near = (float(np.abs(orbit.points - x).max(axis=1).min()) < 10.0 * _REPEATS for orbit in orbits)
+    return next((number for number, is_near in enumerate(near) if is_near), UNDECIDED)
 
 
 def _periodic(orbit: PeriodicOrbit, verification: PeriodicOrbit) -> Attractor:
@@ -475,13 +441,7 @@ def _periodic(orbit: PeriodicOrbit, verification: PeriodicOrbit) -> Attractor:
 
 
 def _chaotic(
-    flow: Flow,
-    rows: _Array,
-    seen: AdvancedStates,
-    which: NDArray[np.int64],
-    most: int,
-    lasts: int,
-    orbits: list[PeriodicOrbit],
+    flow: Flow, seen: AdvancedStates, which: NDArray[np.int64], most: int, lasts: int
 ) -> tuple[list[Attractor], list[NDArray[np.int64]]]:
     """Groups of runs that never repeat, those of them that last and diverge."""
     if not which.size:
@@ -533,6 +493,4 @@ def _ordered(found: list[Attractor]) -> tuple[list[Attractor], NDArray[np.int64]
         return (KINDS.index(each.kind), each.period, *np.round(lowest, 6).tolist())
 
     order = sorted(range(len(found)), key=key)
-    position = np.empty(len(found), dtype=np.int64)
-    position[order] = np.arange(len(found))
-    return [found[i] for i in order], position
+    return [found[i] for i in order], np.argsort(np.array(order, dtype=np.int64))

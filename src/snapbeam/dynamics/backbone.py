@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.arclength import Equations, Path, Point, follow
+from snapbeam.dynamics.arclength import Equations, Point, follow
 from snapbeam.dynamics.results import beam_attributes, in_unit, labelled, reported
 from snapbeam.dynamics.shooting import OrbitNotFoundError
 from snapbeam.model.drive.fixed_stop import FixedStop
@@ -67,14 +67,13 @@ def backbone_curve(
     directions. DOP853 of SciPy integrates half a period with tangents; Newton's method and steps of arc length follow
     the curve; Floquet multipliers give the stability.
 
-    Local forces act with their conservative parts. Circuits of harvesters are open: piezoelectric layers stiffen the
-    beam, a coil has no force. Strikers stand still; one with a mass moves on its suspension.
+    Local forces are conservative, circuits of harvesters open: piezoelectric layers stiffen the beam, a coil has no
+    force. Strikers stand still; one with a mass moves on its suspension.
 
     Parameters
     ----------
     system : System
-        System without excitation; damping is ignored. Each striker is a :class:`~snapbeam.FixedStop` under an elastic
-        law.
+        System without excitation; damping is ignored. Strikers are :class:`~snapbeam.FixedStop` under elastic laws.
     well : {"lower", "upper", "both"}
         Motion about a well, or across both.
     mode : int
@@ -82,8 +81,7 @@ def backbone_curve(
     amplitude_limit : float
         Displacement of the centre from its middle position, in length scales, at which the curve ends.
     lowest_frequency_ratio : float
-        Frequency over the first natural frequency at which the curve ends: towards the barrier the period grows without
-        bound.
+        Frequency over the first natural frequency at which the curve ends: towards the barrier it vanishes.
     max_points : int
         Maximum number of points of the curve.
     max_step : float
@@ -99,8 +97,7 @@ def backbone_curve(
         ``min_midspan`` and ``max_midspan`` (over the length scale), ``stable``, ``unstable_multipliers``.
         ``participation`` over ``point`` and ``mode`` is the share of each linear mode in the mean kinetic energy.
         ``initial_amplitude`` over ``point`` and ``buckling_mode`` and, for strikers with mass, ``initial_shift`` over
-        ``striker`` are those at rest; size and angle of the multipliers are over ``multiplier``. The attribute ``end``
-        is the reason why the curve ends.
+        ``striker`` are those at rest; ``multiplier_size`` and ``multiplier_angle``. Attribute ``end``: the reason.
 
     Raises
     ------
@@ -117,14 +114,12 @@ def backbone_curve(
     -----
     With one mode the periods are elliptic integrals: for U = -k x^2/2 + g x^4/4 and the mass m, about a well
     2 K(1 - x_1^2/x_0^2) / (x_0 sqrt(g/2m)), with turning points x_1 < x_0 (Kovacic and Brennan, The Duffing Equation,
-    Wiley, 2011, chapter 4).  The cost grows with the square of the number of modes and with the highest frequency; use up
-    to about 12.
+    Wiley, 2011, chapter 4). Use up to about 12 modes: the cost grows with their square and the highest frequency.
 
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+    >>> model = sb.ReducedModel.from_beam(sb.paper.BEAM, modes=1)
     >>> curve = sb.dynamics.backbone_curve(sb.System(model), amplitude_limit=0.3)
     >>> bool(curve.frequency[0] > curve.frequency[-1])  # the motion about a well softens
     True
@@ -140,30 +135,23 @@ def backbone_curve(
     report = reported(progress, "backbone curve", "points")
     first = motions.about_well(mode) if well != "both" else motions.across()
 
-    def branch(way: float, before: int, most: int) -> Path[_Motions]:
+    def branch(way: float, before: int, most: int) -> tuple[list[Any], str]:
         start = first._replace(tangent=way * first.tangent)
         path = follow(
-            motions, start, limits=np.empty((0, 2)), max_points=most, step=min(_FIRST, max_step), max_step=max_step,
+            motions, start, limits=np.empty((0, 2)), max_points=most, step=_FIRST, max_step=max_step,
             progress=lambda done, _: report(before + done, max_points), what="motion",
         )  # fmt: skip
-        path.events = [*begun, *path.events][: len(path.points)]
-        return path
+        return [*begun, *path.events][: len(path.points)], path.end
 
     begun = [_measures(structure, first)]
     report(1, max_points)
-    if well != "both":
-        path = branch(1.0, 0, max_points)
-        return _dataset(structure, path.events, path.end)
-    back = branch(-1.0, 0, max_points // 2).events
-    ahead = branch(1.0, len(back) - 1, max_points - len(back) + 1)
-    return _dataset(structure, [*reversed(back[1:]), *ahead.events], ahead.end)
+    back = branch(-1.0, 0, max_points // 2)[0] if well == "both" else begun
+    ahead, end = branch(1.0, len(back) - 1, max_points - len(back) + 1)
+    return _dataset(structure, [*reversed(back[1:]), *ahead], end)
 
 
 class _Structure:
-    """Equations of free motion in the linear modes about a well, in units of its amplitude and of 1/omega_1.
-
-    The generalised coordinates are the amplitudes of the buckling modes and the displacements of strikers with mass.
-    """
+    """Equations of free motion of the beam and of strikers with mass, in linear modes about a well, over 1/omega_1."""
 
     def __init__(self, system: System, well: str) -> None:
         self.system = system = instance("system", system, System, "a System")
@@ -229,13 +217,16 @@ class _Structure:
             row[self.model.modes + self.bodies.index(number)] = sides[1]
         return law, row, begin
 
-    # ------------------------------------------------------------------ forces
-
     def _stiffness(self, z: _Array) -> _Array:
         """Second derivative of the potential energy without contacts."""
         found, n = self.linear.copy(), self.model.modes
         found[:n, :n] += self.potential._tangent(z[:n])
         return found
+
+    def _closed(self, z: _Array) -> list[tuple[Any, _Array, float]]:
+        """Law, row and penetration of the contacts that are closed."""
+        depths = ((law, row, begin + float(row @ z)) for law, row, begin in self.stops)
+        return [each for each in depths if each[2] > 0.0]
 
     def acceleration(self, y: _Array) -> _Array:
         """y'' of coordinates about the well, per omega_1^2."""
@@ -245,23 +236,17 @@ class _Structure:
             raise OrbitNotFoundError("the motion leaves the range of the law of a local force")
         force = -self.linear @ away
         force[:n] -= self.potential._gradient(z[:n])
-        for law, row, begin in self.stops:
-            depth = begin + float(row @ z)
-            if depth > 0.0:
-                force -= row * type(law).force(law, depth)
-        found: _Array = self.shapes.T @ force / (self.scale * self.unit**2)
-        return found
+        for law, row, depth in self._closed(z):
+            force -= row * type(law).force(law, depth)
+        return np.asarray(self.shapes.T @ force / (self.scale * self.unit**2))
 
     def slope(self, y: _Array) -> _Array:
         """Derivative of the acceleration."""
         z = self.rest + self.back @ y
         stiffness = self._stiffness(z)
-        for law, row, begin in self.stops:
-            depth = begin + float(row @ z)
-            if depth > 0.0:
-                stiffness += np.outer(row, row) * type(law).slope(law, depth)
-        found: _Array = -self.shapes.T @ stiffness @ self.shapes / self.unit**2
-        return found
+        for law, row, depth in self._closed(z):
+            stiffness += np.outer(row, row) * type(law).slope(law, depth)
+        return np.asarray(-self.shapes.T @ stiffness @ self.shapes / self.unit**2)
 
     def energy(self, y: _Array) -> float:
         """Potential energy above the well, J."""
@@ -269,21 +254,15 @@ class _Structure:
         z = self.rest + away
         found = float(self.potential.energy(z[:n]) - self.potential.energy(self.rest[:n]))
         found += 0.5 * float(away @ self.linear @ away)
-        for law, row, begin in self.stops:
-            depth = begin + float(row @ z)
-            found += float(type(law).energy(law, depth)) if depth > 0.0 else 0.0
-        return found
+        return found + sum(float(type(law).energy(law, depth)) for law, _, depth in self._closed(z))
 
     def centre(self, y: _Array) -> _Array:
         """Displacement of the centre over the length scale, for coordinates of shape (..., n)."""
         z = self.rest + y @ self.back.T
-        found: _Array = z[..., : self.model.modes] @ self.model.midspan_shape / self.model.length_scale
-        return found
+        return np.asarray(z[..., : self.model.modes] @ self.model.midspan_shape / self.model.length_scale)
 
-    # ------------------------------------------------------------------ half a period
-
-    def half(self, y: _Array, time: float, columns: int) -> tuple[_Array, _Array, _Array]:
-        """State after half a period from rest, and its derivative by the first *columns* of the initial state."""
+    def _run(self, y: _Array, time: float, columns: int = 0, times: _Array | None = None) -> _Array:
+        """Motion from rest, and its derivative by the first *columns* of the start, shape (numbers, instants)."""
         from scipy.integrate import solve_ivp
 
         n = self.size
@@ -297,21 +276,18 @@ class _Structure:
             return np.concatenate((v, self.acceleration(y), carried[n:].ravel(), bent.ravel()))
 
         begun = np.concatenate((y, np.zeros(n), np.eye(2 * n)[:, :columns].ravel()))
-        done = solve_ivp(rate, (0.0, time), begun, method="DOP853", rtol=_RTOL, atol=_ATOL)
-        last = done.y[:, -1]
+        done = solve_ivp(rate, (0.0, time), begun, method="DOP853", t_eval=times, rtol=_RTOL, atol=_ATOL)
+        return np.asarray(done.y)
+
+    def half(self, y: _Array, time: float, columns: int) -> tuple[_Array, _Array, _Array]:
+        """State after half a period from rest, and its derivative by the first *columns* of the initial state."""
+        n, last = self.size, self._run(y, time, columns)[:, -1]
         return last[:n], last[n : 2 * n], last[2 * n :].reshape(2 * n, columns)
 
     def waveform(self, y: _Array, time: float) -> tuple[_Array, _Array]:
         """Coordinates and velocities at even instants of half a period, each of shape (instants, N)."""
-        from scipy.integrate import solve_ivp
-
-        n = self.size
-        times = np.linspace(0.0, time, _SAMPLES + 1)
-        done = solve_ivp(
-            lambda _, z: np.concatenate((z[n:], self.acceleration(z[:n]))),
-            (0.0, time), np.concatenate((y, np.zeros(n))), method="DOP853", t_eval=times, rtol=_RTOL, atol=_ATOL,
-        )  # fmt: skip
-        return done.y[:n].T, done.y[n:].T
+        found = self._run(y, time, 0, np.linspace(0.0, time, _SAMPLES + 1))
+        return found[: self.size].T, found[self.size :].T
 
 
 def _open_stiffness(harvester: Harvester, omega: float) -> float:
@@ -382,8 +358,6 @@ class _Motions(Equations):
             return "lowest_frequency_ratio", True
         return (_AT_REST, True) if not across and np.abs(point.y[:-1]).max() < 5e-4 else None
 
-    # ------------------------------------------------------------------ where curves begin
-
     def about_well(self, mode: int) -> Point:
         """A small motion of a linear mode, towards the other well."""
         structure = self.structure
@@ -446,21 +420,16 @@ def _vanishing(before: _Array, after: _Array) -> float | None:
     return part if np.linalg.norm(before + part * chord) < _NEAR_ZERO * np.sqrt(square) else None
 
 
-def _multipliers(structure: _Structure, point: _Array) -> NDArray[np.complex128]:
-    """Floquet multipliers over a whole period, from the tangents of half of one: the motion retraces itself."""
-    n = structure.size
-    _, _, half = structure.half(point[:-1], float(point[-1]), 2 * n)
-    mirror = np.diag([1.0] * n + [-1.0] * n)
-    found: NDArray[np.complex128] = np.linalg.eigvals(mirror @ np.linalg.solve(half, mirror @ half))
-    return found[np.argsort(-np.abs(found))]
-
-
 def _measures(structure: _Structure, of: Point) -> dict[str, Any]:
     """Numbers of the dataset for one point."""
-    point = of.y
+    point, n = of.y, structure.size
     y, v = structure.waveform(point[:-1], float(point[-1]))
     centre, kinetic = structure.centre(y), np.trapezoid(v**2, axis=0)
-    multipliers = _multipliers(structure, point)
+    # over a whole period, from the tangents of half of one: the motion retraces itself
+    _, _, half = structure.half(point[:-1], float(point[-1]), 2 * n)
+    mirror = np.diag([1.0] * n + [-1.0] * n)
+    multipliers = np.linalg.eigvals(mirror @ np.linalg.solve(half, mirror @ half))
+    multipliers = multipliers[np.argsort(-np.abs(multipliers))]
     others = np.delete(multipliers, np.argsort(np.abs(multipliers - 1.0))[:2])
     return {
         "frequency": structure.unit / (2.0 * point[-1]),

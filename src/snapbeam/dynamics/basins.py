@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage, stats
+from scipy import ndimage, special, stats
 
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors, Cloud
 from snapbeam.dynamics.flow import Flow
@@ -22,10 +22,8 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, checked, 
 if TYPE_CHECKING:
     import xarray as xr
 
-_SIGMAS = 3.0
-
-
 _Array = NDArray[np.float64]
+_SIGMAS = 3.0
 _AMONG = 8
 """Looks in a row at which a state must lie among the points of a chaotic attractor."""
 _MANY = 0.05
@@ -55,9 +53,8 @@ def basins_of_attraction(
     warning. The tip's mid-position is fixed in space.
 
     Near a fractal border the error of the integration changes labels. Every state with a neighbour of another label,
-    and 300 random others, are therefore integrated at half the step too. ``sensitive`` marks changed labels;
-    ``sensitive_share`` is their share of the plane, with its 95 % interval (Wilson, for the sampled part). Above 1 % it
-    gives a warning.
+    and 300 random others, are integrated at half the step too. ``sensitive`` marks changed labels; ``sensitive_share``
+    is their share of the plane, with its 95 % interval (Wilson, for the sampled part); above 1 % it gives a warning.
 
     Parameters
     ----------
@@ -89,8 +86,7 @@ def basins_of_attraction(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.find_attractors(system, 12)
     >>> grid = {"amplitude[1]": [-1.2, 0.0, 1.2], "velocity[1]": [-0.5, 0.5]}
     >>> sb.dynamics.basins_of_attraction(found, grid).basin.shape
@@ -100,7 +96,7 @@ def basins_of_attraction(
     flow = attractors.flow
     step = integer("every", every, 1, 10**4)
     rates = [-each.exponent for each in attractors.attractors if each.orbit is not None]
-    total, rule = settling_periods(flow, periods, rates, name="periods", fewest=1)
+    total, rule = settling_periods(flow, periods, rates, name="periods", low=1)
     names, columns, rows = _plane(flow, grid, fixed_coordinates)
     label, after = _labelled(attractors, flow, rows, total, step, reported(progress, "basins", "periods"))
     dataset = _dataset(attractors, names, columns, label, after, total)
@@ -131,16 +127,16 @@ def _diagnostics(dataset: xr.Dataset, attractors: Attractors) -> tuple[Diagnosti
     share, low, high = numbers.values()
     if share > _SENSITIVE:
         assert isinstance(attractors.flow, Stroboscope)
-        finer = attractors.flow.integration.accuracy != "reference"
-        message = (
-            f"basins: the labels of {100 * share:.2g} % of the states ({100 * low:.2g} to {100 * high:.2g} % at 95 %) change "
-            "if the step is halved, so near are they to a border; the variable sensitive marks those that were found; "
-            + (
+        remedy = "at this accuracy only shares and entropies are reliable, not single labels"
+        if attractors.flow.integration.accuracy != "reference":
+            remedy = (
                 "find the attractors with integration = Integration(accuracy='reference') (--accuracy reference) for a "
                 "smaller error"
-                if finer
-                else "at this accuracy only shares and entropies are reliable, not single labels"
             )
+        message = (
+            f"basins: the labels of {100 * share:.2g} % of the states ({100 * low:.2g} to {100 * high:.2g} % at 95 %) "
+            "change if the step is halved, so near are they to a border; the variable sensitive marks those that were "
+            f"found; {remedy}"
         )
         found.append(Diagnostic("dynamics.basins_sensitive", message, numbers))
     return tuple(found)
@@ -189,10 +185,8 @@ def _plane(
         base = np.zeros(flow.dimension)
     else:
         base = state_of(flow, "fixed_coordinates", rest)
-    first, second = np.meshgrid(*columns, indexing="ij")
-    rows = np.repeat(base[None], first.size, axis=0)
-    rows[:, known.index(names[0])] = first.ravel()
-    rows[:, known.index(names[1])] = second.ravel()
+    rows = np.repeat(base[None], columns[0].size * columns[1].size, axis=0)
+    rows[:, [known.index(name) for name in names]] = np.stack(np.meshgrid(*columns, indexing="ij"), -1).reshape(-1, 2)
     return names, columns, rows
 
 
@@ -216,10 +210,8 @@ def _labelled(
                     continue
                 inside &= among[number, open_] >= _AMONG
             else:
-                inside = np.zeros(open_.size, dtype=bool)
-                for ball in captures:
-                    if ball.radius > 0.0:
-                        inside |= ball.holds(x)
+                held = [ball.holds(x) for ball in captures if ball.radius > 0.0]
+                inside = np.any([np.zeros(open_.size, dtype=bool), *held], axis=0)
             inside &= ~taken
             label[open_[inside]], after[open_[inside]] = number, done
             taken |= inside
@@ -244,16 +236,13 @@ def _dataset(
         for name, column in zip(names, columns, strict=True)
     }
     attrs = {"title": "basins of attraction", "periods": total, "undecided": float((label == UNDECIDED).mean())}
-    return labelled(
-        {
-            "basin": (names, label.reshape(shape), words),
-            "captured_after": (names, after.reshape(shape), "periods until certain"),
-            "attractor_points": (
-                ("attractor", "point", "coordinate"), found.every_point[..., places], "attractors there"
-            ),
-        },
-        coords, fixed_parameters(found.flow) | attrs,
-    )  # fmt: skip
+    points = found.every_point[..., places]
+    variables = {
+        "basin": (names, label.reshape(shape), words),
+        "captured_after": (names, after.reshape(shape), "periods until certain"),
+        "attractor_points": (("attractor", "point", "coordinate"), points, "attractors there"),
+    }
+    return labelled(variables, coords, fixed_parameters(found.flow) | attrs)
 
 
 def _long_name(name: str) -> str:
@@ -313,8 +302,7 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     """Basin entropy and boundary basin entropy (Daza et al., Sci. Rep. 6 (2016) 31416).
 
     In each box of *box* points a side, with shares p_j of the labels, the entropy is S = -sum p_j ln p_j. S_b is its
-    mean over all boxes, S_bb over those that hold a border. Undecided points are left out; the bounds hold for any of
-    the present labels in their place.
+    mean over all boxes, S_bb over those that hold a border. Undecided points are left out, except of the bounds.
 
     Parameters
     ----------
@@ -367,8 +355,7 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
 
 def _entropy(counts: NDArray[Any]) -> _Array:
     """Entropy of rows of counts; 0 where all are 0."""
-    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
-    return np.asarray(-np.where(share > 0.0, share * np.log(np.where(share > 0.0, share, 1.0)), 0.0).sum(axis=1))
+    return np.asarray(special.entr(counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)).sum(axis=1))
 
 
 def _extremes(counts: NDArray[Any], lost: NDArray[Any]) -> tuple[_Array, _Array, _Array]:

@@ -27,10 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.dynamics.approaches import penetrations, turning_points
-from snapbeam.dynamics.arclength import OrbitEquations, Point, follow, tangent_of
+from snapbeam.dynamics.arclength import OrbitEquations, Point, distances, follow, tangent_of
 from snapbeam.dynamics.branches import SpecialPoint
 from snapbeam.dynamics.flow import Flow
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels, reported
+from snapbeam.dynamics.results import multiplier_rows, of_flow, parameter_labels, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, impacts_of, jacobian, orbit_tolerance
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.hertz import HertzContact
@@ -45,7 +45,8 @@ if TYPE_CHECKING:
 _Array = NDArray[np.float64]
 CURVES = ("fold", "flip", "Neimark-Sacker", "grazing")
 _TOLERANCE = 1e-9
-_SHORTEST, _LONGEST = 1e-6, 1.0
+_SHORTEST = 1e-6
+"""Minimum distance between points."""
 _DIFFERENCE = 1e-5
 """Step of differences, in units of the well's amplitude and of the ranges of the parameters."""
 _HALVINGS = 40
@@ -97,8 +98,7 @@ class _Curve(OrbitEquations):
 
     def _singular(self, came: Return) -> _Array:
         sign = 1.0 if self.kind == "fold" else -1.0
-        table: _Array = came.jacobian - sign * np.eye(len(came.x))
-        return table
+        return np.asarray(came.jacobian - sign * np.eye(len(came.x)))
 
     def null_vectors(self, came: Return) -> tuple[_Array, _Array, float]:
         """Right and left vector of the bordered systems, which are critical ones on the curve, and g."""
@@ -144,8 +144,7 @@ class _Curve(OrbitEquations):
         # across a touch the motion is another one: the derivative is that of the side without it
         alike = np.reshape([each.impacts == came.impacts for each in beside], (2, -1)) | (self.kind != "grazing")
         weights = np.where(alike.any(axis=0), alike, True)
-        slope: _Array = (sides * weights).sum(axis=0) / weights.sum(axis=0)
-        return slope
+        return np.asarray((sides * weights).sum(axis=0) / weights.sum(axis=0))
 
     def _seen(self, y: _Array) -> Stroboscope:
         flow = self.flow_at(y)
@@ -209,10 +208,7 @@ class _Curve(OrbitEquations):
 
 
 def _without_contact_force(grazing: SpecialPoint, names: tuple[str, str]) -> Flow:
-    """The flow of a grazing orbit, with contacts that exert no force where the orbit has no other impact.
-
-    Such an orbit is the one without contact on both sides of the curve, and the curve the same under every law.
-    """
+    """The flow of a grazing orbit, without contact forces if it has no other impact: the curve is that of every law."""
     orbit = grazing.orbit
     flow = orbit.flow
     if not isinstance(flow, Stroboscope):
@@ -276,10 +272,7 @@ _SIGNS = {"fold": 1.0, "flip": -1.0}
 
 
 def _flip_coefficient(curve: _Curve, point: Point) -> float:
-    """The cubic coefficient of the normal form of a flip; NaN where the states beside the orbit have other impacts.
-
-    A doubled orbit is stable if it is positive.
-    """
+    """Cubic coefficient of a flip, positive if the doubled orbit is stable; NaN if states nearby have other impacts."""
     right, left, _ = curve.null_vectors(point.came)
     x, v, w = point.y[:-2], right / np.linalg.norm(right), left * np.linalg.norm(right) / (left @ right)
 
@@ -315,8 +308,7 @@ def bifurcation_curve(
 
     Points of codimension two are located: cusps, fold-flips (multipliers +1 and -1), generalized flips, the resonances
     1:1 to 1:4, and grazing at a bifurcation. If the grazing approach is the only contact, a grazing curve leaves its
-    force out, so that the orbit is defined on both sides. With other impacts under Newton's law the orbit keeps a gap
-    of 1e-6 b.
+    force out: the orbit exists on both sides. With other impacts under Newton's law the orbit keeps a gap of 1e-6 b.
 
     Parameters
     ----------
@@ -332,8 +324,7 @@ def bifurcation_curve(
         First and maximum distance between points, in units of the well's amplitude for the state and of the range for
         each parameter; between 1e-6 and 1.
     tolerance : float
-        Tolerance of the orbit and of the condition, as in :func:`periodic_orbit`; up to 1,000 times as much where light
-        impacts make the multipliers rough.
+        Tolerance, as in :func:`periodic_orbit`; up to 1,000 times as much where light impacts roughen multipliers.
     progress : callable or bool, optional
         Report of points, as in :func:`snapbeam.sweep`.
 
@@ -342,8 +333,7 @@ def bifurcation_curve(
     xarray.Dataset
         Variables over ``point``: both parameters, their errors, the state, the multipliers, impacts, residual. Over
         ``special_point``: kind and parameters of points of codimension two. On a grazing curve the attribute
-        ``kept_gap`` is the gap over b; ``contact_force`` is "left out" if the
-        multipliers are those of the motion without contact.
+        ``kept_gap`` is the gap over b; ``contact_force`` is "left out" if the multipliers are those without contact.
 
     Raises
     ------
@@ -359,8 +349,7 @@ def bifurcation_curve(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
     >>> curve = sb.dynamics.bifurcation_curve(
@@ -393,10 +382,7 @@ def bifurcation_curve(
     for k, name in enumerate(names):
         within(name, float(begun[k]), *limits[k], closed="both")
     count = integer("max_points", max_points, 2, 10**6)
-    length, longest = (
-        within(words, value, _SHORTEST, _LONGEST, closed="both")
-        for words, value in (("step", step), ("max_step", max_step))
-    )
+    step, max_step = distances(step, max_step, _SHORTEST)
     spans = limits[:, 1] - limits[:, 0]
     orbit, family = special_point.orbit, Family(flow, *names)
     curve = _Curve(family, orbit.period, spans, orbit_tolerance(tolerance), special_point.kind)
@@ -412,54 +398,44 @@ def bifurcation_curve(
             first._replace(tangent=sign * first.tangent),
             limits=limits / spans[:, None],
             max_points=count,
-            step=min(length, longest),
-            max_step=longest,
+            step=step,
+            max_step=max_step,
             progress=report,
             what="point",
         )
         for sign in (-1.0, 1.0)
     )
     points = [*reversed(back.points[1:]), *ahead.points]
-    ends = f"{back.end}; {ahead.end}"
-    return _dataset(curve, names, points, [*back.events, *ahead.events], ends, flow)
+    return _dataset(curve, points, [*back.events, *ahead.events], f"{back.end}; {ahead.end}")
 
 
 def _dataset(
-    curve: _Curve,
-    names: tuple[str, str],
-    seen: list[tuple[_Curve, Point]],
-    special: list[tuple[str, Point]],
-    ends: str,
-    flow: Flow,
+    curve: _Curve, seen: list[tuple[_Curve, Point]], special: list[tuple[str, Point]], ends: str
 ) -> xr.Dataset:
+    flow = curve.family.flow
     points = [point for _, point in seen]
     relative = _FINE if isinstance(flow, Stroboscope) else 1e-9
     errors = np.array([curve.error(point, relative) for point in points])
     values = np.array([curve.values(point.y) for point in points])
     places = np.reshape([curve.values(point.y) for _, point in special], (-1, 2))
-    multipliers = np.array([np.linalg.eigvals(point.came.jacobian) for point in points])
     of_kind, kinds = {"long_name": "kind of the point of codimension two"}, [kind for kind, _ in special]
-    variables: dict[str, tuple[Any, Any, Any]] = {
-        "state": (
-            ("point", "coordinate"), np.array([by.state(point.y, flow) for by, point in seen]),
-            "state of the orbit at the phase of observation of the special point",
-        ),
-        "multiplier_real": (("point", "multiplier"), multipliers.real, "Floquet multiplier"),
-        "multiplier_imag": (("point", "multiplier"), multipliers.imag, "its imaginary part"),
+    multipliers = np.array([np.linalg.eigvals(point.came.jacobian) for point in points])
+    states = np.array([by.state(point.y, flow) for by, point in seen])
+    words = "state of the orbit at the phase of observation of the special point"
+    variables = {"state": (("point", "coordinate"), states, words)} | multiplier_rows(multipliers, "point") | {
         "impacts": ("point", np.array([p.came.impacts for p in points], np.int32), "impacts within the period"),
         "residual": ("point", np.array([p.residual for p in points]), "of the return and of the condition"),
         "special_point_kind": ("special_point", np.array(kinds, dtype=str), of_kind),
     }  # fmt: skip
-    coords: dict[str, Any] = {"coordinate": coordinate_names(flow)}
-    shorts = []
-    for k, name in enumerate(names):
+    coords, shorts = {}, []
+    for k, name in enumerate(curve.family.names):
         short, labels = parameter_labels(flow, name)
         shorts.append(short)
         coords[short] = ("point", values[:, k], labels | {"parameter": name})
         off = labels | {"long_name": f"by how much it may be off at these steps: {labels['long_name']}"}
         variables[f"{short}_error"] = ("point", errors[:, k], off)
         variables[f"special_point_{short}"] = ("special_point", places[:, k], labels)
-    attrs = fixed_parameters(flow, *shorts) | {
+    attrs: dict[str, Any] = {
         "title": f"bifurcation curve of periodic orbits: {curve.kind}", "kind": curve.kind, "parameters": shorts,
         "period": curve.period, "termination_reason": ends,
     }  # fmt: skip
@@ -467,4 +443,4 @@ def _dataset(
         assert isinstance(flow, Stroboscope)
         left_out = flow.system.contacts[0].law == HertzContact(_WITHOUT_FORCE)
         attrs |= {"kept_gap": curve.room, "contact_force": "left out" if left_out else "included"}
-    return labelled(variables, coords, attrs)
+    return of_flow(flow, variables, attrs, coords, shorts)

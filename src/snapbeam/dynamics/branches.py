@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.arclength import OrbitEquations, Path, Point, follow, tangent_of
+from snapbeam.dynamics.arclength import OrbitEquations, Point, distances, follow, tangent_of
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, orbit_at
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, parameter_labels, reported
+from snapbeam.dynamics.results import multiplier_rows, of_flow, parameter_labels, reported
 from snapbeam.dynamics.shooting import Family, OrbitNotFoundError, Return, jacobian, orbit_tolerance
-from snapbeam.dynamics.stroboscope import Stroboscope, jumps
+from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.util.display import plotter
 from snapbeam.util.validation import InputError, checked, choice, integer, interval, shown, within
 
@@ -39,9 +39,6 @@ _Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
 
 
-# A branch of periodic orbits and its special points, as datasets.
-
-
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
     """A special point of a branch: a bifurcation or a grazing orbit.
@@ -53,8 +50,7 @@ class SpecialPoint:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=12)
     >>> [(point.kind, round(point.value, 4)) for point in branch.special_points]
@@ -87,8 +83,7 @@ class Branch:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.3), max_points=5)
     >>> len(branch.orbits), branch.termination_reason
@@ -138,11 +133,8 @@ class Branch:
         steps = np.linalg.norm(np.diff(states, axis=0), axis=1)
         there = [orbit_at(point.orbit, first.flow).coordinates for point in special]
         off = labels | {"long_name": f"by how much it may be off at these steps: {labels['long_name']}"}
-        coordinates, multipliers = ("orbit", "coordinate"), ("orbit", "multiplier")
-        variables: dict[str, tuple[Any, Any, Any]] = {
-            "state": (coordinates, states, "state of the orbit at the phase of observation of the first orbit"),
-            "multiplier_real": (multipliers, values.real, "Floquet multiplier"),
-            "multiplier_imag": (multipliers, values.imag, "its imaginary part"),
+        words = "state of the orbit at the phase of observation of the first orbit"
+        variables = {"state": (("orbit", "coordinate"), states, words)} | multiplier_rows(values, "orbit") | {
             "stable": ("orbit", self.is_stable, "whether every multiplier is inside the unit circle"),
             "impacts": ("orbit", np.array(self.impacts, np.int32), "impacts within the period"),
             "arclength": ("orbit", np.append(0.0, np.cumsum(steps)), "length of the branch in states"),
@@ -158,29 +150,16 @@ class Branch:
             ),
         }  # fmt: skip
         if isinstance(first.flow, Stroboscope):
-            centers = np.array([_centers(orbit) for orbit in seen])
-            words = "centre displacement there, over b"
-            variables["midspan_displacement"] = ("orbit", centers[:, 0], words)
+            centers = np.array([orbit._centres for orbit in seen])
+            variables["midspan_displacement"] = ("orbit", centers[:, 0], "centre displacement there, over b")
             words = "centre displacement once a period of the drive, over b"
             variables["midspan_returns"] = (("orbit", "return"), centers, words)
-        coords = {
-            "coordinate": coordinate_names(first.flow),
-            short: ("orbit", self.values, labels | {"parameter": self.name}),
-        }
-        attrs = fixed_parameters(first.flow, short) | {
+        coords = {short: ("orbit", self.values, labels | {"parameter": self.name})}
+        attrs = {
             "title": "branch of periodic orbits", "parameter": short, "period": first.period,
             "termination_reason": self.termination_reason,
         }  # fmt: skip
-        return labelled(variables, coords, attrs)
-
-
-def _centers(orbit: PeriodicOrbit) -> NDArray[np.float64]:
-    """Centre displacement over b, once a period of the drive."""
-    flow = orbit.flow
-    assert isinstance(flow, Stroboscope)
-    n = flow.space.modes
-    amplitudes = orbit.points[:, :n] * flow.space.scales[:n]
-    return np.asarray(amplitudes @ flow.system.model.midspan_shape / flow.system.scale.length)
+        return of_flow(first.flow, variables, attrs, coords, (short,))
 
 
 # Special points, located between two orbits of a branch, with an error.
@@ -220,7 +199,8 @@ class _Orbits(OrbitEquations):
 
     def require_next(self, last: Point, point: Point) -> None:
         """Refuse another number of impacts where the derivatives jump between such orbits."""
-        if jumps(self.family.flow) and point.came.impacts != last.came.impacts:
+        flow = self.family.flow
+        if isinstance(flow, Stroboscope) and flow.jumps and point.came.impacts != last.came.impacts:
             raise OrbitNotFoundError("another number of impacts: it grazes")
 
     def events(self, last: Point, point: Point, number: int) -> list[SpecialPoint]:
@@ -328,10 +308,7 @@ def _derivative_error(flow: Flow) -> float:
 
 
 def _moved(orbits: _Orbits, spots: tuple[Point, Point, Point], part: float, off: float) -> float:
-    """Change of the parameter if the location between the first and the last orbit is off by *off*.
-
-    It is read off the parabola through the three, since at a fold the parameter moves with the square alone.
-    """
+    """Change of the parameter, by the parabola through three orbits, if the place of the middle one is off by *off*."""
     first, middle, last = (float(spot.y[-1]) for spot in spots)
     if not 1e-6 < part < 1.0 - 1e-6:
         return abs(last - first) * float(orbits.spans[0]) * off
@@ -359,10 +336,7 @@ def _grazing(orbits: _Orbits, one: Point, other: Point, at: int) -> SpecialPoint
 
 
 def _grazing_end(points: list[tuple[_Orbits, Point]]) -> SpecialPoint | None:
-    """The grazing that a branch ends at, if its last orbit passes the tip without room to spare.
-
-    The room left, over how fast it went along the branch, is by how much the place is off.
-    """
+    """The grazing that a branch ends at, if its last orbit passes the tip; the error is the room left over its rate."""
     orbits, last = points[-1]
     if not isinstance(orbits.family.flow, Stroboscope):
         return None
@@ -380,8 +354,8 @@ def _grazing_end(points: list[tuple[_Orbits, Point]]) -> SpecialPoint | None:
     return SpecialPoint("grazing", orbit, orbits._value(last.y), len(points) - 1, error)
 
 
-_SHORTEST, _LONGEST = 1e-8, 1.0
-"""Allowed range of the distance between orbits."""
+_SHORTEST = 1e-8
+"""Minimum distance between orbits."""
 _DIFFERENCE = 2e-6
 """Step of the difference by the parameter, over its range."""
 
@@ -436,8 +410,7 @@ def continuation(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.02, 0.032))
     >>> float(branch.values.max())
@@ -449,10 +422,7 @@ def continuation(
         raise InputError(f"bounds = ({low:g}, {high:g}): must contain the orbit's own {name} = {begun:g}")
     choice("direction", direction, ("up", "down"))
     count = integer("max_points", max_points, 2, 10**6)
-    length, max_step = (
-        within(words, value, _SHORTEST, _LONGEST, closed="both")
-        for words, value in (("step", step), ("max_step", max_step))
-    )
+    step, max_step = distances(step, max_step, _SHORTEST)
     span = np.array([high - low])
     orbits = _Orbits(Family(orbit.flow, name), orbit.period, span, orbit_tolerance(tolerance))
     y = np.append(orbit.coordinates, begun / span)
@@ -464,23 +434,18 @@ def continuation(
         Point(y, tangent_of(table, towards), came, table, orbit.iterations, orbit.residual),
         limits=np.array([[low, high]]) / span,
         max_points=count,
-        step=min(length, max_step),
+        step=step,
         max_step=max_step,
         progress=report,
     )
     if len(path.points) < count:
         report(len(path.points), len(path.points))
-    return _branch(name, path)
-
-
-def _branch(name: str, path: Path[_Orbits]) -> Branch:
     points, special, end = path.points, path.events, path.end
     grazing = _grazing_end(points) if end.startswith("no further") else None
     if grazing is not None:
         special, end = [*special, grazing], "grazing"
-    impacts = [point.came.impacts for _, point in points]
-    tangents = [point.tangent for _, point in points]
-    return Branch(name, [by.orbit(point) for by, point in points], special, end, impacts, tangents)
+    impacts, followed = [point.came.impacts for _, point in points], [by.orbit(point) for by, point in points]
+    return Branch(name, followed, special, end, impacts, [point.tangent for _, point in points])
 
 
 def switch_branch(
@@ -518,8 +483,7 @@ def switch_branch(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.15, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.15, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, [-0.69, -0.21])
     >>> branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.145, 0.155))
     >>> flip = branch.special_points[0]
@@ -536,6 +500,6 @@ def switch_branch(
     vector = vectors[:, np.argmin(np.abs(values - (-1.0 if doubled else 1.0)))].real
     row = np.append(vector / np.linalg.norm(vector), 0.0)
     orbits = _Orbits(Family(orbit.flow, name), orbit.period * (2 if doubled else 1), span, _TOLERANCE)
-    away = within("size", size, _SHORTEST, _LONGEST, closed="both") * row
+    away = within("size", size, _SHORTEST, 1.0, closed="both") * row
     guess = np.append(orbit.coordinates, special_point.value / span) + away
     return orbits.orbit(orbits.correct(guess, row, row))

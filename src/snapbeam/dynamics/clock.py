@@ -67,10 +67,7 @@ def common_cycles(system: System, columns: Mapping[str, NDArray[np.float64]]) ->
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """Period of a system whose states are taken at a phase of its primary excitation, rad.
-
-    Without a *phase* each motion has the phase at which a run of the system begins.
-    """
+    """Period of a system whose states are taken at a phase, rad; None: that at which a run of the system begins."""
 
     system: System
     phase: float | None = None

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.flow import Flow, minimal_period
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, shoot, state_of
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled, reported
+from snapbeam.dynamics.results import multiplier_rows, of_flow, reported
 from snapbeam.dynamics.shooting import OrbitNotFoundError, require_isolated_orbits
 from snapbeam.dynamics.stroboscope import Stroboscope, flow_of
 from snapbeam.model.integration import Integration
@@ -45,8 +45,7 @@ class EdgeState:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
     >>> edge.orbit.period, edge.orbit.is_stable
     (1, False)
@@ -71,22 +70,14 @@ class EdgeState:
         settled = np.empty((0, self.flow.dimension)) if self.orbit is None else self.orbit.points
         values = np.empty(0, dtype=complex) if self.orbit is None else self.orbit.multipliers
         words = "unstable orbit that it settles on, once a period"
-        return labelled(
-            {
-                "state": (("period", "coordinate"), self.states, "state on the border once a period"),
-                "distance": ("period", self.distance, "distance of the two that hold it"),
-                "orbit_state": (("orbit_period", "coordinate"), settled, words),
-                "multiplier_real": ("multiplier", values.real, "its multipliers"),
-                "multiplier_imag": ("multiplier", values.imag, "imaginary part"),
-            },
-            {"coordinate": coordinate_names(self.flow)},
-            fixed_parameters(self.flow)
-            | {
-                "title": "edge state",
-                "period": 0 if self.orbit is None else self.orbit.period,
-                "termination_reason": self.termination_reason,
-            },
-        )
+        variables = {
+            "state": (("period", "coordinate"), self.states, "state on the border once a period"),
+            "distance": ("period", self.distance, "distance of the two that hold it"),
+            "orbit_state": (("orbit_period", "coordinate"), settled, words),
+        }
+        period = 0 if self.orbit is None else self.orbit.period
+        attrs = {"title": "edge state", "period": period, "termination_reason": self.termination_reason}
+        return of_flow(self.flow, variables | multiplier_rows(values), attrs)
 
     def __repr__(self) -> str:
         end = "on no orbit" if self.orbit is None else f"on {self.orbit!r}".replace("<", "").replace(">", "")
@@ -123,14 +114,11 @@ def edge_tracking(
     horizon : int
         Periods until the outcome is evaluated.
     bisect_threshold, diverge_threshold : float
-        Distances in units of the well's amplitude; the second is at most a tenth of the distance between *u1* and *u2*.
-        The bisection also stops at rounding.
+        Distances over the well's amplitude, the second at most a tenth of that of *u1* and *u2*; or rounding stops it.
     outcome : callable, optional
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
-    integration : Integration, optional
-        Solver settings.
-    progress : callable or bool, optional
-        Report of periods, as in :func:`snapbeam.sweep`.
+    integration, progress : optional
+        Solver settings, and report of periods as in :func:`snapbeam.sweep`.
 
     Returns
     -------
@@ -144,8 +132,7 @@ def edge_tracking(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> edge = sb.dynamics.edge_tracking(system, [-0.9, 0.0], [-1.0, 1.3], periods=25)
     >>> edge.termination_reason
     '25 periods; it settled on an orbit of period 1'
@@ -155,18 +142,21 @@ def edge_tracking(
     near, far = (positive("bisect_threshold", bisect_threshold), positive("diverge_threshold", diverge_threshold))
     if not near < far:
         raise InputError(f"bisect_threshold = {near:g}: must be less than diverge_threshold = {far:g}")
-    decide = _snaps if outcome is None else outcome
+
+    def snaps(states: _Array) -> NDArray[np.bool_]:
+        return np.asarray((_snaps if outcome is None else outcome)(flow, states, ahead), dtype=bool)
+
     low, high = state_of(flow, "u1", u1), state_of(flow, "u2", u2)
-    told = decide(flow, np.stack([low, high]), ahead)
-    if bool(told[0]) or not bool(told[1]):
+    told = snaps(np.stack([low, high]))
+    if told[0] or not told[1]:
         raise InputError(
             f"u1, u2: the outcomes within {ahead} periods are {bool(told[0])} and {bool(told[1])}; must be "
             "False and True"
         )
-    if not far <= _FARTHEST * float(np.abs(high - low).max()):
+    apart = float(np.abs(high - low).max())
+    if not far <= _FARTHEST * apart:
         raise InputError(
-            f"diverge_threshold = {far:g}: must be at most {_FARTHEST:g} times the distance of u1 and u2, "
-            f"{float(np.abs(high - low).max()):.3g}"
+            f"diverge_threshold = {far:g}: must be at most {_FARTHEST:g} times the distance of u1 and u2, {apart:.3g}"
         )
     states: list[_Array] = []
     distances, closest = [], 0.0
@@ -175,7 +165,7 @@ def edge_tracking(
     report = reported(progress, "edge tracking", "periods")
     for period in range(total):
         if begin:
-            bracket = _bisect(flow, low, high, near, ahead, decide)
+            bracket = _bisect(low, high, near, snaps)
             if bracket is None:
                 stopped = (
                     f"after {period} periods the two states have the same outcome within {ahead} periods; "
@@ -184,8 +174,7 @@ def edge_tracking(
                 break
             low, high = bracket
             closest = max(closest, float(np.abs(high - low).max()))
-        both = flow.advance(np.stack([low, high]), 1).states
-        low, high = both[0], both[1]
+        low, high = flow.advance(np.stack([low, high]), 1).states
         size = float(np.abs(high - low).max())
         if not np.isfinite(size):
             if not states:
@@ -212,10 +201,7 @@ def edge_tracking(
 
 
 def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array, _Array]:
-    """The start of a system, and the same with a velocity of the first mode that makes it snap.
-
-    *size* is that velocity over omega_1 times the well's amplitude; without one it is doubled until the beam snaps.
-    """
+    """The start of a system, and the same with a velocity of the first mode, *size* or doubled until the beam snaps."""
     quiet = flow.coordinates()[0]
     towards = -np.sign(quiet[0]) or 1.0
     sizes = [0.1 * 2.0**k for k in range(8)] if size is None else [positive("kick", size)]
@@ -247,23 +233,15 @@ def _snaps(flow: Flow, states: _Array, horizon: int) -> NDArray[np.bool_]:
 
 
 def _bisect(
-    flow: Flow,
-    low: _Array,
-    high: _Array,
-    near: float,
-    horizon: int,
-    decide: Callable[[Flow, _Array, int], NDArray[np.bool_]],
+    low: _Array, high: _Array, near: float, snaps: Callable[[_Array], NDArray[np.bool_]]
 ) -> tuple[_Array, _Array] | None:
-    """Two states on a line, *near* each other, the first quiet, the second not; None if the ends have one outcome.
-
-    It stops where rounding leaves no state between the two.
-    """
+    """Two states on a line, *near* or up to rounding, of which the second snaps; None if the ends have one outcome."""
     parts = np.linspace(0.0, 1.0, _PIECES + 1)
     for _ in range(_ROUNDS):
         size = float(np.abs(high - low).max())
         rows = low + parts[:, None] * (high - low)
         rows[-1] = high
-        told = np.asarray(decide(flow, rows, horizon), dtype=bool)
+        told = snaps(rows)
         if told[0] or not told[-1]:
             return None
         at = int(np.argmax(told))
@@ -275,10 +253,7 @@ def _bisect(
 
 
 def _settled(flow: Flow, path: _Array) -> tuple[PeriodicOrbit | None, str]:
-    """The unstable orbit that the last stretch of periods repeats that repeats at all, and what was found.
-
-    A border between basins that are interlaced has motions that leave the orbit on it and come back to it.
-    """
+    """The unstable orbit of the last stretch that repeats (motions may leave it and come back), and what was found."""
     long = int(np.clip(len(path) // 3, 4, 40))
     if len(path) < 4:
         return None, "too few periods to look for an orbit"

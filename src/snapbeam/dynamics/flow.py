@@ -6,10 +6,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -23,6 +22,8 @@ from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_st
 from snapbeam.util.validation import InputError, InputTypeError, flag, integer, nonnegative, shown
 
 _Array = NDArray[np.float64]
+_NOT_RUN: dict[str, Any] = {"tangent": None, "statistics": None, "modal": None}
+"""Fields of a state that belong to the run that led to it."""
 
 # Many starts of one system, each from its own number alone: a beam that rings faintly, a drive at any phase.
 
@@ -37,8 +38,7 @@ class InitialConditions:
         Number of initial conditions, at least 1.
     displacement : float
         Root mean square of the mid-span displacement, m, with equal mean energy in every linear mode; by default the
-        error of reading a position to a pixel of the paper's camera. A start that would press the beam into the tip is
-        mirrored about the beam at rest.
+        reading error of the paper's camera. A start that would press the beam into the tip is mirrored about rest.
     phase : bool
         Sample the phase of a sinusoidal drive of a single striker, in the half cycle in which the tip moves away.
     seed : int
@@ -72,33 +72,17 @@ class InitialConditions:
 
     def describe(self) -> dict[str, Any]:
         """Description of the initial conditions, for comparison."""
-        return {
-            "count": self.count,
-            "displacement": self.displacement,
-            "phase": self.phase,
-            "seed": self.seed,
-            "side": "away from the tip",
-        }
+        return asdict(self) | {"side": "away from the tip"}
 
     def state(
         self, system: System, number: int, state: State | None = None, location: ArrayLike | None = None
     ) -> State:
-        """Start *number* of a system, or that start added to *state* or a batch of states.
-
-        *location* is where the tip strikes, x_s/L, or that of each of several runs; the system's by default.  With several
-        locations the result is a batch, also where they do not matter.
-        """
+        """Start *number*, or that added to *state*, of a system, or of runs if *location*, x_s/L, has several."""
         found = state if state is not None else system.start_state
         if location is not None and np.ndim(location):
             shape = (*np.broadcast_shapes(np.shape(location), found.batch), system.model.modes)
-            found = dataclasses.replace(
-                found,
-                amplitude=np.broadcast_to(found.amplitude, shape),
-                velocity=np.broadcast_to(found.velocity, shape),
-                tangent=None,
-                statistics=None,
-                modal=None,
-            )
+            amplitude, velocity = (np.broadcast_to(each, shape) for each in (found.amplitude, found.velocity))
+            found = replace(found, amplitude=amplitude, velocity=velocity, **_NOT_RUN)
         if self.displacement > 0.0:
             rung = perturbed_start(system, Replicates(1, self.displacement, seed=self.seed), number, found)
             found = leaving(system, found, rung, location)
@@ -111,9 +95,7 @@ class InitialConditions:
             )
         generator = np.random.Generator(np.random.Philox(key=[self.seed, number]).jumped())
         phase = math.pi * (1.0 + generator.random())
-        return dataclasses.replace(
-            found, phase=np.array(phase), contact_time=np.array(np.nan), tangent=None, statistics=None, modal=None
-        )
+        return replace(found, phase=np.array(phase), contact_time=np.array(np.nan), **_NOT_RUN)
 
 
 def leaving(system: System, rest: State, begun: State, location: ArrayLike | None = None) -> State:
@@ -126,15 +108,8 @@ def leaving(system: System, rest: State, begun: State, location: ArrayLike | Non
     away = 1.0 if striker.side == "below" else -1.0
     reach = np.sum(system.model.shape_at(at) * change[0], axis=-1)
     turn = np.where(away * reach < 0.0, -1.0, 1.0)[..., None]
-    return dataclasses.replace(
-        begun,
-        amplitude=rest.amplitude + turn * change[0],
-        velocity=rest.velocity + turn * change[1],
-        contact_time=np.array(np.nan),
-        tangent=None,
-        statistics=None,
-        modal=None,
-    )
+    amplitude, velocity = rest.amplitude + turn * change[0], rest.velocity + turn * change[1]
+    return replace(begun, amplitude=amplitude, velocity=velocity, contact_time=np.array(np.nan), **_NOT_RUN)
 
 
 def starts_of(given: InitialConditions | int) -> InitialConditions:
@@ -147,10 +122,7 @@ def starts_of(given: InitialConditions | int) -> InitialConditions:
 
 
 def held_in_space(system: System) -> System:
-    """The system with the mid-position of its first tip fixed in space, where it is at its own start.
-
-    A tip that touches the beam wherever that is makes another system of every start.  Further tips are fixed already.
-    """
+    """The system with the mid-position of its first tip fixed in space, where it is at its own start, for any start."""
     if system.striker is None:
         return system
     offset, without_gap = (
@@ -242,11 +214,7 @@ class Flow(Protocol):
         every: bool = False,
         points: Mapping[str, _Array] | None = None,
     ) -> AdvancedStates:
-        """Take states of shape (runs, d), or where they came to, some periods on.
-
-        *tangents*, small changes that are advanced too, have the shape (runs, k, d); *points* are parameters that differ
-        between the runs.
-        """
+        """Take states (runs, d) and *tangents* (runs, k, d) some periods on; *points*: parameters of the runs."""
         ...
 
     def changed(self, values: Mapping[str, float]) -> Flow:

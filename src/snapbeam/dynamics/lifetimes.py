@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from snapbeam.dynamics.flow import InitialConditions, held_in_space, starts_of
+from snapbeam.dynamics.results import in_unit
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -43,8 +44,6 @@ CYCLES = 1000
 WELLS = ("first", "other")
 
 
-# How long something lasts that ends at random: censored maximum likelihood with intervals, and whether it fits.
-#
 # After a delay t0 a transient that forgets its past ends at a constant rate kappa = 1/tau: the share that lasts longer
 # than t is exp(-(t - t0)/tau).  The rate is estimated from d ends in a total time at risk E by kappa = d/E (Lawless,
 # Statistical Models and Methods for Lifetime Data, 2nd ed., 2003, section 4.1).
@@ -61,11 +60,10 @@ class LifetimeSettings:
     Parameters
     ----------
     delay : float, optional
-        Delay t0, cycles: earlier ends are not counted. By default the first end after which a test does not reject the
-        exponential at 1 %; at most half of the ends are left out.
+        Delay t0, cycles, before which ends are not counted: by default the first end from which a test does not refuse
+        the exponential at 1 %, at most half of them.
     settling_cycles : float
-        Cycles without a zero crossing after which snap-through counts as ended, greater than 0. A later crossing
-        censors a run: its lifetime is longer.
+        Cycles, more than 0, without a zero crossing after which snap-through has ended; a later one censors a run.
     confidence : float
         Confidence level of the intervals, in (0, 1).
 
@@ -107,8 +105,7 @@ class LifetimeFit(NamedTuple):
     lasting: NDArray[np.int64]
     """Runs that outlived the observation."""
     goodness: _Array
-    """Probability of so great a distance from the exponential if it holds (Kolmogorov and Smirnov); NaN for fewer
-    than three ends."""
+    """Probability of so great a distance from an exponential (Kolmogorov and Smirnov); NaN if fewer than three."""
 
 
 def fit_lifetime(
@@ -117,10 +114,8 @@ def fit_lifetime(
     """Fit exp(-(t - t0)/tau) to times of runs, of which some, not *ended*, are only known to be longer; NaN: no run.
 
     Without a given *delay*, t0 is the first end from which on the exponential is not refused at 1 % (at most half of
-    the ends are left out; if it is refused still, t0 is the first end and ``goodness`` says so).  Since the exponential
-    forgets, what lasts longer is, counted from t0, a sample without a delay, and the interval is that of complete data
-    where every run ended, with 2 d kappa E distributed as chi squared.  With censored times the rate has the posterior
-    of Jeffreys' prior, gamma(d + 1/2, E), whose intervals cover as they say to a percent or so.
+    the ends are left out; if it is refused still, t0 is the first end).  If every run ended, 2 d kappa E is distributed
+    as chi squared; with censored times the rate has the posterior of Jeffreys' prior, gamma(d + 1/2, E).
     """
     times, ends = np.broadcast_arrays(np.asarray(time, dtype=np.float64), np.asarray(ended, dtype=bool))
     if times.ndim == 0:
@@ -131,7 +126,7 @@ def fit_lifetime(
     batch = times.shape[:-1]
     times, ends = times.reshape(-1, times.shape[-1]), ends.reshape(-1, times.shape[-1])
     rows = [_fit_one(t[~np.isnan(t)], e[~np.isnan(t)], delay) for t, e in zip(times, ends, strict=True)]
-    begun, count, lasting, exposure, distance, used = (np.array(column) for column in zip(*rows, strict=True))
+    begun, count, lasting, exposure, goodness = (np.array(column) for column in zip(*rows, strict=True))
     shape = np.where(lasting == 0, count, count + _JEFFREYS)
     tail = 0.5 * (1.0 - share)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -139,23 +134,18 @@ def fit_lifetime(
         high = np.where(count > 0, exposure / stats.gamma.ppf(tail, np.maximum(shape, 1e-9)), np.inf)
         low = exposure / stats.gamma.ppf(1.0 - tail, np.maximum(shape, 1e-9))
     unknown = exposure <= 0.0
-    low = np.where(unknown, 0.0, low)
-    high = np.where(unknown, np.inf, high)
-    tau = np.where(unknown, np.nan, tau)
-    goodness = np.where(used >= 2, stats.kstwo.sf(distance, np.maximum(used, 1)), np.nan)
-    return LifetimeFit(
-        tau.reshape(batch), low.reshape(batch), high.reshape(batch), begun.reshape(batch),
-        count.astype(np.int64).reshape(batch), lasting.astype(np.int64).reshape(batch), goodness.reshape(batch),
-    )  # fmt: skip
+    low, high, tau = (np.where(unknown, other, each) for each, other in ((low, 0.0), (high, np.inf), (tau, np.nan)))
+    found: list[Any] = [tau, low, high, begun, count.astype(np.int64), lasting.astype(np.int64), goodness]
+    return LifetimeFit(*(each.reshape(batch) for each in found))
 
 
 def _fit_one(times: _Array, ends: NDArray[np.bool_], delay: float | None) -> tuple[float, ...]:
-    """Delay, ends, lasting, time at risk, distance from the exponential and the ends that it was measured with."""
+    """Delay, ends, lasting, time at risk, and goodness."""
     if delay is not None:
         kept = times >= delay
         return (delay, *_from(times[kept] - delay, ends[kept]))
     if not ends.any():
-        return np.nan, 0, times.size, float(times.sum()), np.nan, 0
+        return np.nan, 0, times.size, float(times.sum()), np.nan
     moments = np.sort(times[ends])
     most = moments.size - max(_FEWEST, moments.size // 2)
     found: tuple[float, ...] = ()
@@ -166,7 +156,7 @@ def _fit_one(times: _Array, ends: NDArray[np.bool_], delay: float | None) -> tup
         kept[first] = False
         tried = (begun, *_from(times[kept] - begun, ends[kept]))
         found = found or tried
-        if not tried[5] >= 2 or stats.kstwo.sf(tried[4], tried[5]) >= _REFUSED:
+        if not tried[4] < _REFUSED:
             return tried
     return found
 
@@ -183,14 +173,8 @@ def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
     lasting = int(times.size - count)
     if lasting == 0:
         marks = marks[:-1]
-    distance = np.nan
-    if marks.size >= 2:
-        steps = np.arange(marks.size + 1) / marks.size
-        distance = max(float((steps[1:] - marks).max()), float((marks - steps[:-1]).max()))
-    return count, lasting, exposure, distance, marks.size
-
-
-# What a sweep keeps of many starts at every point: when each snapped last, and where it ended.
+    goodness = float(stats.kstest(marks, "uniform", method="exact").pvalue) if marks.size >= 2 else np.nan
+    return count, lasting, exposure, goodness
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +209,10 @@ class LifetimeWork(PointWork):
         size, count = next(iter(points.values())).size, self.initial_conditions.count
         integers = np.zeros((len(_PER_START), count, size), dtype=np.int32)
         numbers = np.full((count, size), np.nan)
-        cycle = self._cycles(points)
+        cycle = np.empty(size)
+        for system, _, which, own in self.setup.groups(points):
+            columns = {name: values for name, values in own.items() if not name.startswith("initial_state.")}
+            cycle[which] = cycles_of(system, run_columns(system, columns))
         side = -1 if self.setup.system.striker is None or self.setup.system.striker.side == "below" else 1
         for s in range(count):
 
@@ -244,14 +231,6 @@ class LifetimeWork(PointWork):
             integers[4, s] = found["final_well_proven"]
             numbers[s] = found["last_zero_crossing"] / cycle
         return ResultTable(integers.reshape(-1, size).T.copy(), numbers.T.copy())
-
-    def _cycles(self, points: Columns) -> NDArray[np.float64]:
-        """Seconds of a cycle of each point."""
-        cycle = np.empty(next(iter(points.values())).size)
-        for system, _, which, own in self.setup.groups(points):
-            columns = {name: values for name, values in own.items() if not name.startswith("initial_state.")}
-            cycle[which] = cycles_of(system, run_columns(system, columns))
-        return cycle
 
     def unfinished(self, size: int, status: RunStatus = RunStatus.NOT_RUN) -> ResultTable:
         """Rows of points that were not computed."""
@@ -329,8 +308,7 @@ def lifetime_map(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> ds = sb.dynamics.lifetime_map(
     ...     system,
     ...     {"drive.velocity_amplitude": [0.1, 0.2]},
@@ -409,23 +387,18 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
     dims = (*points.dims, START)
     kept = work.columns(table)
     failed = ~np.isin(kept["status"], _REACHED)
+    last, well = np.where(failed, np.nan, kept["last_snap"]), np.where(failed, 0, kept["well"])
+    sides = {"flag_values": np.array([-1, 0, 1], dtype=np.int8), "flag_meanings": "first unknown other"}
     columns: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
-        "last_snap": (kept["last_snap"], "1", "cycle of the last crossing; NaN: never, or not known", {}),
-        "snaps": (kept["zero_crossings"], "1", "crossings of the centre", {}),
-        "late_snaps": (kept["late_crossings"], "1", "crossings in the last quarter of the run", {}),
-        "end_well": (
-            np.where(failed, 0, kept["well"]), "1", "well that the run ended about",
-            {"flag_values": np.array([-1, 0, 1], dtype=np.int8), "flag_meanings": "first unknown other"},
-        ),
-        "final_well_proven": (kept["final"] != 0, "1", "whether the run provably ends there", {}),
-        "status": (kept["status"], "1", "status of the run", code_flags(RunStatus)),
-    }  # fmt: skip
-    kinds = {"last_snap": "float64", "snaps": "int32", "late_snaps": "int32", "final_well_proven": "bool"}
-    for name, (values, unit, words, labels) in columns.items():
-        if name == "last_snap":
-            values = np.where(failed, np.nan, values)
-        array = points.arranged(np.asarray(values).astype(kinds.get(name, "int8")))
-        dataset[name] = (dims, array, {"units": unit, "long_name": words} | labels)
+        "last_snap": (last, "float64", "cycle of the last crossing; NaN: never, or not known", {}),
+        "snaps": (kept["zero_crossings"], "int32", "crossings of the centre", {}),
+        "late_snaps": (kept["late_crossings"], "int32", "crossings in the last quarter of the run", {}),
+        "end_well": (well, "int8", "well that the run ended about", sides),
+        "final_well_proven": (kept["final"] != 0, "bool", "whether the run provably ends there", {}),
+        "status": (kept["status"], "int8", "status of the run", code_flags(RunStatus)),
+    }
+    for name, (values, kind, words, labels) in columns.items():
+        dataset[name] = (dims, points.arranged(values.astype(kind)), in_unit("1", words) | labels)
     return dataset
 
 
@@ -475,7 +448,7 @@ def refit(dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: 
         "runs_failed": ((~good).sum(axis=-1), "runs that failed"),
     }
     for name, (values, text) in words.items():
-        result[name] = (dims, values, {"units": "1", "long_name": text})
+        result[name] = (dims, values, in_unit("1", text))
 
     def enter(name: str, dim: str, hits: list[NDArray[np.int64]], words: str) -> None:
         table = np.stack(hits, axis=-1)
@@ -483,13 +456,13 @@ def refit(dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: 
         for ending, values, text in zip(
             ("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True
         ):
-            result[f"{name}{ending}"] = ((*dims, dim), values, {"units": "1", "long_name": f"{text}{words}"})
+            result[f"{name}{ending}"] = ((*dims, dim), values, in_unit("1", f"{text}{words}"))
 
     ended, well = good & ~lasting, runs["end_well"].values
     result[WELL] = ((WELL,), list(WELLS), {"long_name": "well that a run ends about"})
     hits = [(ended & (well == side)).sum(axis=-1) for side in (-1, 1)]
     enter("end_probability", WELL, hits, "probability of ending in a well")
-    result[AFTER] = ((AFTER,), cycles_after, {"units": "1", "long_name": "cycles"})
+    result[AFTER] = ((AFTER,), cycles_after, in_unit("1", "cycles"))
     hits = [(good & (time > cycle)).sum(axis=-1) + (lasting & (time == cycle)).sum(axis=-1) for cycle in cycles_after]
     enter("snapping_probability", AFTER, hits, "probability of snapping on after so many cycles")
     result.attrs |= {"settling_cycles": settings.settling_cycles, "confidence": settings.confidence}

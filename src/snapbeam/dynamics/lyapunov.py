@@ -47,9 +47,8 @@ def lyapunov_spectrum(
 ) -> xr.Dataset:
     """The largest Lyapunov exponents, by tangents with a QR factorisation at every whole period.
 
-    The linearised time steps advance k small changes, orthonormalised once a period (Benettin, Galgani, Giorgilli and
-    Strelcyn, Meccanica 15 (1980) 9); the exponents are the rates of their logarithmic growth. A run that snaps and then
-    settles has exponents of the transient and of the settled motion; ``transient=0`` gives both.
+    The exponents are the rates of logarithmic growth of k small changes (Benettin, Galgani, Giorgilli and Strelcyn,
+    Meccanica 15 (1980) 9). Of a run that snaps and then settles, ``transient=0`` gives those of both parts.
 
     Parameters
     ----------
@@ -65,10 +64,8 @@ def lyapunov_spectrum(
         Starts of the runs; the system's start by default.
     axes : mapping, optional
         Parameters that may differ between runs, each with its values: a map of exponents, all from the first state.
-    integration : Integration, optional
-        Solver settings.
-    progress : callable or bool, optional
-        Report of periods, as in :func:`snapbeam.sweep`.
+    integration, progress : optional
+        Solver settings, and report of periods as in :func:`snapbeam.sweep`.
 
     Returns
     -------
@@ -76,8 +73,7 @@ def lyapunov_spectrum(
         ``exponent`` (1/s, over ``exponent_number`` and the axes or runs) with ``exponent_error``, one standard error
         from the means of blocks. ``exponent_snapping`` and ``exponent_settled`` are of the periods before and after the
         last crossing (NaN if none), with ``periods_snapping``. Without axes, ``running`` is the estimate after each
-        period and the attribute ``period`` is in s; with axes ``excitation_period`` (s) is that of each point. Exponent
-        times period is the exponent per period.
+        period and the attribute ``period`` is in s; with axes ``excitation_period`` (s) is that of each point.
 
     Raises
     ------
@@ -91,8 +87,7 @@ def lyapunov_spectrum(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> result = sb.dynamics.lyapunov_spectrum(system, 2, periods=40, transient=20)
     >>> result.exponent.dims, result.exponent.attrs["units"]
     (('run', 'exponent_number'), '1/s')
@@ -117,9 +112,9 @@ def lyapunov_spectrum(
             crossed[done] = _crossed(advanced)
         else:
             ahead = flow.advance(advanced, some, every=True, points=columns)
-            for i, found in enumerate(_derivatives(flow, advanced.beginnings(ahead), columns, some), done):
-                frame, growth[i] = _orthogonal(frame @ np.asarray(found.tangents))
-                crossed[i] = _crossed(found)
+            slopes, crossed[done : done + some] = _derivatives(flow, advanced.beginnings(ahead), columns, some)
+            for i, slope in enumerate(slopes, done):
+                frame, growth[i] = _orthogonal(frame @ slope)
             advanced = ahead
         done += some
         report(done, total)
@@ -154,23 +149,15 @@ def _runs(
 
 def _derivatives(
     flow: Flow, begun: AdvancedStates, columns: dict[str, _Array] | None, periods: int
-) -> list[AdvancedStates]:
-    """The derivative of the map over each of some periods, as tangents: row i is the change by the unit vector i."""
+) -> tuple[_Array, NDArray[np.bool_]]:
+    """Derivatives of the map over some periods, row i the change by the unit vector i, and the runs that crossed."""
     count, size = begun.states.shape
     unit = np.tile(np.eye(size), (count, 1, 1))
     points = None if columns is None else {name: np.tile(each, periods) for name, each in columns.items()}
     found = flow.advance(begun, 1, tangents=unit, points=points)
     assert found.tangents is not None
-    parts = [slice(i * count // periods, (i + 1) * count // periods) for i in range(periods)]
-    return [
-        AdvancedStates(
-            found.states[part],
-            None,
-            found.tangents[part],
-            {name: values[part] for name, values in found.statistics.items()},
-        )
-        for part in parts
-    ]
+    crossed = np.broadcast_to(_crossed(found), count)
+    return found.tangents.reshape(periods, -1, size, size), crossed.reshape(periods, -1)
 
 
 def _crossed(advanced: AdvancedStates) -> NDArray[np.bool_] | bool:
@@ -301,15 +288,14 @@ def largest_lyapunov(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> result = sb.dynamics.largest_lyapunov(system, 40, transient=20)
     >>> bool(result.exponent < 0.0)
     True
     """
     flow = flow_of(system, integration)
     total = integer("periods", periods, _BLOCKS, 10**7)
-    before, rule = settling_periods(flow, transient, fewest=1)
+    before, rule = settling_periods(flow, transient, low=1)
     size = within("distance", distance, *_DISTANCES, closed="both")
     begun, _, _ = _runs(flow, states, None)
     here = flow.advance(begun, before).states

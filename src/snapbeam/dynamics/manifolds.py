@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.periodic_orbits import PeriodicOrbit, periodic_orbit
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.results import labelled, of_flow
 from snapbeam.dynamics.shooting import OrbitNotFoundError
 from snapbeam.dynamics.stroboscope import Stroboscope
 from snapbeam.model.contact.restitution import INSTEAD_OF_RESTITUTION
@@ -86,6 +86,25 @@ def _clock(max_seconds: float | None, progress: Callable[[float], object] | bool
     return _Clock(end, sharing(progress, what), 0.0, 1.0)
 
 
+class _Resolution(NamedTuple):
+    """Length and resolution of a branch."""
+
+    length: float
+    distance: float
+    turn: float
+    points: int
+
+
+def _resolution(max_arclength: float, max_distance: float, max_turn: float, max_points: int) -> _Resolution:
+    """The arguments of :func:`invariant_manifold`, checked."""
+    return _Resolution(
+        within("max_arclength", max_arclength, 0.0, 1e4, closed="right"),
+        within("max_distance", max_distance, 1e-6, 1.0, closed="both"),
+        within("max_turn", max_turn, 1e-3, 1.0, closed="both"),
+        integer("max_points", max_points, 10, 10**6),
+    )
+
+
 class _Segment(NamedTuple):
     """The fundamental segment of one branch."""
 
@@ -103,10 +122,7 @@ class _Segment(NamedTuple):
         return self.saddle + self.factor ** ages[:, None] * self.vector
 
     def image(self, states: _Array, near: _Array) -> _Array:
-        """Images of states; under the inverse map Newton's method seeks them from *near*, and they are NaN where it fails.
-
-        The map of a flow is one to one, so that a state that is found is the inverse image.
-        """
+        """Images of states; under an inverse map without a flow by Newton's method from *near*; NaN where it fails."""
         backward = self.flow.inverse if self.inverse and isinstance(self.flow, Stroboscope) else None
         if not self.inverse or backward is not None:
             return (backward or self.flow).advance(states, self.periods).states
@@ -133,16 +149,13 @@ class _Segment(NamedTuple):
         return found
 
 
-def _grow(
-    segment: _Segment, max_arclength: float, max_distance: float, max_turn: float, max_points: int, clock: _Clock
-) -> tuple[_Array, _Array, str]:
+def _grow(segment: _Segment, fine: _Resolution, clock: _Clock) -> tuple[_Array, _Array, str]:
     """Age and state of the points of a branch, and the reason for its end."""
     ages = np.linspace(0.0, 1.0, _BEGUN)
     levels = [(ages, segment.begin(ages))]
     length = np.zeros(1)
     while True:
-        left = max_arclength - float(length[-1])
-        found = _next_level(segment, levels, left, max_distance, max_turn, max_points, clock)
+        found = _next_level(segment, levels, fine.length - float(length[-1]), fine, clock)
         if not isinstance(found, str):
             levels.append(found)
         age = np.concatenate(
@@ -150,8 +163,8 @@ def _grow(
         )
         states = np.concatenate([*(known[:-1] for _, known in levels), levels[-1][1][-1:]])
         length = np.linalg.norm(np.diff(states, axis=0), axis=1).cumsum()
-        end = 1 + int(np.searchsorted(length, max_arclength))
-        clock.tell(min(float(length[-1]) / max_arclength, 1.0))
+        end = 1 + int(np.searchsorted(length, fine.length))
+        clock.tell(min(float(length[-1]) / fine.length, 1.0))
         if isinstance(found, str) or end < len(states):
             return age[: end + 1], states[: end + 1], "max_arclength" if end < len(states) else str(found)
 
@@ -161,16 +174,10 @@ _Levels = list[tuple[_Array, _Array]]
 
 
 def _next_level(
-    segment: _Segment,
-    levels: _Levels,
-    length: float,
-    max_distance: float,
-    max_turn: float,
-    max_points: int,
-    clock: _Clock,
+    segment: _Segment, levels: _Levels, length: float, fine: _Resolution, clock: _Clock
 ) -> tuple[_Array, _Array] | str:
     """Ages and states of the image of the last level up to a length, points inserted, or the reason why there is none."""
-    room = max_points - sum(len(own) for own, _ in levels)
+    room = fine.points - sum(len(own) for own, _ in levels)
     ages, before = levels[-1]
     states = np.full_like(before, np.nan)
     while ages.size <= room:
@@ -201,7 +208,7 @@ def _next_level(
             places = np.flatnonzero(still[1:] != still[:-1])
             parts, words = np.full(places.size, _PARTS), "the inverse map does not converge"
         else:
-            places, parts = _gaps(ages, states, max_distance, max_turn)
+            places, parts = _gaps(states, fine)
             words = "the map jumps, or the curve bends too sharply for max_distance and max_turn"
             if not places.size:
                 return ages, states
@@ -228,21 +235,19 @@ def _between(wanted: _Array, ages: _Array, states: _Array) -> _Array:
     return found
 
 
-def _gaps(
-    ages: _Array, states: _Array, max_distance: float, max_turn: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _gaps(states: _Array, fine: _Resolution) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Places after which points must be inserted, and into how many parts they divide the chord there."""
     chords = np.diff(states, axis=0)
     size = np.linalg.norm(chords, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         cosine = np.sum(chords[1:] * chords[:-1], axis=1) / (size[1:] * size[:-1])
-        sharp = ~(cosine >= np.cos(max_turn)) & (size[1:] + size[:-1] > _CLOSEST * max_distance)
-    missing = size > max_distance
+        sharp = ~(cosine >= np.cos(fine.turn)) & (size[1:] + size[:-1] > _CLOSEST * fine.distance)
+    missing = size > fine.distance
     longer = size[1:] > size[:-1]
     missing[1:] |= sharp & longer
     missing[:-1] |= sharp & ~longer
     places = np.flatnonzero(missing)
-    return places, np.clip(np.ceil(size[places] / max_distance), 2, _MOST_PARTS).astype(np.intp)
+    return places, np.clip(np.ceil(size[places] / fine.distance), 2, _MOST_PARTS).astype(np.intp)
 
 
 @checked
@@ -259,8 +264,7 @@ def invariant_manifold(
 ) -> xr.Dataset:
     """One-dimensional stable or unstable manifold of a saddle orbit, in the stroboscopic section.
 
-    Neighbours are at most *max_distance* apart and the curve turns by at most *max_turn* between them; it is then off
-    the chord by about max_distance max_turn/8.
+    The curve is off the chords of its points by about max_distance max_turn/8.
 
     Parameters
     ----------
@@ -277,8 +281,8 @@ def invariant_manifold(
     max_points : int
         Maximum number of points of each branch.
     max_seconds : float, optional
-        Time limit, s, after which both branches end; none by default. A stable manifold takes longer where the motion has
-        no inverse in time (circuits, damped contacts, friction) or where *orbit* is that of a map: Newton's method.
+        Time limit, s, of both branches. A stable manifold takes longer where the motion has no inverse in time
+        (circuits, damped contacts, friction) or where *orbit* is that of a map: Newton's method.
     progress : callable, optional
         Called as ``progress(share)`` with the share of the length; True prints it with the time left.
 
@@ -293,8 +297,7 @@ def invariant_manifold(
     Raises
     ------
     InputError
-        If the manifold does not have one dimension, or is a stable one under Newton's law, whose map has no inverse
-        where the beam sticks to the tip.
+        If the manifold has more dimensions or none, or is a stable one under Newton's law, whose map has no inverse.
 
     See Also
     --------
@@ -303,8 +306,7 @@ def invariant_manifold(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> curve = sb.dynamics.invariant_manifold(saddle, max_arclength=1.0)
     >>> curve.sizes["coordinate"], bool(curve["arclength"].max() <= 1.05)
@@ -312,17 +314,11 @@ def invariant_manifold(
     """
     instance("orbit", orbit, PeriodicOrbit, "an orbit, as periodic_orbit gives")
     inverse = choice("stability", stability, ("unstable", "stable")) == "stable"
-    length = within("max_arclength", max_arclength, 0.0, 1e4, closed="right")
-    distance = within("max_distance", max_distance, 1e-6, 1.0, closed="both")
-    turn = within("max_turn", max_turn, 1e-3, 1.0, closed="both")
-    most = integer("max_points", max_points, 10, 10**6)
-    clock = _clock(max_seconds, progress, f"{stability} manifold")
-    return _manifold(orbit, inverse, length, distance, turn, most, clock)
+    fine = _resolution(max_arclength, max_distance, max_turn, max_points)
+    return _manifold(orbit, inverse, fine, _clock(max_seconds, progress, f"{stability} manifold"))
 
 
-def _manifold(
-    orbit: PeriodicOrbit, inverse: bool, length: float, distance: float, turn: float, most: int, clock: _Clock
-) -> xr.Dataset:
+def _manifold(orbit: PeriodicOrbit, inverse: bool, fine: _Resolution, clock: _Clock) -> xr.Dataset:
     """Both branches of a manifold."""
     stability = "stable" if inverse else "unstable"
     flow = orbit.flow
@@ -347,33 +343,23 @@ def _manifold(
     for number, side in enumerate((1, -1)):
         begun = side * _NEAR_SADDLE * vector / np.linalg.norm(vector)
         segment = _Segment(flow, twice * orbit.period, orbit.coordinates, begun, factor, inverse)
-        branches.append((side, *_grow(segment, length, distance, turn, most, clock.half(number))))
-    return _dataset(orbit, stability, value, branches, distance * turn / 8.0)
-
-
-def _dataset(
-    orbit: PeriodicOrbit,
-    stability: str,
-    multiplier: float,
-    branches: list[tuple[int, _Array, _Array, str]],
-    error: float,
-) -> xr.Dataset:
+        branches.append((side, *_grow(segment, fine, clock.half(number))))
     ages, states = (np.concatenate([each[k] for each in branches]) for k in (1, 2))
     sides = np.concatenate([np.full(age.size, side, np.int8) for side, age, *_ in branches])
     steps = [np.linalg.norm(np.diff(known, axis=0), axis=1) for _, _, known, _ in branches]
-    variables: dict[str, tuple[Any, Any, Any]] = {
+    variables = {
         "state": (("point", "coordinate"), states, "state"),
         "side": ("point", sides, "branch"),
         "arclength": ("point", np.concatenate([np.append(0.0, np.cumsum(own)) for own in steps]), "length of the branch"),
         "age": ("point", ages, "applications of the map since the fundamental segment"),
         "saddle": ("coordinate", orbit.coordinates, "state of the orbit"),
     }  # fmt: skip
-    attrs = fixed_parameters(orbit.flow) | {
+    attrs = {
         "title": f"{stability} manifold of a periodic orbit", "stability": stability,
-        "multiplier": multiplier, "period": orbit.period, "chord_error": error,
+        "multiplier": value, "period": orbit.period, "chord_error": fine.distance * fine.turn / 8.0,
         "termination_reason": "; ".join(reason for *_, reason in branches),
     }  # fmt: skip
-    return labelled(variables, {"coordinate": coordinate_names(orbit.flow)}, attrs)
+    return of_flow(orbit.flow, variables, attrs)
 
 
 @checked
@@ -388,8 +374,7 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Variables over ``point``, along the unstable manifold: ``state``, known to the attribute ``chord_error``, and
-        the ``arclength`` of both.
+        ``state`` over ``point``, known to the attribute ``chord_error``, ``arclength`` and ``stable_arclength``.
 
     See Also
     --------
@@ -398,8 +383,7 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> both = [
     ...     sb.dynamics.invariant_manifold(saddle, kind, max_arclength=1.0) for kind in ("unstable", "stable")
@@ -414,7 +398,7 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
         if given.attrs.get("stability") != name or given.sizes.get("coordinate") != 2:
             raise InputError(f"{name}: must be the {name} manifold of an orbit of a map of the plane")
     u, s = (_chords(each) for each in (unstable, stable))
-    found = []
+    found: list[list[float]] = []
     share = max(1, _SHARE // max(len(s[0]), 1))
     for at in range(0, len(u[0]), share):
         begin, way, length = (each[at : at + share, None] for each in u)
@@ -425,11 +409,9 @@ def homoclinic_points(unstable: xr.Dataset, stable: xr.Dataset) -> xr.Dataset:
             a = (apart[..., 0] * s[1][None, :, 1] - apart[..., 1] * s[1][None, :, 0]) / cross
             b = (apart[..., 0] * way[..., 1] - apart[..., 1] * way[..., 0]) / cross
             i, j = np.nonzero((a >= 0.0) & (a < 1.0) & (b >= 0.0) & (b < 1.0))
-        for one, other in zip(i.tolist(), j.tolist(), strict=True):
-            part = float(a[one, other])
-            along = float(length[one, 0] + part * np.linalg.norm(way[one, 0]))
-            along_stable = float(s[2][other] + b[one, other] * np.linalg.norm(s[1][other]))
-            found.append((along, along_stable, *(begin[one, 0] + part * way[one, 0])))
+        along = length[i, 0] + a[i, j] * np.hypot(*way[i, 0].T)
+        along_stable = s[2][j] + b[i, j] * np.hypot(*s[1][j].T)
+        found += np.column_stack([along, along_stable, begin[i, 0] + a[i, j, None] * way[i, 0]]).tolist()
     table = np.array(sorted(found)).reshape(-1, 4)
     return labelled(
         {
@@ -495,8 +477,7 @@ def homoclinic_tangency(
         Variables over ``value``, each value that was tried: ``crosses``. ``bracket`` over ``manifolds`` ("apart",
         "crossing"): the nearest values, NaN where none was found. The attribute ``termination_reason`` is
         ``tolerance``; otherwise the bracket is wider, with a :class:`~snapbeam.DiagnosticWarning`: ``max_seconds``, a
-        crossing at both *bounds* or at neither, a manifold that ended before *max_arclength*, or a later value without
-        the saddle.
+        crossing at both *bounds* or neither, a manifold that ends before *max_arclength*, a value without the saddle.
 
     Raises
     ------
@@ -512,8 +493,7 @@ def homoclinic_tangency(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> saddle = sb.dynamics.periodic_orbit(system, [0.0, 0.0])
     >>> found = sb.dynamics.homoclinic_tangency(
     ...     saddle, "velocity_amplitude", (0.02, 0.03), max_arclength=0.5, max_seconds=1e-3
@@ -524,9 +504,7 @@ def homoclinic_tangency(
     instance("orbit", orbit, PeriodicOrbit, "an orbit, as periodic_orbit gives")
     low, high = interval("bounds", bounds)
     width = within("tolerance", tolerance, 1e-9, 0.5, closed="both") * (high - low)
-    length = within("max_arclength", max_arclength, 0.0, 1e4, closed="right")
-    distance = within("max_distance", max_distance, 1e-6, 1.0, closed="both")
-    turn = within("max_turn", max_turn, 1e-3, 1.0, closed="both")
+    fine = _resolution(max_arclength, max_distance, max_turn, _POINTS)
     total = 2 + int(np.ceil(np.log2((high - low) / width)))
     clock = _clock(max_seconds, progress, "homoclinic tangency")
     tried: dict[float, bool] = {}
@@ -540,10 +518,7 @@ def homoclinic_tangency(
         try:
             saddle = _continued(min(saddles, key=lambda each: abs(each.flow.value(name) - value)), name, value)
             saddles.append(saddle)
-            both = [
-                _manifold(saddle, inverse, length, distance, turn, _POINTS, part.half(int(inverse)))
-                for inverse in (False, True)
-            ]
+            both = [_manifold(saddle, inverse, fine, part.half(int(inverse))) for inverse in (False, True)]
         except (InputError, OrbitNotFoundError) as error:
             if not tried:
                 raise
@@ -588,7 +563,7 @@ def homoclinic_tangency(
         {"value": ("value", np.array(values), {"long_name": name}), "manifolds": ["apart", "crossing"]},
         {
             "title": "homoclinic tangency", "parameter": name, "termination_reason": reason,
-            "max_arclength": length, "max_distance": distance, "max_turn": turn,
+            "max_arclength": fine.length, "max_distance": fine.distance, "max_turn": fine.turn,
         },
     )  # fmt: skip
 

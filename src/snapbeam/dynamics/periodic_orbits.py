@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.dynamics.approaches import Passage, between_contacts, carried, passage_of
 from snapbeam.dynamics.flow import Flow
-from snapbeam.dynamics.results import coordinate_names, fixed_parameters, labelled
+from snapbeam.dynamics.results import multiplier_rows, of_flow
 from snapbeam.dynamics.shooting import (
     Family,
     OrbitNotFoundError,
@@ -49,8 +49,7 @@ class PeriodicOrbit:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> orbit.is_stable, bool(abs(orbit.multipliers).max() < 1.0)
     (True, True)
@@ -99,12 +98,15 @@ class PeriodicOrbit:
     @cached_property
     def minimal_period(self) -> int:
         """The fewest periods of the drive after which it closes already."""
-        for divisor in range(1, self.period):
-            if self.period % divisor == 0:
-                apart = np.abs(self.points[divisor] - self.points[0]).max()
-                if apart < _SAME:
-                    return divisor
-        return self.period
+        divisors = (divisor for divisor in range(1, self.period) if self.period % divisor == 0)
+        return next((m for m in divisors if np.abs(self.points[m] - self.points[0]).max() < _SAME), self.period)
+
+    @property
+    def _centres(self) -> _Array:
+        """Displacement of the centre over b, once a period of the drive."""
+        system, space = self._stroboscope.system, self._stroboscope.space
+        amplitudes = self.points[:, : space.modes] * space.scales[: space.modes]
+        return np.asarray(amplitudes @ system.model.midspan_shape / system.scale.length)
 
     @property
     def state(self) -> State:
@@ -137,16 +139,9 @@ class PeriodicOrbit:
 
     def to_dataset(self) -> xr.Dataset:
         """The orbit once a period, and its multipliers, labelled."""
-        return labelled(
-            {
-                "state": (("period", "coordinate"), self.points, "state once a period"),
-                "multiplier_real": ("multiplier", self.multipliers.real, "Floquet multiplier"),
-                "multiplier_imag": ("multiplier", self.multipliers.imag, "its imaginary part"),
-            },
-            {"coordinate": coordinate_names(self.flow)},
-            fixed_parameters(self.flow)
-            | {"period": self.period, "residual": self.residual, "stable": int(self.is_stable)},
-        )
+        points = {"state": (("period", "coordinate"), self.points, "state once a period")}
+        attrs = {"period": self.period, "residual": self.residual, "stable": int(self.is_stable)}
+        return of_flow(self.flow, points | multiplier_rows(self.multipliers), attrs)
 
     def __repr__(self) -> str:
         kind = "stable" if self.is_stable else f"unstable ({self.unstable})"
@@ -222,8 +217,7 @@ def periodic_orbit(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> orbit = sb.dynamics.periodic_orbit(system, transient=100)
     >>> orbit.period, orbit.residual < 1e-10
     (1, True)
@@ -248,28 +242,24 @@ def periodic_orbit(
     if not all(isinstance(orbit, PeriodicOrbit) for orbit in deflate):
         raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
     most = integer("iterations", iterations, 1, 10_000)
-    orbit = None
+
+    def shot(flow: Flow, x: _Array) -> PeriodicOrbit:
+        left_out = tuple(point for orbit in deflate for point in orbit_at(orbit, flow).points)
+        return shoot(flow, x, periods, allowed, most, deflate=left_out)
+
     try:
-        orbit = shoot(flow, x, periods, allowed, most, deflate=_points(deflate, flow))
+        orbit = shot(flow, x)
+        x = orbit.coordinates
     except OrbitNotFoundError as error:
         if phase is not None or between_contacts(flow, x, periods) is None:
-            coarse = isinstance(flow, Stroboscope) and flow.integration.accuracy != "reference"
-            if not coarse:
+            if not isinstance(flow, Stroboscope) or flow.integration.accuracy == "reference":
                 raise
             raise OrbitNotFoundError(f"{error}, or use accuracy = 'reference'") from None
-    if phase is None:
-        x = x if orbit is None else orbit.coordinates
-        moved = between_contacts(flow, x, periods)
-        if moved is not None:
-            assert isinstance(flow, Stroboscope) and moved.phase is not None
-            x = carried(flow, x, moved.phase)
-            orbit = shoot(moved, x, periods, allowed, most, deflate=_points(deflate, moved))
-    assert orbit is not None
+    moved = between_contacts(flow, x, periods) if phase is None else None
+    if moved is not None:
+        assert isinstance(flow, Stroboscope) and moved.phase is not None
+        orbit = shot(moved, carried(flow, x, moved.phase))
     return orbit
-
-
-def _points(orbits: Sequence[PeriodicOrbit], flow: Flow) -> tuple[_Array, ...]:
-    return tuple(point for orbit in orbits for point in orbit_at(orbit, flow).points)
 
 
 def state_of(flow: Flow, name: str, given: State | ArrayLike | None) -> _Array:

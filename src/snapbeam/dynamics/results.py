@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.dynamics.flow import Flow
@@ -31,6 +31,25 @@ def labelled(
         for name, (dims, values, words) in variables.items()
     }
     return xr.Dataset(found, coords, attrs)
+
+
+def of_flow(
+    flow: Flow,
+    variables: Mapping[str, tuple[Any, Any, Any]],
+    attrs: dict[str, Any],
+    coords: dict[str, Any] | None = None,
+    varied: Iterable[str] = (),
+) -> xr.Dataset:
+    """A dataset over the coordinates of a flow, with its parameters except those that are *varied*."""
+    coords = {"coordinate": coordinate_names(flow)} | (coords or {})
+    return labelled(variables, coords, fixed_parameters(flow, *varied) | attrs)
+
+
+def multiplier_rows(values: Any, *dims: str) -> dict[str, tuple[Any, Any, Any]]:
+    """Variables of Floquet multipliers, over some dimensions."""
+    over = (*dims, "multiplier")
+    parts = {"real": (values.real, "Floquet multiplier"), "imag": (values.imag, "its imaginary part")}
+    return {f"multiplier_{part}": (over, each, words) for part, (each, words) in parts.items()}
 
 
 def reported(

@@ -20,13 +20,7 @@ if TYPE_CHECKING:
 
 _Array = NDArray[np.float64]
 SECTIONS = ("stroboscopic", "impact")
-_LEVELS = (
-    "displacement_at_striker",
-    "midspan_displacement",
-    "velocity_at_striker",
-    "midspan_velocity",
-    "penetration_normalised",
-)
+_STATES = ("displacement_at_striker", "midspan_displacement", "velocity_at_striker", "midspan_velocity")
 _DIRECTIONS = ("up", "down", "both")
 _SAMPLES = 128
 """A period of the drive or, where that is shorter, of the first mode, to find passages in."""
@@ -78,8 +72,7 @@ def poincare_section(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> section = sb.dynamics.poincare_section(system, "impact", 20, transient=20)
     >>> sorted(section.data_vars)[:3]
     ['displacement_at_striker', 'drive_phase', 'midspan_displacement']
@@ -107,11 +100,20 @@ def poincare_section(
     else:
         times, off, words = _passages(held, how, level, end, flow.period)
         reason += f"; {words}"
-    result = _dataset(held, how, np.minimum(times, end), flow, section)
-    result.attrs |= {"transient": before, "termination_reason": reason}
-    if off is not None:
-        result.attrs["level_error"] = off
-    return result
+    if not times.size:
+        raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
+    times = np.minimum(times, end)
+    data = simulate(held, how, sample_times=times).dataset
+    kept = data[[*_STATES[::2], *_STATES[1::2], "modal_amplitude", "modal_velocity"]]
+    kept = kept.rename(time="point").reset_coords(drop=True)
+    phases = (flow.clock.striker_phase + 2.0 * np.pi * times / flow.clock.cycle) % (2.0 * np.pi)
+    attrs = {"title": "Poincare section", "section": str(section), "transient": before, "termination_reason": reason}
+    return labelled(
+        {str(name): (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars}
+        | {"drive_phase": ("point", phases, in_unit("rad", "phase of the drive"))},
+        {"time": ("point", times, in_unit("s", "time since the transient"))},
+        data.attrs | attrs | ({} if off is None else {"level_error": off}),
+    )
 
 
 def _level(section: Any) -> tuple[str, float, str] | None:
@@ -124,17 +126,14 @@ def _level(section: Any) -> tuple[str, float, str] | None:
         raise InputTypeError(
             f"section = {shown(section)}: must be one of {', '.join(SECTIONS)}, or (variable, level, direction)"
         ) from None
-    choice("section[0]", name, _LEVELS)
+    choice("section[0]", name, (*_STATES, "penetration_normalised"))
     return name, finite("section[1]", value), choice("section[2]", direction, _DIRECTIONS)
 
 
 def _passages(
     system: System, how: Integration, level: tuple[str, float, str], end: float, period: float
 ) -> tuple[_Array, float, str]:
-    """Instants at which a variable passes its level, the maximum distance from it there, and why the search stopped.
-
-    They are found between samples, then on the run itself.
-    """
+    """Instants at which a run passes a level, the maximum distance from it there, and why the search stopped."""
     name, value, direction = level
     spacing = min(period, 1.0 / system.model.reference_frequency) / _SAMPLES
     grid = np.linspace(0.0, end, int(np.ceil(end / spacing)) + 1)
@@ -148,25 +147,8 @@ def _passages(
     def off(times: _Array) -> _Array:
         """Distances from the level at instants in any order."""
         instants, back = np.unique(times, return_inverse=True)
-        found: _Array = (simulate(system, how, sample_times=instants).dataset[name].values - value)[back]
-        return found
+        return np.asarray((simulate(system, how, sample_times=instants).dataset[name].values - value)[back])
 
     found = find_root(off, (grid[at], grid[at + 1]), maxiter=_ROUNDS)
     words = f"{int(found.nit.max())} rounds of Chandrupatla's rule" + ("" if found.success.all() else ", the maximum")
     return np.unique(found.x), float(np.abs(found.f_x).max()), words
-
-
-def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope, section: Any) -> xr.Dataset:
-    if not times.size:
-        raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
-    data = simulate(system, how, sample_times=times).dataset
-    kept = data[["displacement_at_striker", "velocity_at_striker", "midspan_displacement", "midspan_velocity", "modal_amplitude",
-                 "modal_velocity"]]  # fmt: skip
-    kept = kept.rename(time="point").reset_coords(drop=True)
-    phase = (flow.clock.striker_phase + 2.0 * np.pi * times / flow.clock.cycle) % (2.0 * np.pi)
-    return labelled(
-        {str(name): (kept[name].dims, kept[name].values, kept[name].attrs) for name in kept.data_vars}
-        | {"drive_phase": ("point", phase, in_unit("rad", "phase of the drive"))},
-        {"time": ("point", times, in_unit("s", "time since the transient"))},
-        data.attrs | {"title": "Poincare section", "section": str(section)},
-    )

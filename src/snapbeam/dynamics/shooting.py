@@ -36,8 +36,7 @@ class OrbitNotFoundError(RuntimeError):
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> try:
     ...     sb.dynamics.periodic_orbit(system, [5.0, 3.0], iterations=2)
     ... except sb.dynamics.OrbitNotFoundError as error:
@@ -87,8 +86,7 @@ class Family:
             np.stack([self.advance(x[None], periods, each).states[0] for each in values + sign * np.diag(step)])
             for sign in (1.0, -1.0)
         )
-        change: _Array = (above - below).T / (2.0 * step)
-        return change
+        return np.asarray((above - below).T / (2.0 * step))
 
 
 class Return(NamedTuple):
@@ -135,10 +133,9 @@ def newton(
     first: _Array | None = None,
     deflate: tuple[_Array, ...] = (),
 ) -> Shot:
-    """A root of *residual* by Newton's method, its derivative kept by Broyden's updates as long as steps gain by it.
+    """A root by Newton's method, its derivative (at first *first*) kept by Broyden's updates as long as steps gain.
 
-    *residual* gives r(x), *derivative* r(x) and its derivative, *first* is a derivative to begin with. It stays away from
-    the roots *deflate* (Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026).
+    It avoids the roots *deflate* (Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026).
     """
     fresh = first is None
     if first is None:
@@ -149,7 +146,7 @@ def newton(
     for count in range(iterations + 1):
         if not np.isfinite(size):
             raise OrbitNotFoundError("a run failed on the way; begin nearer to the orbit")
-        if size <= tolerance and not (deflate and _near(x, deflate)):
+        if size <= tolerance and not any(float(np.abs(x - other).max()) < 1e-6 for other in deflate):
             return Shot(x, size, count)
         if count == iterations:
             break
@@ -201,10 +198,6 @@ def orbit_tolerance(value: float) -> float:
     return within("tolerance", value, 0.0, LARGEST_TOLERANCE, closed="right")
 
 
-def _near(x: _Array, known: tuple[_Array, ...]) -> bool:
-    return any(float(np.abs(x - other).max()) < 1e-6 for other in known)
-
-
 def _deflated(x: _Array, step: _Array, known: tuple[_Array, ...]) -> _Array:
     """Newton's step of the residual times a product of (1 + 1/|x - root|^2)."""
     along = 0.0
@@ -214,6 +207,4 @@ def _deflated(x: _Array, step: _Array, known: tuple[_Array, ...]) -> _Array:
         if square == 0.0:
             raise OrbitNotFoundError("the guess is an orbit that is to be left out; begin elsewhere")
         along += -2.0 * float(away @ step) / (square * (square + 1.0))
-    if along == 1.0:
-        return step
-    return step / (1.0 - along)
+    return step if along == 1.0 else step / (1.0 - along)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -39,11 +39,7 @@ _LONGEST = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Stroboscope:
-    """The map of a system over the common period of its motions, the tips' mid-positions fixed in space.
-
-    It takes and gives :class:`~snapbeam.dynamics.coordinates.Coordinates`, at a phase of the primary excitation, rad,
-    by default the one at which a run of the system begins.
-    """
+    """The map of a system over the common period of its motions, at a phase, rad, its tips held at mid-positions."""
 
     system: System
     integration: Integration = field(default_factory=Integration)
@@ -90,11 +86,6 @@ class Stroboscope:
     def jumps(self) -> bool:
         """True if the derivatives of the map may jump, by a contact force that does, depends on the velocity or has a memory."""
         return any(each.law.is_dissipative for each in self.system.contacts)
-
-    @property
-    def refined(self) -> Stroboscope:
-        """The flow at accuracy level "reference"."""
-        return replace(self, integration=self.integration.replace(accuracy="reference", step=None))
 
     @cached_property
     def inverse(self) -> Stroboscope | None:
@@ -189,7 +180,10 @@ class Stroboscope:
         return found[0] if len(found) == 1 else joined(found)
 
     def _begun(self, states: ArrayLike) -> State:
-        rows = _rows(states)
+        try:
+            rows = np.atleast_2d(np.asarray(states, dtype=np.float64))
+        except (TypeError, ValueError, OverflowError):
+            raise InputTypeError(f"states = {shown(states)}: must be an array of numbers, a row a run") from None
         if rows.ndim != 2 or rows.shape[1] != self.dimension:
             raise InputError(f"states of shape {rows.shape}: must have the shape (runs, {self.dimension})")
         # a failed state stands still and stays lost
@@ -213,26 +207,21 @@ class Stroboscope:
         return found
 
     def slope(self, x: _Array, periods: int, values: Mapping[str, float], name: str, step: float) -> _Array:
-        """Derivative by one of the parameters of the runs of where the map brings one state, shape (d,).
-
-        The numbers of a run are differentiated by a difference over twice the *step*, the run itself exactly.  Only where the parameter
-        changes how many pieces a motion has, or in which order it jumps, differences between runs are taken.
-        """
+        """Derivative of the map of one state by a parameter, shape (d,): of a run's numbers a difference, or exact."""
         begun, moved = self._begun(x[None]), np.zeros((1, 1, self.dimension))
         given = {key: np.array([value]) for key, value in values.items()}
         points = [given, *(given | {name: np.array([values[name] + sign * step])} for sign in (1.0, -1.0))]
         for _ in range(periods):
             here, above, below = (self._ensemble(begun, 1, each) for each in points)
+            # a motion with other pieces, or jumps in another order: a difference between runs
             if not (native.unchanged(above, below) and native.differentiable(above, below)):
                 ends = [self.advance(x[None], periods, points=each) for each in points[1:]]
-                change: _Array = (ends[0].states - ends[1].states)[0] / (2.0 * step)
-                return change
+                return np.asarray((ends[0].states - ends[1].states)[0] / (2.0 * step))
             moved = self._moved(here, moved, np.zeros(1, bool), (above, below, 2.0 * step))
             begun = self._advance_part(begun, 1, False, given, None).hidden
             # the gap says where the tip is, whatever the parameter moves
             begun = replace(begun, striker_position=np.array(np.nan), modal=None)
-        found: _Array = moved[0, 0]
-        return found
+        return np.asarray(moved[0, 0])
 
     def _advance_part(
         self, begun: State, periods: int, every: bool, points: Mapping[str, _Array] | None, tangents: _Array | None
@@ -296,31 +285,17 @@ def flow_of(system: System | Flow, integration: Integration | None = None, accur
     return system
 
 
-def jumps(flow: Flow) -> bool:
-    """Return whether the derivatives of a map may jump between orbits with other numbers of impacts."""
-    return isinstance(flow, Stroboscope) and flow.jumps
-
-
 def settling_periods(
-    flow: Flow,
-    given: int | None = None,
-    rates: ArrayLike = (),
-    least: int = 200,
-    name: str = "transient",
-    fewest: int = 0,
+    flow: Flow, given: Any = None, rates: Iterable[float] = (), least: int = 200, name: str = "transient", low: int = 0
 ) -> tuple[int, str]:
-    """The number of periods after which a motion of *flow* counts as settled, if none is *given*, and the rule that gave it.
-
-    It is 16 time constants of the slowest mode, 1/min(zeta_j omega_j), or of further decay *rates*, 1/s (per period of
-    a map, which has no modes), but at least *least* and at most 20,000 periods.
-    """
+    """Periods after which a motion is settled, and the rule: *given*, or by the slowest mode or decay *rates*, 1/s."""
     if given is not None:
-        return integer(name, given, fewest, 10**7), "as given"
-    known = [float(rate) for rate in np.ravel(np.asarray(rates, dtype=np.float64))]
+        return integer(name, given, low, 10**7), "as given"
+    known = list(rates)
     if isinstance(flow, Stroboscope):
         model = flow.system.struck_model
-        rates = model.damping_ratio * model.omega if model.damping is None else -flow.system.poles().real
-        known.append(float(np.min(rates)))
+        decay = model.damping_ratio * model.omega if model.damping is None else -flow.system.poles().real
+        known.append(float(np.min(decay)))
     if not known:
         return least, f"{least} periods"
     slowest = min(known)
@@ -331,11 +306,3 @@ def settling_periods(
     if wanted < least:
         return least, f"the minimum of {least} periods; {rule} are {wanted:.3g}"
     return math.ceil(wanted), rule
-
-
-def _rows(states: ArrayLike) -> _Array:
-    """States as rows of numbers, NaN in those that were lost."""
-    try:
-        return np.atleast_2d(np.asarray(states, dtype=np.float64))
-    except (TypeError, ValueError, OverflowError):
-        raise InputTypeError(f"states = {shown(states)}: must be an array of numbers, a row a run") from None

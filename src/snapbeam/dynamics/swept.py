@@ -74,8 +74,7 @@ def bifurcation_diagram(
 ) -> xr.Dataset:
     """Compute a bifurcation diagram: states once a period over one parameter that is swept up and down.
 
-    Each sweep continues from the last state: sweeps differ where attractors coexist. Random initial conditions show
-    further attractors.
+    Each sweep continues from the last state: sweeps differ where attractors coexist; random starts show further ones.
 
     Parameters
     ----------
@@ -92,8 +91,7 @@ def bifurcation_diagram(
     initial_conditions : InitialConditions or int
         Further starts at every value; none by default.
     periods : pair of int
-        Periods to discard and to record at each value. None discards 16 time constants of the slowest mode, in [200,
-        20,000].
+        Periods to discard (None: 16 time constants of the slowest mode, in [200, 20,000]) and to record, at each value.
     grazing : bool
         Sample every approach in four of the recorded periods densely: ``clearance``, ``min_penetration``.
     progress : callable or bool, optional
@@ -104,8 +102,7 @@ def bifurcation_diagram(
     xarray.Dataset
         Variables over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of
         the centre and of the contact point, at the phase of the start. Over ``sweep`` and the parameter:
-        ``impacts_per_period``, ``crossings_per_period``, ``minimal_period`` (0: none seen) and ``failed``. Failed runs
-        and those after them in their sweep are NaN.
+        ``impacts_per_period``, ``crossings_per_period``, ``minimal_period`` (0: none seen), ``failed``; NaN follow.
 
     See Also
     --------
@@ -114,8 +111,7 @@ def bifurcation_diagram(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> diagram = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", [0.02, 0.03, 0.04])
     >>> dict(diagram.sizes)
     {'sweep': 2, 'velocity_amplitude': 3, 'period': 32}
@@ -128,9 +124,8 @@ def bifurcation_diagram(
         raise InputTypeError(f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep") from None
     integer("periods[1]", keep, 2, 10**6)
     flag("grazing", grazing)
-    many = None
-    if isinstance(initial_conditions, InitialConditions) or initial_conditions:
-        many = starts_of(initial_conditions)
+    asked = isinstance(initial_conditions, InitialConditions) or initial_conditions
+    many = starts_of(initial_conditions) if asked else None
     if not kinds and many is None:
         raise InputError("sweeps = (): must be at least one, or initial_conditions at least 1")
     flow = Stroboscope(system, Integration() if integration is None else integration)
@@ -151,17 +146,13 @@ def bifurcation_diagram(
         location = swept.values if swept.name == "contact.location" else None
         state = many.state(flow.system, number, flow.system.start_state, location)
         begun = np.broadcast_to(flow.coordinates(state), (count, flow.dimension))
-        rows[len(kinds) + number], counts[len(kinds) + number] = _recorded(
-            flow, swept, begun, np.arange(count), leave, keep
-        )
+        place = len(kinds) + number
+        rows[place], counts[place] = _recorded(flow, swept, begun, np.arange(count), leave, keep)
         report(count * (bool(kinds) + number + 1), total)
     labels = [*kinds, *(f"start {number}" for number in range(further))]
     dataset = _diagram(flow, swept, labels, rows, counts, grazing)
-    dataset.attrs |= {
-        "periods_left_out": leave,
-        "termination_reason": f"{leave} periods left out ({rule}) and {keep} kept at each value",
-    }
-    return dataset
+    reason = f"{leave} periods left out ({rule}) and {keep} kept at each value"
+    return dataset.assign_attrs(periods_left_out=leave, termination_reason=reason)
 
 
 def _recorded(
@@ -237,8 +228,7 @@ def hysteresis(
 
     Each value is one run of :func:`snapbeam.simulate` from the last state before it: modes, phase of the excitation,
     strikers and circuit. An excitation that does not repeat (a record, a chirp, noise) restarts at each value, and only
-    the state of the structure is carried on. Statistics named ``last_quarter`` leave out a transient that is over after
-    three quarters of a run.
+    the state of the structure is carried on. Statistics named ``last_quarter`` leave out a transient.
 
     Parameters
     ----------
@@ -258,8 +248,7 @@ def hysteresis(
     Returns
     -------
     xarray.Dataset
-        The :data:`snapbeam.STATISTICS` over ``sweep`` and the parameter. The runs after a failed one have the status
-        NOT_RUN, the class UNKNOWN, and NaN.
+        The :data:`snapbeam.STATISTICS` over ``sweep`` and the parameter; after a failed run NOT_RUN, UNKNOWN and NaN.
 
     Raises
     ------
@@ -274,8 +263,7 @@ def hysteresis(
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
-    >>> system = paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
+    >>> system = sb.paper.struck_beam(frequency_ratio=1.6, velocity_amplitude=0.03, damping_ratio=0.05)
     >>> found = sb.dynamics.hysteresis(system, "velocity_amplitude", [0.02, 0.03], sb.Integration(cycles=20))
     >>> found["peak_force"].dims
     ('sweep', 'velocity_amplitude')
@@ -293,7 +281,8 @@ def hysteresis(
     told = reported(progress, "hysteresis", "values")
     rows = rows_for(len(system.contacts))
     tables: dict[str, Any] = {
-        key: np.full((len(kinds), count), _missing(key, each.dtype), each.dtype) for key, each in rows.items()
+        key: np.full((len(kinds), count), _MISSING.get(key, np.nan if each.dtype == "float64" else 0), each.dtype)
+        for key, each in rows.items()
     }
     state = system.initial_state
     places = [(i, k) for i, kind in enumerate(kinds) for k in swept.order(kind)]
@@ -339,10 +328,5 @@ _OF_ONE_RUN = {"title", "response_class", "status", "system_hash", "parameter_ha
 """Attributes of a run that do not hold for all runs."""
 
 
-def _missing(name: str, kind: str) -> Any:
-    """Value of a statistic of a run that was not computed."""
-    if name == "response_class":
-        return int(ResponseClass.UNKNOWN)
-    if name == "status":
-        return int(RunStatus.NOT_RUN)
-    return np.nan if kind == "float64" else 0
+_MISSING = {"response_class": int(ResponseClass.UNKNOWN), "status": int(RunStatus.NOT_RUN)}
+"""Values of statistics of a run that was not computed."""
