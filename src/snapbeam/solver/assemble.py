@@ -5,13 +5,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.contact.base import ContactLaw
-from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.early_termination import decidable_energy, passed_heights
 from snapbeam.model.integration import Integration
@@ -20,56 +19,15 @@ from snapbeam.model.quantity import numbered, quantities, section_of, split_name
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.solver.channels import channels_of
-from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable, Records
-from snapbeam.solver.excitation import displacements, motion_of, side_of, started
+from snapbeam.solver.ensemble import FAR_AWAY, CircuitCoupling, Ensemble, Records, run_dtype
+from snapbeam.solver.excitation import displacements, motion_of, own_columns, side_of, started
 from snapbeam.solver.restrictions import check_integrable
-from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
+from snapbeam.solver.step_size import Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.validation import InputError, shown
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
-
-
-# The strikers beside the first one, for every run of an ensemble.
-
-
-def others_of(
-    system: System, structure: Structure, columns: Mapping[str, _Array], runs: int, since: _Array
-) -> FurtherContactTable | None:
-    """Rows, laws and numbers of the further strikers of each run; None if there is at most one striker.
-
-    A striker stands where its tip touches the beam at rest in the first well, or its gap away from that.  *since* holds
-    the contact time of every striker, shape (runs or 1, strikers).
-    """
-    further = system.contacts[1:]
-    if not further:
-        return None
-    count = len(further)
-    offset, at_rest = np.zeros((2, runs, count))
-    places, signs = np.zeros((runs, count), dtype=np.int64), []
-    rows: list[_Array] = []
-    for j, each in enumerate(further):
-        number, striker = j + 2, each.striker
-        assert system.striker is not None
-        sign = 1.0 if striker.side == system.striker.side else -1.0
-        signs.append(sign)
-        section, moving = section_of("contact", number), section_of("drive", number)
-        location = columns[f"{section}.location"]
-        different, which = np.unique(location, return_inverse=True)
-        shapes = np.array([structure.model.shape_at(float(x)) for x in different])
-        places[:, j] = len(rows) + which
-        own_rows = np.array([structure.row(shape, j + 1, sign) for shape in shapes])
-        rows += list(own_rows)
-        at_rest[:, j] = sign * structure.sign * structure.rests(shapes)[which]
-        begun = displacements(striker.drive, _own(columns, moving, runs), system.scale, np.zeros(runs))
-        gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
-        rest = _reach_at_rest(system, structure, which, own_rows)
-        offset[:, j] = rest + np.where(np.isnan(gap), -begun, -gap)
-    return FurtherContactTable(
-        tuple(type(each.law) for each in further), tuple(signs), offset, at_rest,
-        np.broadcast_to(since[:, 1:], (runs, count)), places, np.array(rows),
-    )  # fmt: skip
 
 
 # What moves in every run of an ensemble.
@@ -87,7 +45,7 @@ def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
         return 2.0 * math.pi / (np.ones(runs) * system.scale.omega)
     section, drive = leads
     with np.errstate(all="ignore"):
-        periods = drive.cycle(_own(columns, section, runs), system.scale)
+        periods = drive.cycle(own_columns(columns, section, runs), system.scale)
     bad = np.flatnonzero(~((periods >= _SHORTEST_PERIOD) & np.isfinite(periods)))
     if bad.size:
         raise InputError(
@@ -105,13 +63,6 @@ def phases_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arra
     return columns.get(name, np.zeros(runs))
 
 
-def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
-    """Parameters of a section, of which there may be none."""
-    names = {name: split_name(name) for name in columns}
-    own = {field: columns[name] for name, (of, field) in names.items() if of == section}
-    return own or {"": np.zeros(runs)}
-
-
 def clock_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
     """Rate of the phase of each run, rad/s: of its one motion, or of the time since they began that several motions share."""
     if not system.moving:
@@ -119,7 +70,7 @@ def clock_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array
     if len(system.moving) > 1:
         return 2.0 * math.pi / (HORIZON * cycles_of(system, columns))
     section, drive = system.moving[0]
-    return drive.numbers(_own(columns, section, runs), system.scale)["omega"]
+    return drive.numbers(own_columns(columns, section, runs), system.scale)["omega"]
 
 
 def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
@@ -136,7 +87,7 @@ def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
         return np.full(runs, np.inf)
     if system.striker is None:
         return np.full(runs, -np.inf)
-    drive, own = system.striker.drive, _own(columns, "drive", runs)
+    drive, own = system.striker.drive, own_columns(columns, "drive", runs)
     if system.striker.side == "above" and drive.recorded:  # made in space; other motions are positive as it pushes
         return drive.mirrored_bounds(own, system.scale)
     return drive.bounds(own, system.scale)[0]
@@ -152,7 +103,7 @@ def _begun_at(system: System, columns: Mapping[str, _Array], clock: _Array, phas
         motions.append(("base_excitation", base.motion, -side if base.direction == "up" else side))
     found = np.zeros(runs)
     for section, drive, share in motions:
-        own, times = started(system, _own(columns, section, runs), phase, clock)
+        own, times = started(system, own_columns(columns, section, runs), phase, clock)
         found = found + share * displacements(drive, own, system.scale, times)
     return found
 
@@ -162,7 +113,7 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
     found = np.zeros(runs)
     for section, drive in system.moving:
         if _is_around(section):
-            numbers = drive.numbers(_own(columns, section, runs), system.scale)
+            numbers = drive.numbers(own_columns(columns, section, runs), system.scale)
             found = np.maximum(found, numbers["fastest" if "fastest" in numbers else "omega"])
     return found
 
@@ -276,36 +227,36 @@ def make_ensemble(
     _require_clock(system, state)
     _require_valid(system, state)
     clock = clock_of(system, columns, runs)
-    table = np.zeros(runs, dtype=RUN)
-    places = _places(structure, table, columns.get("contact.location", np.full(runs, 0.5)))
-    since = state.flat.contact_times(max(1, len(system.contacts)))
+    table = np.zeros(runs, dtype=run_dtype(len(system.contacts)))
+    table["rest_center"] = structure.center_rest
+    table["contact_time"] = state.flat.contact_times(max(1, len(system.contacts)))
     units = np.array([each.unit for each in system.harvesters] or [1.0])
-    starts = _starts(structure, table, state, since, units)
+    starts = _starts(structure, table, state, units)
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
-    table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, clock)
-    highest = table["rest_contact"] + table["offset"] + highest_of(system, columns, runs)
-    time = clocked(table, system, integration, cycles_of(system, columns), plans, periods)
+    rows = _place(system, structure, state, columns, table, starts, clock)
+    location = columns.get("contact.location", np.full(runs, 0.5))
+    highest = table["rest_contact"][:, 0] + table["offset"][:, 0] + highest_of(system, columns, runs)
+    cycles = clocked(table, system, integration, cycles_of(system, columns), plans, periods)
     _require_record(system, table, clock)
-    _decisions(table, system, structure, integration, time, places.location, highest)
+    _decisions(table, system, structure, integration, cycles, location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
-    law: type[ContactLaw] = HertzContact if system.contact_law is None else type(system.contact_law)
     ensemble = Ensemble(
         structure=structure,
         scale=system.scale,
         order=plans[0].order,
-        law=law,
         runs=table,
         clock=clock,
         comes_round=len(system.moving) < 2 and all(drive.is_periodic for _, drive in system.moving),
-        location=places.location,
+        location=location,
         highest=highest,
-        contact_rows=places.rows,
+        contact_rows=rows,
         starts=starts,
         max_steps=most_steps(integration, system.model.modes),
         high_omega=integration.high_frequency_ratio * system.scale.omega,
-        cycles=time.cycles,
+        cycles=cycles,
         circuits=_circuits(system, columns, runs),
-        others=others_of(system, structure, columns, runs, since),
+        contacts=len(system.contacts),
+        impulsive=any(each.law.impulsive for each in system.contacts),
     )
     if integration.engine == "python":
         return dataclasses.replace(ensemble, systems=_systems(system, points or {}, runs))
@@ -544,26 +495,12 @@ def _side(system: System, state: State, goes_on: bool) -> str:
     return "above" if float(first.amplitude @ system.model.midspan_shape) > 0.0 else "below"
 
 
-class _Places(NamedTuple):
-    location: _Array
-    rows: _Array
-
-
-def _places(structure: Structure, table: Records, location: _Array) -> _Places:
-    different, which = np.unique(location, return_inverse=True)
-    shapes = np.array([structure.model.shape_at(float(x)) for x in different])
-    table["contact_row"] = which
-    table["rest_contact"] = structure.sign * structure.rests(shapes)[which]
-    table["rest_center"] = structure.center_rest
-    return _Places(location, np.array([structure.row(shape) for shape in shapes]))
-
-
-def _starts(structure: Structure, table: Records, state: State, since: _Array, units: _Array) -> _Array:
-    """q and p of every start; which start, well and contact time *since* each run has is entered in the table."""
+def _starts(structure: Structure, table: Records, state: State, units: _Array) -> _Array:
+    """q and p of every start; which start and well each run has is entered in the table."""
     flat, modal = state.flat, state.flat.modal
     count = flat.batch[0]
     table["start_row"] = np.arange(table.size) if count > 1 else 0
-    table["well_sign"], table["contact_time"] = 1.0, since[:, 0]
+    table["well_sign"] = 1.0
     if modal is not None and modal.structure == structure.hash:
         table["well_sign"] = modal.well_sign
         return np.stack((modal.q, modal.p), axis=1)
@@ -577,35 +514,55 @@ def modal_of(structure: Structure, flat: State, units: _Array) -> _Array:
     return np.array([structure.to_modal(*each) for each in zip(*parts, strict=True)])
 
 
-def _offsets(
+def _place(
     system: System,
     structure: Structure,
     state: State,
     columns: Mapping[str, _Array],
     table: Records,
-    rows: _Array,
     starts: _Array,
     clock: _Array,
 ) -> _Array:
-    """Penetration of the tip at mid-stroke into the beam at rest in the first well."""
-    if system.striker is None:
-        return np.full(table.size, FAR_AWAY)
-    flat, modal = state.flat, state.flat.modal
-    position = structure.sign * flat.striker_position - table["rest_contact"]
-    if modal is not None and modal.structure == structure.hash:
-        # to the bit, unless the striker now strikes at another place
-        same = structure.sign * (table["rest_contact"] + modal.offset) == flat.striker_position
-        return np.where(same, modal.offset, position)
-    pairs = {(int(run["contact_row"]), int(run["start_row"])) for run in table}
-    reach = {(workspace, at): float(rows[workspace] @ starts[at, 0]) for workspace, at in pairs}
-    touching = np.array([reach[int(run["contact_row"]), int(run["start_row"])] for run in table])
-    begun = _begun_at(system, columns, clock, table["phase"])
-    offset = touching - begun
-    if "contact.gap" in columns:
+    """Enter the row of every contact, its rest and its offset: penetration of the tip at mid-stroke into the beam at rest.
+
+    A tip touches the beam or stands its gap away from the beam at rest.  The first one touches the beam as the run begins
+    unless the state says where it is, the others touch it at rest.  Returns the rows of all contacts; of a beam alone that of mid-span.
+    """  # fmt: skip
+    runs, rows = table.size, list[_Array]()
+    table["offset"] = FAR_AWAY
+    for j in range(max(1, len(system.contacts))):
+        section, sign = section_of("contact", j + 1), 1.0
+        if j and system.contacts[j].striker.side != system.contacts[0].striker.side:
+            sign = -1.0
+        different, which = np.unique(columns.get(f"{section}.location", np.full(runs, 0.5)), return_inverse=True)
+        shapes = np.array([structure.model.shape_at(float(x)) for x in different])
+        own = np.array([structure.row(shape, j, sign) for shape in shapes])
+        table["contact_row"][:, j] = len(rows) + which
+        table["rest_contact"][:, j] = sign * structure.sign * structure.rests(shapes)[which]
+        rows += list(own)
+        if not system.contacts:
+            continue
         # the gap is that to the beam at rest, which a local force moves out of the well of the structure
-        rest = _reach_at_rest(system, structure, table["contact_row"], rows)
-        offset = np.where(np.isnan(columns["contact.gap"]), offset, rest - columns["contact.gap"])
-    return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
+        resting = touching = _reach_at_rest(system, structure, which, own)
+        if j:
+            drive = system.contacts[j].striker.drive
+            parameters = own_columns(columns, section_of("drive", j + 1), runs)
+            begun = displacements(drive, parameters, system.scale, np.zeros(runs))
+        else:
+            pairs = zip(which.tolist(), table["start_row"].tolist(), strict=True)
+            touching = np.array([float(own[place] @ starts[at, 0]) for place, at in pairs])
+            begun = _begun_at(system, columns, clock, table["phase"])
+        gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
+        table["offset"][:, j] = np.where(np.isnan(gap), touching - begun, resting - gap)
+    given, modal = state.flat.striker_position, state.flat.modal
+    if system.contacts and not np.isnan(given).all():
+        rest, offset = table["rest_contact"][:, 0], table["offset"][:, 0]
+        position = structure.sign * given - rest
+        if modal is not None and modal.structure == structure.hash:
+            # to the bit, unless the striker now strikes at another place
+            position = np.where(structure.sign * (rest + modal.offset) == given, modal.offset, position)
+        table["offset"][:, 0] = np.where(np.isnan(given), offset, position)
+    return np.array(rows)
 
 
 def _reach_at_rest(system: System, structure: Structure, which: _Integers, rows: _Array) -> _Array | float:
@@ -641,7 +598,7 @@ def _decisions(
     system: System,
     structure: Structure,
     integration: Integration,
-    time: Clocked,
+    cycles: float,
     location: _Array,
     highest: _Array,
 ) -> None:
@@ -651,7 +608,7 @@ def _decisions(
         return
     if system.striker is not None and structure.wells_are_mirror_images:
         # elsewhere the class also depends on whether the other well is reached
-        table["decide_crossings"] = int(time.cycles / 20.0)
+        table["decide_crossings"] = int(cycles / 20.0)
     table["decide_reach"] = np.maximum(highest, 0.0)
     if not structure.wells_are_mirror_images:
         table["decide_reach"] = passed_heights(structure.model, location, highest)

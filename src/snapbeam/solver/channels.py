@@ -35,10 +35,10 @@ from snapbeam.model.local_force import (
     MagneticForce,
     QuadraticDamping,
 )
-from snapbeam.model.quantity import section_of, split_name
+from snapbeam.model.quantity import section_of
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
-from snapbeam.solver.excitation import side_of, started
+from snapbeam.solver.excitation import own_columns, side_of, started
 from snapbeam.solver.structure import Structure
 from snapbeam.solver.user_laws import UserLaw, contact_law, local_force
 
@@ -127,13 +127,13 @@ class Channels:
 class _Builder:
     """Channels and signals, one after the other."""
 
-    def __init__(self, runs: int) -> None:
+    def __init__(self, runs: int, rows: _Array) -> None:
         self.runs = runs
         self.laws: list[int] = []
         self.numbers: list[_Array] = []
         self.offset: list[_Array] = []
         self.since: list[_Array] = []
-        self.rows: list[_Array] = []
+        self.rows: list[_Array] = [rows]
         self.row_of: list[NDArray[np.int64]] = []
         self.rest: list[_Array] = []
         self.uses: list[dict[str, float]] = []
@@ -145,8 +145,8 @@ class _Builder:
         self.jumps: dict[str, _Array] = {}
         self.of_user: list[UserLaw] = []
 
-    def add(self, law: int, rows: _Array, which: Any, rest: Any, uses: dict[str, float], numbers: Any = (), offset: Any = 0.0, since: Any = -1.0) -> None:  # fmt: skip
-        """Add a channel: its law, rows and which of them each run has, and the factors of its signals."""
+    def add(self, law: int, rows: _Array | None, which: Any, rest: Any, uses: dict[str, float], numbers: Any = (), offset: Any = 0.0, since: Any = -1.0) -> None:  # fmt: skip
+        """Add a channel: its law, rows (None: those there are) and which of them each run has, and the factors of its signals."""
         own = [np.broadcast_to(np.asarray(value, float), self.runs) for value in numbers]
         self.laws.append(law)
         self.numbers.append(np.stack(own, axis=1) if own else np.zeros((self.runs, 0)))
@@ -169,10 +169,12 @@ class _Builder:
         self.of_user.append(own)
         return USER_LAWS[own.kind], own.head, kind.numbers_type()._fields
 
-    def place(self, rows: _Array, which: Any, rest: Any) -> None:
+    def place(self, rows: _Array | None, which: Any, rest: Any) -> None:
         """Add rows, and which of them each run has."""
-        first = sum(len(each) for each in self.rows)
-        self.rows.append(np.atleast_2d(rows))
+        first = 0
+        if rows is not None:
+            first = sum(map(len, self.rows))
+            self.rows.append(np.atleast_2d(rows))
         self.row_of.append(np.broadcast_to(np.asarray(which) + first, self.runs))
         self.rest.append(np.broadcast_to(np.asarray(rest, float), self.runs))
 
@@ -228,12 +230,11 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         If the native core does not have a part of the system.
     """
     structure, table, runs = ensemble.structure, ensemble.runs, ensemble.size
-    built = _Builder(runs)
+    built = _Builder(runs, ensemble.contact_rows)
     for section, drive in _motions(system):
         _add_motion(built, system, ensemble, columns, section, drive)
     base = system.base_excitation
     up = 1.0 if base is None or base.direction == "up" else -1.0
-    others = ensemble.others
     for number, contact in enumerate(system.contacts, 1):
         section = section_of("contact", number)
         law, head, names = built.law(contact.law, system.model)
@@ -244,15 +245,12 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         if contact.law.memory:
             left = ensemble.starts[table["start_row"], 0, structure.mode_of_indentation(number - 1)]
         values = [*head, *(left if name == contact.law.memory else columns[f"{section}.{name}"] for name in names)]
-        if number == 1:
-            rows, which, rest = ensemble.contact_rows, table["contact_row"], table["rest_contact"]
-            offset, since = table["offset"], table["contact_time"]
-        else:
-            rows, which, rest = others.rows, others.places[:, number - 2], others.rest[:, number - 2]
-            offset, since = others.offset[:, number - 2], others.since[:, number - 2]
+        which, rest, offset, since = (
+            table[name][:, number - 1] for name in ("contact_row", "rest_contact", "offset", "contact_time")
+        )
         if contact.law.impulsive:
-            values.append(_cancelled(structure, rows)[which])
-        built.add(law, rows, which, rest, uses, values, offset, since)
+            values.append(_cancelled(structure, ensemble.contact_rows)[which])
+        built.add(law, None, which, rest, uses, values, offset, since)
     for force, row in zip(system.local_forces, structure.local_forces, strict=True):
         law, head, names = built.law(force, system.model)
         built.add(law, row.row, 0, row.rest, {}, [*head, *(getattr(force.numbers, name) for name in names)])
@@ -272,7 +270,7 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         else:
             built.add(CIRCUIT, circuit.row, 0, 0.0, {}, [coupling.rate, 0.0, state[table["start_row"]]])
     observed = np.array([structure.row_of_beam(row) for row in ensemble.contact_rows])
-    built.place(observed, table["contact_row"], table["rest_contact"])
+    built.place(observed, table["contact_row"][:, 0], table["rest_contact"][:, 0])
     return built.built(len(system.contacts), len(structure.circuits))
 
 
@@ -291,11 +289,6 @@ _FAR = 1e300
 """Bound of a motion that has none."""
 
 
-def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
-    own = {field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section}
-    return own or {"": np.zeros(runs)}
-
-
 def _bounds(drive: Drive, own: Mapping[str, _Array], system: System) -> _Array:
     """Bounds of the value, slope and second derivative of a motion, shape (runs, 3)."""
     runs = next(iter(own.values())).size
@@ -312,7 +305,7 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
     runs, table = ensemble.size, ensemble.runs
     if isinstance(drive, FixedStop):
         return
-    own, begun = started(system, _own(columns, section, runs), table["phase"], ensemble.clock)
+    own, begun = started(system, own_columns(columns, section, runs), table["phase"], ensemble.clock)
     repeats = len(system.moving) < 2 and drive.is_periodic
     bounds = _bounds(drive, own, system)
     components = drive.components_until(own, system.scale, begun + table["end"] * table["tick"])

@@ -10,10 +10,16 @@ from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.components import Motion
-from snapbeam.model.quantity import numbered
+from snapbeam.model.quantity import numbered, split_name
 from snapbeam.model.system import System
 
 _Array = NDArray[np.float64]
+
+
+def own_columns(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
+    """Parameters of a section, of which there may be none."""
+    own = {field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section}
+    return own or {"": np.zeros(runs)}
 
 
 def motion_of(drive: Drive, scale: Scale, until: float, columns: Mapping[str, _Array] | None = None) -> Motion:

@@ -16,13 +16,8 @@ from snapbeam.model.matrix_pairs import coupled_blocks
 from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP, Channels
 from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.solver.statistics import (
-    CIRCUIT_LATE_LOSS,
-    CIRCUIT_LOSS,
-    CIRCUIT_PEAK,
-    OTHER_IMPACTS,
-    OTHER_IMPULSE,
-    OTHER_PEAK,
-    OTHER_WORK,
+    OF_CONTACT,
+    OF_CORE,
     SAMPLED,
     Last,
     OutputStates,
@@ -43,25 +38,9 @@ RUN = (
     "decide_reach", "decide_crossings", "max_steps", "stretch", "calm_energy", "lowest",
 )  # fmt: skip
 """Numbers of a run, in the order of ``core/api.hpp: RunNumber``."""
-STATISTICS = (
-    "status", "time", "side", "zero_crossings", "zero_crossings_last_quarter", "last_zero_crossing", "steps", "trials",
-    "sampled_steps", "min_displacement", "max_displacement", "min_center", "max_center", "peak_velocity",
-    "peak_midspan_velocity", "square_displacement", "square_center", "square_velocity", "square_midspan_velocity",
-    "energy_time", "high_energy_time", "dissipated", "first_energy", "energy", "displacement", "center", "early_stop_time",
-)  # fmt: skip
 OF_CHANNEL = (
-    "impacts",
-    "impulse",
-    "work",
-    "gross_work",
-    "lost",
-    "late_lost",
-    "peak_force",
-    "deepest",
-    "contact_time",
-    "touching",
-    "onset",
-)
+    "impacts", "impulse", "work", "gross_work", "lost", "late_lost", "peak_force", "deepest", "contact_time", "touching", "onset"
+)  # fmt: skip
 STATUS = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED, RunStatus.DIVERGED, RunStatus.STEP_LIMIT)
 """Status of a run by its number in the core."""
 OF_SAMPLE, CHANNEL_SAMPLE = 3, 6
@@ -218,7 +197,7 @@ class _Arrays:
             "order": np.argsort(-ensemble.work, kind="stable").astype(np.int32),
             "outputs": 0,
             "states": np.zeros((ensemble.size, 0, 2 * n + 1 + 2 * channels.laws.size)),
-            "statistics": np.empty((ensemble.size, len(STATISTICS))),
+            "statistics": np.empty((ensemble.size, len(OF_CORE))),
             "of_channels": np.empty((ensemble.size, channels.laws.size, len(OF_CHANNEL))),
             "held": np.empty((ensemble.size, len(self.updated))),
             "account": 0,
@@ -251,7 +230,7 @@ class _Arrays:
         batch, channels, n = self.batch, self.channels.laws.size, self.order.size
         shapes: dict[str, tuple[int, ...]] = {
             "q": (n,), "p": (n,), "numbers": batch["numbers"].shape[1:], "laws": (channels,), "offset": (channels,), "rest": (channels + 1,),
-            "rows": (channels + 1, n), "signals": batch["signals"].shape[1:], "end": (), "statistics": (len(STATISTICS),),
+            "rows": (channels + 1, n), "signals": batch["signals"].shape[1:], "end": (), "statistics": (len(OF_CORE),),
             "of_channels": (channels, len(OF_CHANNEL)), "jumps": batch["jumps"].shape[1:],
         }  # fmt: skip
         found = {name: np.zeros((self.ensemble.size, _core.DIRECTIONS, *shape)) for name, shape in shapes.items()}
@@ -307,39 +286,33 @@ class _Arrays:
 
     def accumulators(self) -> Records:
         """The records of the runs."""
-        statistics, of_channels = self.batch["statistics"], self.batch["of_channels"]
-        channels = self.channels
-        further = max(0, channels.contacts - 1)
-        found = empty_accumulators(self.ensemble.size, further, len(self.circuits))
+        statistics, channels = self.batch["statistics"], self.channels
+        of = dict(zip(OF_CHANNEL, np.moveaxis(self.batch["of_channels"], 2, 0), strict=True))
+        found = empty_accumulators(self.ensemble.size, channels.contacts, len(self.circuits))
         begun = statistics[:, 0] >= 0.0
-        for k, name in enumerate(STATISTICS):
-            if name in (found.dtype.names or ()) and name not in ("status", "time"):
-                found[name][begun] = statistics[begun, k]
+        for k, name in enumerate(OF_CORE):
+            found[name][begun] = statistics[begun, k]
         found["status"][begun] = np.array(STATUS, dtype=np.int64)[statistics[begun, 0].astype(int)]
         found["time"][begun] = np.rint(statistics[begun, 1] / self.finer)
         for row, held in zip(self.updated, self.batch["held"].T, strict=True):
             found[f"own_{row.name}"] = held
-        contacts = {name: of_channels[:, : channels.contacts, k] for k, name in enumerate(OF_CHANNEL)}
-        for name, column in (("impacts", "impacts"), ("total_impulse", "impulse"), ("work", "work"), ("lost", "lost"), ("contact_time", "contact_time")):  # fmt: skip
-            found[name] = contacts[column].sum(axis=1)
+        for name in ("impacts", "impulse", "work", "lost", "contact_time"):
+            found["total_impulse" if name == "impulse" else name] = of[name][:, : channels.contacts].sum(axis=1)
         if channels.contacts:
-            found["peak_force"], found["touching"] = contacts["peak_force"][:, 0], contacts["touching"][:, 0]
-            found["onset"] = np.rint(contacts["onset"][:, 0] / self.finer)
-        if further:
-            for at, name in ((OTHER_IMPACTS, "impacts"), (OTHER_PEAK, "peak_force"), (OTHER_IMPULSE, "impulse"), (OTHER_WORK, "work")):  # fmt: skip
-                found["others"][:, :, at] = contacts[name][:, 1:]
+            found["contacts"] = np.stack([of[name][:, : channels.contacts] for name in OF_CONTACT], axis=2)
+            found["peak_force"] = of["peak_force"][:, : channels.contacts].max(axis=1)
         if self.circuits.size:
-            for at, name in ((CIRCUIT_LOSS, "lost"), (CIRCUIT_LATE_LOSS, "late_lost"), (CIRCUIT_PEAK, "peak_force")):
-                found["circuits"][:, :, at] = of_channels[:, self.circuits, OF_CHANNEL.index(name)]
-        works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")
-        found["gross_work"] = of_channels[:, :, works[1]].sum(axis=1)
+            found["circuits"] = np.stack(
+                [of[name][:, self.circuits] for name in ("lost", "late_lost", "peak_force")], axis=2
+            )
+        found["gross_work"] = of["gross_work"].sum(axis=1)
         for j, law in enumerate(channels.laws.tolist()):
             if j < channels.contacts or j in self.circuits:
                 continue
             if law == LINEAR_DAMPING:  # of the structure
-                found["dissipated"] += self.batch["account"] * of_channels[:, j, works[2]]
+                found["dissipated"] += self.batch["account"] * of["lost"][:, j]
             else:
-                found[_work_of(law)] += of_channels[:, j, works[0]] - of_channels[:, j, works[2]]
+                found[_work_of(law)] += of["work"][:, j] - of["lost"][:, j]
         if self.batch["account"]:
             found["dissipated"] += found["lost"]
         return found
@@ -575,7 +548,7 @@ class Recording:
             most = max(most, int(found.max()))
         width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
         samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // width), most + 8)
-        saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
+        saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(OF_CORE) + 6 * channels.kinds.size + 32) * 8
         self.recorder: dict[str, Any] = {
             "times": np.ascontiguousarray(times, dtype=float),
             "in_contact": int(in_contact),

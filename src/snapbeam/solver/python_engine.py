@@ -97,7 +97,7 @@ class Equations:
 
             return moved
 
-        base, others = system.base_excitation, ensemble.others
+        base = system.base_excitation
         self.base = None if base is None else moves("base_excitation", base.motion)
         self.up = -1.0 if base is not None and base.direction == "down" else 1.0
         self.load = None if system.axial_load is None else moves("axial_load", system.axial_load.motion)
@@ -112,15 +112,11 @@ class Equations:
         self.state = [APART] * len(system.contacts)
         for j, each in enumerate(system.contacts):
             side = 1.0 if each.striker.side == "below" else -1.0
-            row, offset, since = (ensemble.contact_rows[table["contact_row"]], table["offset"], table["contact_time"])
-            if j:
-                assert others is not None
-                row = others.rows[others.places[run, j - 1]]
-                offset, since = others.offset[run, j - 1], others.since[run, j - 1]
+            row, offset = ensemble.contact_rows[table["contact_row"][j]], table["offset"][j]
             motion = moves(section_of("drive", j + 1), each.striker.drive)
             follows = 0.0 if base is None or base.striker_on_base else -side * self.up
             self.contacts.append(Contact(each.law, row, offset, motion, follows, structure.mode_of_indentation(j)))
-            self.since.append(float(since))
+            self.since.append(float(table["contact_time"][j]))
 
     def tip(self, j: int, t: float) -> tuple[float, float]:
         """w_j and w_j' in the frame of the ends."""

@@ -32,9 +32,9 @@ class Records:
         self.ensemble, self.eq, self.t, self.s = ensemble, eq, 0.0, s
         self.times, self.in_contact, self.tick = times, in_contact, float(table["tick"])
         self.end, self.late = float(table["end"]) * self.tick, float(table["last_quarter"]) * self.tick
-        row = ensemble.contact_rows[table["contact_row"]]
+        row = ensemble.contact_rows[table["contact_row"][0]]
         self.places = np.stack((structure.row_of_beam(row), structure.center))
-        self.at_rest = np.array([float(table["rest_contact"]), structure.center_rest])
+        self.at_rest = np.array([float(table["rest_contact"][0]), structure.center_rest])
         self.level = float(structure.dividing_height)
         wells = ensemble.structure.unequal_wells
         self.second_well = ensemble.structure.shift + (0.0 if wells is None else wells.second)
@@ -51,7 +51,7 @@ class Records:
                 self.loads[j] = self.at_yield(j)
         self.impacts: list[list[float]] = []
         self.samples: list[tuple[Any, ...]] = []
-        self.found = found = empty_accumulators(1, max(0, count - 1), len(eq.circuits))
+        self.found = found = empty_accumulators(1, count, len(eq.circuits))
         found["status"], found["first_energy"] = RunStatus.OK, self.energy()
         for i, name in enumerate(("displacement", "center")):
             found[f"min_{name}"] = found[f"max_{name}"] = self.at_rest[i] + self.places[i] @ s[: eq.n]
@@ -139,13 +139,12 @@ class Records:
         found["displacement"], found["center"] = self.at_rest + self.places @ s[:n]
         found["side"] = 1 if found["center"][0] > self.level else -1
         found["contact_time"] += sum(min(each * self.tick, self.t) for each in lasting if each >= 0.0)
-        found["touching"], found["onset"] = lasting[0] >= 0.0, found["time"] - max(0, round(lasting[0]))
-        found["peak_force"] = self.peaks[0] if self.peaks else 0.0
+        found["peak_force"] = max(self.peaks, default=0.0)
         if self.eq.circuits:
             losses = s[s.size - early.size :]
             found["circuits"][0, :, :CIRCUIT_PEAK] = np.stack((losses, losses - early), axis=1)
-        if len(self.eq.state) > 1:
-            found["others"][0] = np.stack((self.hits, self.peaks, impulses, works), axis=1)[1:]
+        if self.eq.state:
+            found["contacts"][0] = np.stack((self.hits, self.peaks, impulses, works), axis=1)
 
     def impact_ended(self, j: int) -> None:
         """Enter an impact."""

@@ -63,48 +63,23 @@ SAMPLED = ("energy", "contact", "work", "dissipated", "lost", *WORKS)
 """Columns of the values of a sample; the energies lost in circuits follow."""
 
 
-# What every engine keeps: name, kind, value at the start.
-_KEPT: tuple[tuple[str, type, float], ...] = (
-    ("status", np.int64, int(RunStatus.NOT_RUN)),
-    ("time", np.int64, 0),  # ticks integrated
-    ("touching", np.int64, 0),
-    ("onset", np.int64, 0),  # tick at which the present contact began
-    ("side", np.int64, 0),  # sign of the centre displacement, -1 in the well the run began in
-    ("zero_crossings", np.int64, 0),
-    ("zero_crossings_last_quarter", np.int64, 0),
-    ("impacts", np.int64, 0),
-    ("steps", np.int64, 0),
-    ("last_zero_crossing", np.float64, math.nan),
-    ("min_displacement", np.float64, 0.0),
-    ("max_displacement", np.float64, 0.0),
-    ("min_center", np.float64, 0.0),
-    ("max_center", np.float64, 0.0),
-    ("peak_velocity", np.float64, 0.0),
-    ("peak_midspan_velocity", np.float64, 0.0),
-    ("square_displacement", np.float64, 0.0),  # integrals over time
-    ("square_center", np.float64, 0.0),
-    ("square_velocity", np.float64, 0.0),
-    ("square_midspan_velocity", np.float64, 0.0),
-    ("energy_time", np.float64, 0.0),  # integral of the modal energy, sampled
-    ("high_energy_time", np.float64, 0.0),  # of the modes above a frequency
-    ("peak_force", np.float64, 0.0),
-    ("contact_time", np.float64, 0.0),
-    ("total_impulse", np.float64, 0.0),
-    ("work", np.float64, 0.0),
-    ("gross_work", np.float64, 0.0),
-    ("dissipated", np.float64, 0.0),  # integrated, where an energy balance is computed
-    ("lost", np.float64, 0.0),  # in contact
-    *((name, np.float64, 0.0) for name in WORKS),
-    ("first_energy", np.float64, 0.0),
-    ("energy", np.float64, 0.0),  # at the end, contact included
-    ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
-    ("center", np.float64, 0.0),
-    ("early_stop_time", np.float64, math.nan),
-)
-
-
-OTHER_IMPACTS, OTHER_PEAK, OTHER_IMPULSE, OTHER_WORK = range(4)
-"""Columns of the statistics of each striker after the first."""
+OF_CORE = (
+    "status", "time", "side", "zero_crossings", "zero_crossings_last_quarter", "last_zero_crossing", "steps", "trials",
+    "sampled_steps", "min_displacement", "max_displacement", "min_center", "max_center", "peak_velocity",
+    "peak_midspan_velocity", "square_displacement", "square_center", "square_velocity", "square_midspan_velocity",
+    "energy_time", "high_energy_time", "dissipated", "first_energy", "energy", "displacement", "center", "early_stop_time",
+)  # fmt: skip
+"""What the core counts of a run, as in ``core/api.hpp: Statistic``: the time in ticks; sides are -1 in the well that a run
+begins in; squares and energies of modes are integrals over time; the last energy has that of contacts."""
+_KEPT = (*OF_CORE, "impacts", "peak_force", "contact_time", "total_impulse", "work", "gross_work", "lost", *WORKS)
+"""What every engine keeps of a run: the same and that of all channels."""
+_COUNTED = frozenset(OF_CORE[:5]) | {"steps", "trials", "sampled_steps", "impacts"}
+_AT_START = {"status": float(RunStatus.NOT_RUN), "last_zero_crossing": math.nan, "early_stop_time": math.nan}
+"""Values at the start that are not 0."""
+OF_CONTACT = ("impacts", "peak_force", "impulse", "work")
+"""Columns of what is kept of each contact."""
+CIRCUIT_LOSS, CIRCUIT_LATE_LOSS, CIRCUIT_PEAK = range(3)
+"""Columns of each circuit: energy lost, J, with load; that in the last quarter; maximum of its coordinate."""
 
 
 @dataclass(frozen=True)
@@ -474,16 +449,12 @@ def unregister_statistic(name: str) -> None:
     del STATISTICS[name]
 
 
-CIRCUIT_LOSS, CIRCUIT_LATE_LOSS, CIRCUIT_PEAK = range(3)
-"""Columns of each circuit: energy lost, J, with load; that in the last quarter; maximum of its coordinate."""
-
-
-def accumulators_dtype(others: int = 0, circuits: int = 0) -> np.dtype[Any]:
-    """One record of what engines keep of a run, with *others* strikers beside the first and so many circuits."""
-    fields: list[Any] = [("others", np.float64, (others, OTHER_WORK + 1))] if others else []
-    fields += [("circuits", np.float64, (circuits, CIRCUIT_PEAK + 1))] if circuits else []
+def accumulators_dtype(contacts: int = 0, circuits: int = 0) -> np.dtype[Any]:
+    """One record of what engines keep of a run, with so many contacts and circuits."""
+    parts = (("contacts", contacts, len(OF_CONTACT)), ("circuits", circuits, CIRCUIT_PEAK + 1))
+    fields: list[Any] = [(name, np.float64, (count, columns)) for name, count, columns in parts if count]
     fields += [(f"own_{row.name}", np.float64) for row in updated()]
-    fields += [(name, kind) for name, kind, _ in _KEPT]
+    fields += [(name, np.int64 if name in _COUNTED else np.float64) for name in _KEPT]
     return np.dtype(fields, align=True)
 
 
@@ -491,13 +462,11 @@ ACCUMULATORS = accumulators_dtype()
 """Data type of the accumulators of the package's own statistics."""
 
 
-def empty_accumulators(runs: int, others: int = 0, circuits: int = 0) -> Any:
-    """Accumulators of runs that have not begun, with *others* strikers beside the first and so many circuits."""
-    accumulators_of_runs = np.zeros(runs, dtype=accumulators_dtype(others, circuits))
-    for name, _, start in _KEPT:
+def empty_accumulators(runs: int, contacts: int = 0, circuits: int = 0) -> Any:
+    """Accumulators of runs that have not begun, with so many contacts and circuits."""
+    accumulators_of_runs = np.zeros(runs, dtype=accumulators_dtype(contacts, circuits))
+    for name, start in (_AT_START | {f"own_{row.name}": row.start for row in updated()}).items():
         accumulators_of_runs[name] = start
-    for row in updated():
-        accumulators_of_runs[f"own_{row.name}"] = row.start
     return accumulators_of_runs
 
 
@@ -518,12 +487,12 @@ def lost_in_circuits(accumulators_of_runs: Any) -> NDArray[np.float64]:
 
 
 _EACH = {
-    "impacts": (OTHER_IMPACTS, "impacts"),
-    "peak_force": (OTHER_PEAK, "peak contact force"),
-    "impulse": (OTHER_IMPULSE, "impulse on the beam, all impacts"),
-    "striker_work": (OTHER_WORK, "work done"),
+    "impacts": ("impacts", "impacts"),
+    "peak_force": ("peak_force", "peak contact force"),
+    "impulse": ("impulse", "impulse on the beam, all impacts"),
+    "striker_work": ("work", "work done"),
 }
-"""Statistics of each of several strikers: column of the further strikers, and long name."""
+"""Statistics of each of several strikers: one of :data:`OF_CONTACT`, and long name."""
 
 
 def name_in(held: Container[Any], name: str) -> str:
@@ -614,34 +583,17 @@ class Reading:
         """A column, NaN where the run failed."""
         return np.where(self.good, self.accumulators[column], np.nan)
 
-    @property
-    def others(self) -> NDArray[np.float64]:
-        """Statistics of each striker after the first, shape (runs, strikers, kinds)."""
-        if self.ensemble.others is None:
-            return np.zeros((self.accumulators.size, 0, 4))
-        return np.asarray(self.accumulators["others"])
-
-    def one(self, column: int, number: int) -> NDArray[np.float64]:
-        """A column of one of several strikers, the first being 1: its own is what the others leave of the whole."""
-        others = self.others[:, :, column]
-        if number > 1:
-            found = others[:, number - 2]
-        elif column == OTHER_PEAK:
-            found = self.accumulators["peak_force"]
-        else:
-            whole = {OTHER_IMPACTS: "impacts", OTHER_IMPULSE: "total_impulse", OTHER_WORK: "work"}[column]
-            found = self.accumulators[whole] - others.sum(axis=1)
-        return np.asarray(found if column == OTHER_IMPACTS else np.where(self.good, found, np.nan))
+    def one(self, column: str, number: int) -> NDArray[np.float64]:
+        """A column of one of several strikers, the first being 1."""
+        found = self.accumulators["contacts"][:, number - 1, OF_CONTACT.index(column)]
+        return np.asarray(found if column == "impacts" else np.where(self.good, found, np.nan))
 
     @property
     def peak_force(self) -> NDArray[np.float64]:
         """Peak force of any striker; NaN if impacts have zero duration."""
         force = self.seen("peak_force")
-        if self.ensemble.others is not None:
-            return np.maximum(force, self.others[:, :, OTHER_PEAK].max(axis=1))
-        if self.ensemble.law.impulsive:
-            return np.where((force == 0.0) & (self.accumulators["impacts"] > 0), np.nan, force)
-        return force
+        without = self.ensemble.impulsive & (force == 0.0) & (self.accumulators["impacts"] > 0)
+        return np.where(without, np.nan, force)
 
     @cached_property
     def other_well_reached(self) -> NDArray[np.bool_]:
@@ -695,8 +647,7 @@ def statistics_of(ensemble: Ensemble, accumulators_of_runs: Records) -> dict[str
     """Statistics of runs in the units and signs of a map, arrays of shape (runs,) by name."""
     reading = Reading(ensemble, accumulators_of_runs)
     found = {}
-    strikers = 1 if ensemble.others is None else 1 + len(ensemble.others.laws)
-    for name, row in rows_for(strikers).items():
+    for name, row in rows_for(ensemble.contacts).items():
         values = row.value(reading) if row.update is None else row.value(reading, accumulators_of_runs[f"own_{name}"])
         found[name] = np.asarray(values).astype(row.dtype)
     return found

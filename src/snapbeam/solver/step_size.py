@@ -437,16 +437,10 @@ _FEWEST_CLOCK = 4.0
 """Flight steps, at least, in a cycle of excitation and in a period of the first mode, of a step that was asked for."""
 
 
-class Clocked(NamedTuple):
-    """Duration of runs and time grid."""
-
-    cycles: float
-
-
 def clocked(
     table: Records, system: System, integration: Integration, cycle: _Array, plans: list[Plan], periods: float | None
-) -> Clocked:
-    """Enter the ticks of every run in the table of runs.
+) -> float:
+    """Enter the ticks of every run in the table of runs, and return the cycles of each.
 
     *cycle* holds the seconds of one cycle of excitation of each run.
 
@@ -506,7 +500,7 @@ def clocked(
     if periods is None:
         table["output_interval"] = table["end"]
     table["last_quarter"] = table["end"] // 4 * 3
-    return Clocked(cycles)
+    return cycles
 
 
 def _asked_cycles(drive: RecordedMotion, integration: Integration, periods: float | None, left: float) -> float:
