@@ -20,7 +20,7 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.solver.channels import channels_of
 from snapbeam.solver.ensemble import FAR_AWAY, CircuitCoupling, Ensemble, Records, run_dtype
-from snapbeam.solver.excitation import displacements, motion_of, own_columns, side_of, started
+from snapbeam.solver.excitation import carried, displacements, motion_of, own_columns, side_of, started
 from snapbeam.solver.restrictions import check_integrable
 from snapbeam.solver.step_size import Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
@@ -37,10 +37,13 @@ _SHORTEST_PERIOD = 1e-300
 """Period of an excitation, s, below which its reciprocal and its products are not numbers."""
 
 
+def _runs_of(columns: Mapping[str, _Array]) -> int:
+    return next(iter(columns.values())).size if columns else 1
+
+
 def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
     """Seconds of one cycle of excitation of each run, or of the first mode where nothing moves, shape (runs,)."""
-    runs = next(iter(columns.values())).size if columns else 1
-    leads = system.primary_excitation
+    runs, leads = _runs_of(columns), system.primary_excitation
     if leads is None:
         return 2.0 * math.pi / (np.ones(runs) * system.scale.omega)
     section, drive = leads
@@ -95,15 +98,12 @@ def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
 
 def _begun_at(system: System, columns: Mapping[str, _Array], clock: _Array, phase: _Array) -> _Array:
     """Displacement of the first tip from its mid-position at the start, m, in the frame of the ends; shape (runs,)."""
-    runs, base = phase.size, system.base_excitation
-    assert system.striker is not None
-    motions = [("drive", system.striker.drive, 1.0)]
-    if base is not None and not base.striker_on_base:
-        side = -1.0 if system.striker.side == "above" else 1.0
-        motions.append(("base_excitation", base.motion, -side if base.direction == "up" else side))
-    found = np.zeros(runs)
+    striker, base, found = system.contacts[0].striker, system.base_excitation, np.zeros(phase.size)
+    motions: list[tuple[str, Drive, float]] = [("drive", striker.drive, 1.0)]
+    if base is not None and (share := carried(system, striker)):
+        motions.append(("base_excitation", base.motion, share))
     for section, drive, share in motions:
-        own, times = started(system, own_columns(columns, section, runs), phase, clock)
+        own, times = started(system, own_columns(columns, section, phase.size), phase, clock)
         found = found + share * displacements(drive, own, system.scale, times)
     return found
 
@@ -121,22 +121,14 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
 def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, tuple[_Array, _Array]]:
     """Displacement (m) and velocity (m/s) of the base in space; change of the load and external forces (N) and their rates.
 
-    By section.
-    *ensemble* is that of the one run, which may begin in the middle of its drives.
+    By section.  *ensemble* is that of the one run, which may begin in the middle of its drives.
     """
-    found = {}
+    found, base = {}, system.base_excitation
     for section, drive in system.moving:
-        if not _is_around(section):
-            continue
-        pairs = _motion_at(ensemble, system, section, drive, times)
-        sign = (
-            -1.0
-            if section == "base_excitation"
-            and system.base_excitation is not None
-            and system.base_excitation.direction == "down"
-            else 1.0
-        )
-        found[section] = sign * pairs[0], sign * pairs[1]
+        if _is_around(section):
+            sign = -1.0 if section == "base_excitation" and base is not None and base.direction == "down" else 1.0
+            value, rate, _ = sign * _motion_at(ensemble, system, section, drive, times)
+            found[section] = value, rate
     return found
 
 
@@ -210,7 +202,7 @@ def make_ensemble(
     check_integrable(system, integration.engine)
     columns = run_columns(system, points or {})
     state = system.start_state if start is None else start
-    runs = next(iter(columns.values())).size if columns else 1
+    runs = _runs_of(columns)
     if state.batch and runs in (1, state.batch[0]):
         runs = state.batch[0]
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
@@ -295,19 +287,18 @@ def _require_clock(system: System, state: State) -> None:
     """Refuse a phase of one drive in a start of several motions, which share a clock and have their own phases."""
     if len(system.moving) < 2 or state.modal is not None:
         return
-    given = state.phase[~np.isnan(state.phase)]
-    if ((given < 0.0) | (given > _LONGEST_CLOCK)).any():
+    given = state.phase[(state.phase < 0.0) | (state.phase > _LONGEST_CLOCK)]  # not NaN, which is none
+    if given.size:
         names = ", ".join(f"{section}.phase" for section, _ in system.moving)
         raise InputError(
-            f"state phase = {shown(given[(given < 0.0) | (given > _LONGEST_CLOCK)][0])}: must not be given if several "
+            f"state phase = {shown(given[0])}: must not be given if several "
             f"motions act; give each motion its own phase ({names})"
         )
 
 
 def _require_valid(system: System, state: State) -> None:
     """Refuse one start at which a local force is not valid; of a batch, such runs end at once with the status DIVERGED."""
-    local = system.unloaded_potential
-    if state.batch or not system.local_forces or bool(local.holds(state.amplitude)):
+    if state.batch or not system.local_forces or bool(system.unloaded_potential.holds(state.amplitude)):
         return
     for force in system.local_forces:
         low, high = force.displacement_range(force.numbers)
@@ -324,7 +315,6 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
 
     *points* holds those that differ between the runs; the others are the system's own.
     """
-    size = next(iter(points.values())).size if points else 1
     own: dict[str, float] = {}
     for number, each in enumerate(system.contacts, 1):
         for part in (each.law, each.striker):
@@ -340,7 +330,7 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
     for section, motion in system.moving:
         if _is_around(section):
             own |= {f"{section}.{name}": value for name, value in motion.values().items()}
-    columns = {name: np.full(size, value) for name, value in own.items()}
+    columns = {name: np.full(_runs_of(points), value) for name, value in own.items()}
     for name, values in points.items():
         section, field = split_name(name)
         kind, number = numbered(section)
@@ -356,38 +346,27 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
 
     A striker with a mass meets the beam for a shorter time, as the two masses together do: m_s m/(m_s + m).
     """
-    plans = _plans_of(system, integration, columns)
-    further = [
-        _plans_of(system, integration, columns, section_of("contact", number), each.law)
-        for number, each in enumerate(system.contacts[1:], 2)
-    ]
-    if further:
-        plans = [_serving(each) for each in zip(plans, *further, strict=True)]
-    if integration.step is None and plans[0].order == 6 and _depends_on_velocity(system):
-        plans = [each.scaled(_GENERAL) for each in plans]
-    if integration.step is None and any(_is_around(section) for section, _ in system.moving):
-        fastest = fastest_of(system, columns, len(plans))
-        plans = [
-            each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate))) if rate > 0.0 else each
-            for each, rate in zip(plans, fastest.tolist(), strict=True)
-        ]
-    if integration.step is None and system.harvesters:
-        plans = _with_circuits(plans, system, columns, integration.accuracy)
-    if integration.step is None and system.local_forces:
-        longest = _longest_with_local_forces(system, integration.accuracy)
-        plans = [each._replace(step=min(each.step, longest)) for each in plans]
+    laws = [(section_of("contact", number), each.law) for number, each in enumerate(system.contacts, 1)]
+    of_contacts = [_plans_of(system, integration, columns, *each) for each in laws or [("contact", None)]]
+    plans = [each[0] if len(each) == 1 else _serving(each) for each in zip(*of_contacts, strict=True)]
+    if integration.step is None:
+        if plans[0].order == 6 and _depends_on_velocity(system):
+            plans = [each.scaled(_GENERAL) for each in plans]
+        with np.errstate(divide="ignore"):
+            longest = 2.0 * math.pi / (_RESOLVED * fastest_of(system, columns, len(plans)))
+        if system.harvesters:
+            step = np.minimum([each.step for each in plans], longest)
+            longest = np.minimum(longest, _longest_with_circuits(step, system, columns, integration.accuracy))
+        if system.local_forces:
+            longest = np.minimum(longest, _longest_with_local_forces(system, integration.accuracy))
+        plans = [each._replace(step=min(each.step, own)) for each, own in zip(plans, longest.tolist(), strict=True)]
     masses = [each.striker.mass for each in system.contacts if each.striker.mass is not None]
     if not masses:
         return plans
-    mass = system.struck_model.lightest_contact_mass
-    more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / min(masses)) - 1e-9))
+    more = max(0, math.ceil(0.5 * math.log2(1.0 + system.struck_model.lightest_contact_mass / min(masses)) - 1e-9))
     return [
-        each._replace(
-            min_contact_halvings=each.min_contact_halvings + more,
-            max_halvings=each.max_halvings + more,
-            contact=each.contact * 0.5**more,
-        )
-        for each in plans
+        Plan(order, step, longest + more, shortest + more, contact * 0.5**more)
+        for order, step, longest, shortest, contact in plans
     ]
 
 
@@ -415,16 +394,14 @@ def _longest_with_local_forces(system: System, accuracy: str) -> float:
     return _TAPPED[accuracy] / max(math.sqrt(squared), decay, 1e-300)
 
 
-def _with_circuits(plans: list[Plan], system: System, columns: Mapping[str, _Array], accuracy: str) -> list[Plan]:
-    """Steps that resolve circuits.
+def _longest_with_circuits(step: _Array, system: System, columns: Mapping[str, _Array], accuracy: str) -> _Array:
+    """Longest steps that resolve circuits, s, of runs whose other parts ask for a *step*.
 
     The stiffness t.t of circuits with inertia, and the damping rate t.t of those without, are in the kicks.  The decay lam h of a
     circuit in a step is at most 3, or over 8: then it follows the beam.
     """
-    model, runs = system.struck_model, len(plans)
-    squared, decay, longest = 0.0, np.zeros(runs), np.full(runs, math.inf)
-    step = np.array([each.step for each in plans])
-    for harvester, circuit in zip(system.harvesters, _circuits(system, columns, runs), strict=True):
+    model, squared, decay, longest = system.struck_model, 0.0, np.zeros(step.size), np.full(step.size, math.inf)
+    for harvester, circuit in zip(system.harvesters, _circuits(system, columns, step.size), strict=True):
         row = model.linear_modes.T @ harvester.row(model)
         if harvester.inertia > 0.0:
             squared += float(row @ row) / harvester.inertia
@@ -433,8 +410,7 @@ def _with_circuits(plans: list[Plan], system: System, columns: Mapping[str, _Arr
         else:
             decay += float(row @ row) * circuit.rate
     exchange = np.maximum(np.maximum(math.sqrt(squared), decay), 1e-300)
-    longest = np.minimum(longest, 2.0 * _TAPPED[accuracy] / exchange)
-    return [each._replace(step=min(each.step, own)) for each, own in zip(plans, longest.tolist(), strict=True)]
+    return np.minimum(longest, 2.0 * _TAPPED[accuracy] / exchange)
 
 
 def _serving(plans: Sequence[Plan]) -> Plan:
@@ -442,41 +418,24 @@ def _serving(plans: Sequence[Plan]) -> Plan:
     step = min(each.step for each in plans)
     longest = min(each.step * 0.5**each.min_contact_halvings for each in plans)
     shortest = min(each.step * 0.5**each.max_halvings for each in plans)
-    min_contact_halvings, max_halvings = (math.ceil(math.log2(step / each) - 1e-9) for each in (longest, shortest))
-    return plans[0]._replace(
-        step=step,
-        min_contact_halvings=max(0, min_contact_halvings),
-        max_halvings=max(0, min_contact_halvings, max_halvings),
-        contact=min(each.contact for each in plans),
-    )
+    least, most = (max(0, math.ceil(math.log2(step / each) - 1e-9)) for each in (longest, shortest))
+    return Plan(plans[0].order, step, least, max(least, most), min(each.contact for each in plans))
 
 
 def _plans_of(
-    system: System,
-    integration: Integration,
-    columns: Mapping[str, _Array],
-    section: str = "contact",
-    contact: ContactLaw | None = None,
+    system: System, integration: Integration, columns: Mapping[str, _Array], section: str, contact: ContactLaw | None
 ) -> list[Plan]:
-    """The steps that a contact asks for: that of the first striker, or another one's."""
-    contact = contact or system.contact_law
+    """The steps that a contact asks for, or the beam alone."""
     known = () if contact is None else quantities(type(contact))
     of_contact = {name: columns[at] for name in known if (at := f"{section}.{name}") in columns}
-    step, accuracy = integration.step, integration.accuracy
-    runs = next(iter(columns.values())).size if columns else 1
+    how: dict[str, Any] = {"step": integration.step, "accuracy": integration.accuracy}
     if contact is None or not of_contact:
-        return [choose_base_step(system.struck_model, contact, step=step, accuracy=accuracy)] * runs
-    table = np.stack(list(of_contact.values()), axis=1)
-    different, which = np.unique(table, axis=0, return_inverse=True)
-    plans = [
-        choose_base_step(
-            system.struck_model,
-            dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))),  # type: ignore[type-var]
-            step=step,
-            accuracy=accuracy,
-        )
-        for row in different
+        return [choose_base_step(system.struck_model, contact, **how)] * _runs_of(columns)
+    different, which = np.unique(np.stack(list(of_contact.values()), axis=1), axis=0, return_inverse=True)
+    laws: list[Any] = [
+        dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))) for row in different
     ]
+    plans = [choose_base_step(system.struck_model, law, **how) for law in laws]
     return [plans[i] for i in which.ravel()]
 
 
@@ -491,8 +450,7 @@ def _side(system: System, state: State, goes_on: bool) -> str:
         # the same from call to call, whichever well it comes to
         return "below"
     # measured from the well the beam starts in, so that mirror images are mirrored to the bit
-    first = state.flat[0]
-    return "above" if float(first.amplitude @ system.model.midspan_shape) > 0.0 else "below"
+    return "above" if float(state.flat[0].amplitude @ system.model.midspan_shape) > 0.0 else "below"
 
 
 def _starts(structure: Structure, table: Records, state: State, units: _Array) -> _Array:
@@ -609,7 +567,6 @@ def _decisions(
     if system.striker is not None and structure.wells_are_mirror_images:
         # elsewhere the class also depends on whether the other well is reached
         table["decide_crossings"] = int(cycles / 20.0)
-    table["decide_reach"] = np.maximum(highest, 0.0)
-    if not structure.wells_are_mirror_images:
-        table["decide_reach"] = passed_heights(structure.model, location, highest)
+    equal = structure.wells_are_mirror_images
+    table["decide_reach"] = np.maximum(highest, 0.0) if equal else passed_heights(structure.model, location, highest)
     table["decide_energy"] = decidable_energy(structure.model, location, highest)

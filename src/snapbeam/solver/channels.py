@@ -38,7 +38,7 @@ from snapbeam.model.local_force import (
 from snapbeam.model.quantity import section_of
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
-from snapbeam.solver.excitation import own_columns, side_of, started
+from snapbeam.solver.excitation import carried, own_columns, side_of, started
 from snapbeam.solver.structure import Structure
 from snapbeam.solver.user_laws import UserLaw, contact_law, local_force
 
@@ -238,9 +238,7 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
     for number, contact in enumerate(system.contacts, 1):
         section = section_of("contact", number)
         law, head, names = built.law(contact.law, system.model)
-        uses = {section_of("drive", number): 1.0}
-        if base is not None and not base.striker_on_base:
-            uses["base_excitation"] = -up if contact.striker.side == "below" else up
+        uses = {section_of("drive", number): 1.0, "base_excitation": carried(system, contact.striker)}
         left = None
         if contact.law.memory:
             left = ensemble.starts[table["start_row"], 0, structure.mode_of_indentation(number - 1)]
@@ -269,7 +267,8 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
             built.add(LINEAR_DAMPING, circuit.row, 0, 0.0, {}, [coupling.rate])
         else:
             built.add(CIRCUIT, circuit.row, 0, 0.0, {}, [coupling.rate, 0.0, state[table["start_row"]]])
-    observed = np.array([structure.row_of_beam(row) for row in ensemble.contact_rows])
+    first = ensemble.contact_rows[: 1 + int(table["contact_row"][:, 0].max())]
+    observed = np.array([structure.row_of_beam(row) for row in first])
     built.place(observed, table["contact_row"][:, 0], table["rest_contact"][:, 0])
     return built.built(len(system.contacts), len(structure.circuits))
 

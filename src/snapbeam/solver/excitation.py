@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.components import Motion
 from snapbeam.model.quantity import numbered, split_name
+from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
 
 _Array = NDArray[np.float64]
@@ -41,6 +42,14 @@ def started(
     if len(system.moving) < 2 and "phase" in own:
         return {**own, "phase": phase}, np.zeros(phase.size)
     return dict(own), phase / clock
+
+
+def carried(system: System, striker: Striker) -> float:
+    """Share of the motion of the base in that of a tip, in the frame of the ends and as the tip pushes."""
+    base = system.base_excitation
+    if base is None or base.striker_on_base:
+        return 0.0
+    return -1.0 if (base.direction == "up") == (striker.side == "below") else 1.0
 
 
 def side_of(system: System, section: str, drive: Drive) -> float:

@@ -29,7 +29,7 @@ from scipy.integrate import solve_ivp
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.quantity import section_of
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.excitation import motion_of, side_of, started
+from snapbeam.solver.excitation import carried, motion_of, side_of, started
 from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records, nodes_of
 from snapbeam.solver.statistics import WORKS, OutputStates, Recorded
 from snapbeam.solver.step_size import seconds_of
@@ -111,10 +111,9 @@ class Equations:
         self.contacts, self.since = [], []
         self.state = [APART] * len(system.contacts)
         for j, each in enumerate(system.contacts):
-            side = 1.0 if each.striker.side == "below" else -1.0
             row, offset = ensemble.contact_rows[table["contact_row"][j]], table["offset"][j]
             motion = moves(section_of("drive", j + 1), each.striker.drive)
-            follows = 0.0 if base is None or base.striker_on_base else -side * self.up
+            follows = carried(system, each.striker)
             self.contacts.append(Contact(each.law, row, offset, motion, follows, structure.mode_of_indentation(j)))
             self.since.append(float(table["contact_time"][j]))
 
