@@ -112,17 +112,6 @@ class Channels:
             np.any(self.signals[:, :, 1] * (self.kinds != 1)) or np.any(self.pieces[:, 1:]) or np.any(self.kinds == 2)
         )
 
-    def check(self) -> None:
-        """Raise the first error that a law of a user raised in the core."""
-        for law in self.of_user:
-            for function in law.functions:
-                function.check()
-
-    @property
-    def calls_python(self) -> bool:
-        """True if a law holds the interpreter's lock, so that threads would wait for each other."""
-        return any(function.why_slow for law in self.of_user for function in law.functions)
-
 
 class _Builder:
     """Channels and signals, one after the other."""
