@@ -199,7 +199,9 @@ class _Builder:
             laws=np.array([each[0] for each in self.channels], np.int32),
             contacts=contacts,
             circuits=circuits,
-            uses=np.array([[each[2].get(of, 0.0) for of in sections] for each in self.channels]).reshape(count, len(sections)),
+            uses=np.array([[each[2].get(of, 0.0) for of in sections] for each in self.channels]).reshape(
+                count, len(sections)
+            ),
             signals=np.stack(signals, axis=1) if signals else np.zeros((self.runs, 0, len(SIGNAL))),
             kinds=np.array(kinds, np.int32),
             windows=np.array(windows, np.int32),
