@@ -122,20 +122,17 @@ class Ensemble:
         """-1 for a run that starts in the well away from which the striker pushes, +1 for the other one."""
         moved = np.array([float(start[0] @ self.structure.center) for start in self.starts])
         center = self.runs["well_sign"] * self.runs["rest_center"] + moved[self.runs["start_row"]]
-        side: _Integers = np.where(center - self.structure.dividing_height > 0.0, 1, -1)
-        return side
+        return np.asarray(np.where(center - self.structure.dividing_height > 0.0, 1, -1))
 
     @property
     def work(self) -> _Array:
         """Expected work of each run in flight steps, shape (runs,)."""
-        work: _Array = self.runs["end"] / self.runs["step"]
-        return work
+        return np.asarray(self.runs["end"] / self.runs["step"])
 
     @property
     def step_times(self) -> _Array:
         """Flight step of each run, s."""
-        times: _Array = self.runs["step"] * self.runs["tick"]
-        return times
+        return np.asarray(self.runs["step"] * self.runs["tick"])
 
 
 def run_dtype(contacts: int = 1) -> np.dtype[Any]:

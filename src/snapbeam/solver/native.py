@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snapbeam import _core
 from snapbeam.model.matrix_pairs import coupled_blocks
-from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP, Channels
+from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP
 from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.solver.statistics import (
     OF_CONTACT,
@@ -46,6 +46,7 @@ STATUS = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED, RunStatus.D
 """Status of a run by its number in the core."""
 OF_SAMPLE, CHANNEL_SAMPLE = 3, 6
 """Numbers of a sample, and of each channel in it."""
+_WORKS = {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work", LINEAR_DAMPING: "dissipated"}
 FEW_MODES = 16
 """Modes up to which runs are integrated side by side."""
 _MOST_TICKS = 2.0**52
@@ -286,21 +287,17 @@ class _Arrays:
                 [of[name][:, self.circuits] for name in ("lost", "late_lost", "peak_force")], axis=2
             )
         found["gross_work"] = of["gross_work"].sum(axis=1)
-        for j, law in enumerate(channels.laws.tolist()):
-            if j < channels.contacts or j in self.circuits:
-                continue
-            if law == LINEAR_DAMPING:  # of the structure
-                found["dissipated"] += self.batch["account"] * of["lost"][:, j]
-            else:
-                found[_work_of(law)] += of["work"][:, j] - of["lost"][:, j]
-        if self.batch["account"]:
+        account = self.batch["account"]
+        for j, name in self.works():
+            found[name] += account * of["lost"][:, j] if name == "dissipated" else of["work"][:, j] - of["lost"][:, j]
+        if account:
             found["dissipated"] += found["lost"]
         return found
 
-
-def _work_of(law: int) -> str:
-    """The accumulator of the work of a channel that is no contact."""
-    return {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work"}.get(law, "local_force_work")
+    def works(self) -> list[tuple[int, str]]:
+        """Channels that are no contacts or circuits, and the accumulators of what they do."""
+        first, last = self.channels.contacts, self.channels.laws.size - self.channels.circuits
+        return [(j, _WORKS.get(int(self.channels.laws[j]), "local_force_work")) for j in range(first, last)]
 
 
 def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) -> None:
@@ -489,82 +486,52 @@ def record(
     ensemble: Ensemble, times: _Array, in_contact: bool, progress: Callable[[float], object] | None = None
 ) -> Iterator[Recorded]:
     """Integrate the one run of an ensemble once, and return its records, one part after the other."""
-    return Recording(ensemble, times, in_contact).pieces(progress)
+    arrays = _Arrays(ensemble)
+    n, channels = arrays.order.size, arrays.channels
+    arrays.batch["account"], count = 1, channels.laws.size
+    arrays.hand_out_end()
+    # one step may hold many instants
+    span, most = 2.0 * float(ensemble.step_times[0]), 0
+    for begin in range(0, times.size, _SAMPLES):  # a signal is heard between the parts
+        part = times[begin : begin + _SAMPLES]
+        found = np.searchsorted(times, part + span, side="right") - np.arange(begin, begin + part.size)
+        most = max(most, int(found.max()))
+    width = OF_SAMPLE + CHANNEL_SAMPLE * count
+    samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // (2 * n + width)), most + 8)
+    saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(OF_CORE) + 6 * channels.kinds.size + 32) * 8
+    marks = np.zeros(5, dtype=np.dtype("l"))
+    recorder: dict[str, Any] = {
+        "times": np.ascontiguousarray(times, dtype=float), "in_contact": int(in_contact), "rows": np.empty((samples, 2 * n)),
+        "values": np.empty((samples, width)), "impacts": np.empty((_IMPACTS + count, 5)), "marks": marks,
+        "saved": np.zeros(saved), "budget": _BUDGET,
+    }  # fmt: skip
+    layout = os.environ.get("SNAPBEAM_LAYOUT") or ("modes" if n > FEW_MODES else "thread")
+    running = True
+    while running:
+        _core.record(arrays.problem, arrays.batch, recorder, layout, instruction_set())
+        arrays.check()
+        piece = _recorded(arrays, recorder)
+        running = piece.accumulators_of_runs["status"][0] == RunStatus.INTERRUPTED
+        yield piece
+        if progress is not None:
+            progress(float(piece.accumulators_of_runs["time"][0]) / float(ensemble.runs["end"][0]))
+        marks[1] = marks[2] = 0
 
 
-class Recording:
-    """The one run of an ensemble, ready to be integrated any number of times."""
-
-    def __init__(self, ensemble: Ensemble, times: _Array, in_contact: bool) -> None:
-        self.arrays = arrays = _Arrays(ensemble)
-        n = arrays.order.size
-        channels: Channels = arrays.channels
-        arrays.batch["account"], count = 1, channels.laws.size
-        arrays.hand_out_end()
-        # one step may hold many instants
-        span = 2.0 * float(ensemble.step_times[0])
-        most = 0
-        for begin in range(0, times.size, _SAMPLES):  # a signal is heard between the parts
-            part = times[begin : begin + _SAMPLES]
-            found = np.searchsorted(times, part + span, side="right") - np.arange(begin, begin + part.size)
-            most = max(most, int(found.max()))
-        width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
-        samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // width), most + 8)
-        saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(OF_CORE) + 6 * channels.kinds.size + 32) * 8
-        self.recorder: dict[str, Any] = {
-            "times": np.ascontiguousarray(times, dtype=float),
-            "in_contact": int(in_contact),
-            "rows": np.empty((samples, 2 * n)),
-            "values": np.empty((samples, OF_SAMPLE + CHANNEL_SAMPLE * count)),
-            "impacts": np.empty((_IMPACTS + count, 5)),
-            "marks": np.zeros(5, dtype=np.dtype("l")),
-            "saved": np.zeros(saved),
-            "budget": _BUDGET,
-        }
-        self.layout = os.environ.get("SNAPBEAM_LAYOUT") or ("modes" if n > FEW_MODES else "thread")
-        self.set = instruction_set()
-
-    def pieces(self, progress: Callable[[float], object] | None = None) -> Iterator[Recorded]:
-        """Integrate the run from its beginning, and return its records, one part after the other."""
-        arrays, recorder = self.arrays, self.recorder
-        arrays.begin()
-        arrays.batch["states"].fill(np.nan)
-        marks = recorder["marks"]
-        marks.fill(0)
-        while True:
-            _core.record(arrays.problem, arrays.batch, recorder, self.layout, self.set)
-            arrays.check()
-            accumulators = arrays.accumulators()
-            held, impacts = int(marks[1]), int(marks[2])
-            running = accumulators["status"][0] == RunStatus.INTERRUPTED
-            yield _recorded(arrays, recorder, held, impacts, accumulators)
-            if progress is not None:
-                progress(float(accumulators["time"][0]) / float(arrays.ensemble.runs["end"][0]))
-            if not running:
-                return
-            marks[1] = marks[2] = 0
-
-
-def _recorded(arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: Records) -> Recorded:
-    channels = arrays.channels
-    rows, values = recorder["rows"][:held], recorder["values"][:held]
+def _recorded(arrays: _Arrays, recorder: Any) -> Recorded:
+    """The piece of a run that a recorder holds; its state is not finite if the run diverged."""
+    channels, (held, impacts) = arrays.channels, recorder["marks"][1:3].tolist()
+    values, table = recorder["values"][:held], recorder["impacts"][:impacts]
     own = values[:, OF_SAMPLE:].reshape(held, channels.laws.size, CHANNEL_SAMPLE)
-    q, p = arrays.modes_of(rows, own[:, :, 5])
-    contacts, others = own[:, : channels.contacts], own[:, channels.contacts :]
+    q, p = arrays.modes_of(recorder["rows"][:held], own[:, :, 5])
+    contacts = own[:, : channels.contacts]
     found = np.zeros((held, len(SAMPLED) + arrays.circuits.size))
-    lost = contacts[:, :, 4].sum(axis=1)
-    found[:, :5] = np.stack(
-        (values[:, 1], contacts[:, :, 2].sum(axis=1), contacts[:, :, 3].sum(axis=1), values[:, 2] + lost, lost), axis=1
-    )
+    stored, work, lost = contacts[:, :, 2:5].sum(axis=1).T
+    found[:, :5] = np.stack((values[:, 1], stored, work, values[:, 2] + lost, lost), axis=1)
     found[:, len(SAMPLED) :] = own[:, arrays.circuits, 4]
-    for j, law in enumerate(channels.laws[channels.contacts :].tolist()):
-        if channels.contacts + j in arrays.circuits:
-            continue
-        if law == LINEAR_DAMPING:
-            found[:, SAMPLED.index("dissipated")] += others[:, j, 4]
-            continue
-        found[:, SAMPLED.index(_work_of(law))] += others[:, j, 3] - others[:, j, 4]
-    table = recorder["impacts"][:impacts]
+    for j, name in arrays.works():
+        found[:, SAMPLED.index(name)] += own[:, j, 4] if name == "dissipated" else own[:, j, 3] - own[:, j, 4]
     table = np.concatenate((table[:, 1:], table[:, :1] + 1.0), axis=1) if channels.contacts > 1 else table[:, 1:].copy()
     last = Last(*(each[0, 0] for each in arrays.states()))
+    accumulators = arrays.accumulators()
     return Recorded(values[:, 0].copy(), q, p, contacts[:, :, :2].copy(), found, table, accumulators, last)

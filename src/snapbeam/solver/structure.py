@@ -141,7 +141,7 @@ class Structure:
 
         *sign* is +1 if it pushes as the first one does.
         """
-        row: _Array = sign * self.sign * (self.model.linear_modes.T @ shape)
+        row = np.asarray(sign * self.sign * (self.model.linear_modes.T @ shape))
         own = [-1.0 / math.sqrt(each.mass) if each.contact == contact else 0.0 for each in self.bodies]
         return np.concatenate((row, own, np.zeros(self.omega.size - row.size - len(own))))
 
@@ -236,13 +236,11 @@ class Structure:
 
     def amplitudes(self, q: _Array) -> _Array:
         """alpha of q of shape (..., N) about the well."""
-        alpha: _Array = self.equilibrium + q[..., : self.equilibrium.size] @ self.model.linear_modes.T
-        return alpha
+        return np.asarray(self.equilibrium + q[..., : self.equilibrium.size] @ self.model.linear_modes.T)
 
     def velocities(self, p: _Array) -> _Array:
         """Velocities of alpha, of p of shape (..., N)."""
-        velocity: _Array = p[..., : self.equilibrium.size] @ self.model.linear_modes.T
-        return velocity
+        return np.asarray(p[..., : self.equilibrium.size] @ self.model.linear_modes.T)
 
     @cached_property
     def hash(self) -> str:
