@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import HORIZON, Drive
 from snapbeam.model.early_termination import decidable_energy, passed_heights
 from snapbeam.model.integration import Integration
@@ -346,7 +345,9 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
 
     A striker with a mass meets the beam for a shorter time, as the two masses together do: m_s m/(m_s + m).
     """
-    laws = [(section_of("contact", number), each.law) for number, each in enumerate(system.contacts, 1)]
+    laws: list[tuple[str, Any]] = [
+        (section_of("contact", number), each.law) for number, each in enumerate(system.contacts, 1)
+    ]
     of_contacts = [_plans_of(system, integration, columns, *each) for each in laws or [("contact", None)]]
     plans = [each[0] if len(each) == 1 else _serving(each) for each in zip(*of_contacts, strict=True)]
     if integration.step is None:
@@ -423,18 +424,16 @@ def _serving(plans: Sequence[Plan]) -> Plan:
 
 
 def _plans_of(
-    system: System, integration: Integration, columns: Mapping[str, _Array], section: str, contact: ContactLaw | None
+    system: System, integration: Integration, columns: Mapping[str, _Array], section: str, contact: Any
 ) -> list[Plan]:
-    """The steps that a contact asks for, or the beam alone."""
+    """The steps that a contact law asks for, or the beam alone, None."""
     known = () if contact is None else quantities(type(contact))
     of_contact = {name: columns[at] for name in known if (at := f"{section}.{name}") in columns}
     how: dict[str, Any] = {"step": integration.step, "accuracy": integration.accuracy}
     if contact is None or not of_contact:
         return [choose_base_step(system.struck_model, contact, **how)] * _runs_of(columns)
     different, which = np.unique(np.stack(list(of_contact.values()), axis=1), axis=0, return_inverse=True)
-    laws: list[Any] = [
-        dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))) for row in different
-    ]
+    laws = [dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))) for row in different]
     plans = [choose_base_step(system.struck_model, law, **how) for law in laws]
     return [plans[i] for i in which.ravel()]
 

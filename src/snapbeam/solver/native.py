@@ -180,7 +180,7 @@ class _Arrays:
         """Make room for the state at the end of each run."""
         self.hand_out(1, self.batch["run"][:, RUN.index("end")])
 
-    def states(self) -> tuple[_Array, _Array, _Array, _Array]:
+    def states(self) -> tuple[Any, ...]:
         """q, p, wells and contact ticks of the states handed out, shape (runs, outputs, ...)."""
         found, contacts, n = self.batch["states"], self.channels.contacts, self.order.size
         q, p = self.modes_of(found, found[..., 2 * n + 1 + self.channels.laws.size :])

@@ -183,8 +183,8 @@ def _rms(of: str) -> Callable[[Reading], Values]:
 
 def _response(reading: Reading) -> Values:
     kept, ensemble = reading.accumulators, reading.ensemble
-    counts = (kept[name] for name in ("zero_crossings", "zero_crossings_last_quarter"))
-    kinds = class_of(*counts, ensemble.cycles, -ensemble.first_side * kept["side"])
+    all_crossings, late = kept["zero_crossings"], kept["zero_crossings_last_quarter"]
+    kinds = class_of(all_crossings, late, ensemble.cycles, -ensemble.first_side * kept["side"])
     structure = ensemble.structure
     if not (structure.model.is_bistable and structure.wells_are_mirror_images and ensemble.has_striker):
         # the paper's rule is for equal wells and a striker; here the centre may cross far from the other well
