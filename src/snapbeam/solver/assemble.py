@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import HORIZON, Drive
-from snapbeam.model.early_termination import decidable_energy, passed_heights
+from snapbeam.model.early_termination import decidable_energy
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import numbered, quantities, section_of, split_name
@@ -225,11 +225,8 @@ def make_ensemble(
     starts = _starts(structure, table, state, units)
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
     rows = _place(system, structure, state, columns, table, starts, clock)
-    location = columns.get("contact.location", np.full(runs, 0.5))
-    highest = table["rest_contact"][:, 0] + table["offset"][:, 0] + highest_of(system, columns, runs)
     cycles = clocked(table, system, integration, cycles_of(system, columns), plans, periods)
     _require_record(system, table, clock)
-    _decisions(table, system, structure, integration, cycles, location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
     ensemble = Ensemble(
         structure=structure,
@@ -238,8 +235,8 @@ def make_ensemble(
         runs=table,
         clock=clock,
         comes_round=len(system.moving) < 2 and all(drive.is_periodic for _, drive in system.moving),
-        location=location,
-        highest=highest,
+        location=columns.get("contact.location", np.full(runs, 0.5)),
+        highest=table["rest_contact"][:, 0] + table["offset"][:, 0] + highest_of(system, columns, runs),
         contact_rows=rows,
         starts=starts,
         max_steps=most_steps(integration, system.model.modes),
@@ -249,6 +246,7 @@ def make_ensemble(
         contacts=len(system.contacts),
         impulsive=any(each.law.impulsive for each in system.contacts),
     )
+    _decide(ensemble, system, integration)
     if integration.engine == "python":
         return dataclasses.replace(ensemble, systems=_systems(system, points or {}, runs))
     return dataclasses.replace(ensemble, channels=channels_of(system, ensemble, columns))
@@ -550,22 +548,14 @@ def _circuits(system: System, columns: Mapping[str, _Array], runs: int) -> tuple
     return tuple(found)
 
 
-def _decisions(
-    table: Records,
-    system: System,
-    structure: Structure,
-    integration: Integration,
-    cycles: float,
-    location: _Array,
-    highest: _Array,
-) -> None:
+def _decide(ensemble: Ensemble, system: System, integration: Integration) -> None:
     """Set the criteria of early termination of each run: crossings, energy and reach of the tip."""
+    table, structure = ensemble.runs, ensemble.structure
     table["decide_crossings"], table["decide_energy"] = -1, -math.inf
     if not integration.early_termination or len(system.contacts) > 1 or system.local_forces:
         return
     if system.striker is not None and structure.wells_are_mirror_images:
         # elsewhere the class also depends on whether the other well is reached
-        table["decide_crossings"] = int(cycles / 20.0)
-    equal = structure.wells_are_mirror_images
-    table["decide_reach"] = np.maximum(highest, 0.0) if equal else passed_heights(structure.model, location, highest)
-    table["decide_energy"] = decidable_energy(structure.model, location, highest)
+        table["decide_crossings"] = int(ensemble.cycles / 20.0)
+    table["decide_reach"] = ensemble.reach
+    table["decide_energy"] = decidable_energy(structure.model, ensemble.location, ensemble.highest)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Scale
+from snapbeam.model.early_termination import passed_heights
 from snapbeam.solver.structure import Structure
 
 _REALS = (
@@ -106,6 +107,13 @@ class Ensemble:
     def circuit_rates(self) -> _Array:
         """Rates of loss, shape (runs, circuits)."""
         return np.array([each.rate for each in self.circuits]).reshape(len(self.circuits), self.size).T.copy()
+
+    @property
+    def reach(self) -> _Array:
+        """Displacement that the first contact point must pass so that the tip never meets it again, m; shape (runs,)."""
+        if self.structure.wells_are_mirror_images:
+            return np.maximum(self.highest, 0.0)
+        return passed_heights(self.structure.model, self.location, self.highest)
 
     @property
     def has_striker(self) -> bool:

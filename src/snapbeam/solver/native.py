@@ -15,16 +15,7 @@ from snapbeam import _core
 from snapbeam.model.matrix_pairs import coupled_blocks
 from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP
 from snapbeam.solver.ensemble import Ensemble, Records
-from snapbeam.solver.statistics import (
-    OF_CONTACT,
-    OF_CORE,
-    SAMPLED,
-    Last,
-    OutputStates,
-    Recorded,
-    empty_accumulators,
-    updated,
-)
+from snapbeam.solver.statistics import OF_CONTACT, OF_CORE, SAMPLED, OutputStates, Recorded, empty_accumulators, updated
 from snapbeam.solver.step_size import CALM, PARTS, barrier_of, composition_of
 from snapbeam.solver.user_laws import Function, updates_of
 from snapbeam.util.cores import instruction_set, usable_cores
@@ -185,7 +176,7 @@ class _Arrays:
         found, contacts, n = self.batch["states"], self.channels.contacts, self.order.size
         q, p = self.modes_of(found, found[..., 2 * n + 1 + self.channels.laws.size :])
         ticks = found[..., 2 * n + 1 : 2 * n + 1 + contacts] if contacts else np.full((*found.shape[:2], 1), -1.0)
-        return q, p, found[..., 2 * n], np.where(ticks > 0.0, ticks / self.finer, ticks)
+        return q, p, found[..., 2 * n].copy(), np.where(ticks > 0.0, ticks / self.finer, ticks)
 
     def begin(self) -> None:
         """Outputs as they are before a run."""
@@ -532,6 +523,5 @@ def _recorded(arrays: _Arrays, recorder: Any) -> Recorded:
     for j, name in arrays.works():
         found[:, SAMPLED.index(name)] += own[:, j, 4] if name == "dissipated" else own[:, j, 3] - own[:, j, 4]
     table = np.concatenate((table[:, 1:], table[:, :1] + 1.0), axis=1) if channels.contacts > 1 else table[:, 1:].copy()
-    last = Last(*(each[0, 0] for each in arrays.states()))
-    accumulators = arrays.accumulators()
-    return Recorded(values[:, 0].copy(), q, p, contacts[:, :, :2].copy(), found, table, accumulators, last)
+    at, pressed = values[:, 0].copy(), contacts[:, :, :2].copy()
+    return Recorded(at, q, p, pressed, found, table, arrays.accumulators(), arrays.states())

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.statistics import CIRCUIT_PEAK, SAMPLED, WORKS, Last, Recorded, empty_accumulators
+from snapbeam.solver.statistics import CIRCUIT_PEAK, SAMPLED, WORKS, Recorded, empty_accumulators
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
@@ -162,5 +162,5 @@ class Records:
             for each, shape in zip(columns, ((), (n,), (n,), (count, 2), (width,)), strict=True)
         )
         impacts = np.array(self.impacts).reshape(-1, 5)[:, : 5 if len(self.eq.state) > 1 else 4]
-        last = Last(self.s[:n], self.s[n : 2 * n], 1, np.array(self.lasting()))
+        last = tuple(np.array(each)[None, None] for each in (self.s[:n], self.s[n : 2 * n], 1.0, self.lasting()))
         return Recorded(at, q, p, contacts, values, impacts, self.found, last)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.early_termination import crossing_energy, decidable_energy, passed_heights
+from snapbeam.model.early_termination import crossing_energy, decidable_energy
 from snapbeam.model.extension import takes
 from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
@@ -557,10 +557,7 @@ class Reading:
         settled = self.good & (accumulators["energy"] < crossing_energy(model) - model.well_energy)
         if not (ensemble.highest > -np.inf).any():
             return np.asarray(settled)
-        reach = np.maximum(ensemble.highest, 0.0)
-        if not ensemble.structure.wells_are_mirror_images:
-            reach = passed_heights(model, ensemble.location, ensemble.highest)
-        away = settled & (accumulators["side"] > 0) & (accumulators["displacement"] > reach)
+        away = settled & (accumulators["side"] > 0) & (accumulators["displacement"] > ensemble.reach)
         away &= accumulators["center"] > ensemble.structure.dividing_height
         which = np.flatnonzero(away)
         if which.size:
@@ -595,17 +592,6 @@ class OutputStates(NamedTuple):
     """Ticks since the present contact of each striker began, -1: apart, shape (runs, output states, strikers)."""
 
 
-class Last(NamedTuple):
-    """Final state of a recorded run."""
-
-    q: _Array
-    """Linear modes about the current well, shape (N,)."""
-    p: _Array
-    well_sign: int
-    contact_ticks: NDArray[np.int64]
-    """Contact ticks of each striker, shape (strikers,)."""
-
-
 class Recorded(NamedTuple):
     """A piece of a recorded run."""
 
@@ -622,7 +608,8 @@ class Recorded(NamedTuple):
     """Onset, duration, peak force and impulse of each impact that ended, shape (impacts, 4)."""
     accumulators_of_runs: Records
     """The run's record of accumulators as it is at the end of the piece, shape (1,)."""
-    last: Last
+    last: tuple[Any, ...]
+    """State at its end: what :class:`OutputStates` holds of one run and one time."""
 
     def at(self, which: Any) -> Recorded:
         """Some of the samples."""
