@@ -104,11 +104,6 @@ class Ensemble:
     """The :class:`~snapbeam.System` of each run, for the Python engine."""
 
     @property
-    def circuit_rates(self) -> _Array:
-        """Rates of loss, shape (runs, circuits)."""
-        return np.array([each.rate for each in self.circuits]).reshape(len(self.circuits), self.size).T.copy()
-
-    @property
     def reach(self) -> _Array:
         """Displacement that the first contact point must pass so that the tip never meets it again, m; shape (runs,)."""
         if self.structure.wells_are_mirror_images:

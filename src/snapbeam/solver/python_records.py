@@ -43,7 +43,7 @@ class Records:
         self.loads = [False] * count
         """True for each contact with a memory whose law is on the way that changes the memory, not below it."""
         self.peaks, self.largest, self.hits = [0.0] * count, [0.0] * count, [0] * count
-        for j, since in enumerate(eq.since):
+        for j, since in enumerate(table["contact_time"][:count].tolist()):
             d, rate, numbers = eq.contact(j, 0.0, s)
             if d > 0.0:
                 eq.state[j] = PRESSING if eq.pressure(j, d, rate, numbers) > 0.0 else LOOSE
@@ -94,11 +94,8 @@ class Records:
         # the energy of the modes is counted from the well on whose side mid-span is
         far = (heights[1, : nodes.size] > self.level) & (structure.stretch > 0.0)
         q = inside[:n] - np.where(far, self.second_well[:, None], 0.0)
-        energies = (
-            0.5
-            * (inside[n : 2 * n] ** 2 + (eq.omega[:, None] * q) ** 2)
-            * (np.arange(n) < structure.equilibrium.size)[:, None]
-        )
+        energies = 0.5 * (inside[n : 2 * n] ** 2 + (eq.omega[:, None] * q) ** 2)
+        energies[structure.equilibrium.size :] = 0.0
         found["energy_time"] += weights @ energies.sum(axis=0)
         found["high_energy_time"] += weights @ energies[structure.high_modes(self.ensemble.high_omega)].sum(axis=0)
         if eq.circuits:
@@ -114,10 +111,8 @@ class Records:
             asked = np.union1d(asked, part.t[1:])
         for t, s in zip(asked.tolist(), part.sol(asked).T if asked.size else (), strict=True):
             pressed = [(eq.contact(j, t, s)[0], self.force(j, t, s)) for j in range(len(eq.contacts))]
-            sums, works = (
-                s[2 * n : 2 * n + len(SUMS)],
-                s[self.impulse(0) + 1 : self.impulse(len(eq.contacts)) : 2].sum(),
-            )
+            sums = s[2 * n : 2 * n + len(SUMS)]
+            works = s[self.impulse(0) + 1 : self.impulse(len(eq.contacts)) : 2].sum()
             stored = sum(eq.stored(j, t, s) for j in touching)
             values = (eq.energy(s), stored, works, sums[0] + sums[1], sums[0], *sums[3:])
             self.samples.append((t, s[:n], s[n : 2 * n], pressed, (*values, *s[s.size - len(eq.circuits) :])))
