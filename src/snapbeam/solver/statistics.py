@@ -69,10 +69,10 @@ OF_CORE = (
     "peak_midspan_velocity", "square_displacement", "square_center", "square_velocity", "square_midspan_velocity",
     "energy_time", "high_energy_time", "dissipated", "first_energy", "energy", "displacement", "center", "early_stop_time",
 )  # fmt: skip
-"""What the core counts of a run, as in ``core/api.hpp: Statistic``: the time in ticks; sides are -1 in the well that a run
+"""Counts of the core for a run, as in ``core/api.hpp: Statistic``: the time in ticks; sides are -1 in the well that a run
 begins in; squares and energies of modes are integrals over time; the last energy has that of contacts."""
 _KEPT = (*OF_CORE, "impacts", "peak_force", "contact_time", "total_impulse", "work", "gross_work", "lost", *WORKS)
-"""What every engine keeps of a run: the same and that of all channels."""
+"""Accumulators of every engine for a run: the same and those of all channels."""
 _COUNTED = frozenset(OF_CORE[:5]) | {"steps", "trials", "sampled_steps", "impacts"}
 _AT_START = {"status": float(RunStatus.NOT_RUN), "last_zero_crossing": math.nan, "early_stop_time": math.nan}
 """Values at the start that are not 0."""
