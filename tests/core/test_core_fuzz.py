@@ -260,13 +260,14 @@ def test_marks_beyond_the_records_are_refused(at, bad):
 
 def test_what_is_written_shares_no_memory():
     fresh = arrays(struck(2), 1, POINTS)
-    fresh.batch["statistics"] = fresh.batch["run"].reshape(-1)[:1]
+    run = fresh.batch["run"]
+    fresh.batch["statistics"] = run.reshape(-1)[:1]
     memory = np.zeros(10_000)
     for name in ("run", "statistics"):
         value = arrays(struck(2), 1, POINTS).batch[name]
         memory[: value.size] = value.reshape(-1)
         fresh.batch[name] = memory[: value.size].reshape(value.shape)
-    memory[: fresh.run.size] = fresh.run.reshape(-1)
+    memory[: run.size] = run.reshape(-1)
     with pytest.raises(ValueError, match=r"batch\['statistics'\] must not share memory"):
         _core.integrate(fresh.problem, fresh.batch, "runs", "", 1, None)
 

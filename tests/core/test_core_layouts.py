@@ -32,7 +32,7 @@ def same(one, other, rows=slice(None)):
 def test_lanes_of_runs_and_single_runs_have_the_same_bits(made, modes, which):
     whole = integrated(made(modes), "runs", which)
     assert same(integrated(made(modes), "thread", which), whole)
-    assert (whole[0][:, native.STATISTICS.index("status")] == 0).all()
+    assert (whole[0][:, native.OF_CORE.index("status")] == 0).all()
 
 
 @pytest.mark.parametrize("layout", ["runs", "modes", "thread"])
@@ -54,7 +54,7 @@ def test_layouts_agree_within_rounding(modes, which):
         layout: integrated(struck(modes), layout, which, points=RATIOS[:3]) for layout in ("runs", "modes", "thread")
     }
     columns = [
-        native.STATISTICS.index(name)
+        native.OF_CORE.index(name)
         for name in ("max_displacement", "min_center", "energy", "dissipated", "square_velocity")
     ]
     for layout in ("runs", "modes"):

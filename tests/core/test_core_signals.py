@@ -84,7 +84,7 @@ def test_lanes_of_runs_and_single_runs_have_the_same_bits(modes):
         found[layout] = own.batch["statistics"], own.batch["of_channels"]
     for one, other in zip(found["runs"], found["thread"], strict=True):
         assert np.array_equal(one, other, equal_nan=True)
-    assert (found["runs"][0][:, native.STATISTICS.index("status")] == 0).all()
+    assert (found["runs"][0][:, native.OF_CORE.index("status")] == 0).all()
     assert (found["runs"][1][:, :3, native.OF_CHANNEL.index("impacts")].sum(axis=0) > 0).any()
 
 

@@ -229,7 +229,7 @@ def moved(system: sb.System, size: float | None, times: np.ndarray) -> np.ndarra
     ensemble = make_ensemble(system, sb.Integration(cycles=1))
     ensemble = ensemble if size is None else _perturbed(ensemble, system, size)
     recorded = joined(list(native.record(ensemble, times, False)))
-    return recorded.contacts[:, 0, 0] + recorded.q @ ensemble.contact_rows[0] - float(ensemble.runs["offset"][0])
+    return recorded.contacts[:, 0, 0] + recorded.q @ ensemble.contact_rows[0] - float(ensemble.runs["offset"][0, 0])
 
 
 @pytest.mark.parametrize("name", MOTIONS)

@@ -70,7 +70,7 @@ def test_ticks_make_whole_periods() -> None:
 
 def test_the_tip_touches_unless_a_gap_is_given() -> None:
     def offset(**changes) -> float:
-        return float(make_ensemble(SYSTEM.replace(**changes), sb.Integration(cycles=1)).runs["offset"][0])
+        return float(make_ensemble(SYSTEM.replace(**changes), sb.Integration(cycles=1)).runs["offset"][0, 0])
 
     assert offset() == 0.0
     stroke = 0.18 / 1.21 * default_values.BEAM.buckling_level
@@ -82,7 +82,7 @@ def test_the_tip_touches_unless_a_gap_is_given() -> None:
         struck = SYSTEM.replace(**given)
         rest = sign * float(MODEL.shape_at(default_values.LOCATION) @ MODEL.well_amplitude)
         placed = struck.replace(**{"initial_state.striker_position": rest - sign * 2e-5})
-        found = make_ensemble(placed, sb.Integration(cycles=1)).runs["offset"][0]
+        found = make_ensemble(placed, sb.Integration(cycles=1)).runs["offset"][0, 0]
         assert found == pytest.approx(-2e-5, rel=1e-9), side
 
 
@@ -103,9 +103,9 @@ def test_an_ensemble_holds_no_layout() -> None:
     assert ensemble.structure.omega.shape == (5,)
     assert ensemble.starts.shape == (1, 2, 5)
     assert ensemble.contact_rows.shape == (2, 5)
-    assert ensemble.runs["contact_row"].tolist() == [0, 1, 0]
+    assert ensemble.runs["contact_row"].tolist() == [[0], [1], [0]]
     for i, location in enumerate((0.3, 0.4, 0.3)):
-        row = ensemble.contact_rows[ensemble.runs["contact_row"][i]]
+        row = ensemble.contact_rows[ensemble.runs["contact_row"][i, 0]]
         np.testing.assert_array_equal(row, MODEL.linear_modes.T @ MODEL.shape_at(location))
 
 

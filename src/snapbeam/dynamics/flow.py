@@ -126,7 +126,7 @@ def held_in_space(system: System) -> System:
     if system.striker is None:
         return system
     offset, without_gap = (
-        float(make_ensemble(each, Integration()).runs["offset"][0])
+        float(make_ensemble(each, Integration()).runs["offset"][0, 0])
         for each in (system, system.replace(**{"contact.gap": 0.0, "initial_state": None}))
     )
     held = system.replace(**{"contact.gap": without_gap - offset})

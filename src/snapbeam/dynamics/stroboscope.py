@@ -144,7 +144,7 @@ class Stroboscope:
             return math.nan
         ensemble = make_ensemble(self.system, self.integration)
         run, sign = ensemble.runs[0], ensemble.structure.sign
-        return float(sign * (run["rest_contact"] + run["offset"]))
+        return float(sign * (run["rest_contact"][0] + run["offset"][0]))
 
     def advance(
         self,

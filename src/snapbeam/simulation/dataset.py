@@ -208,16 +208,16 @@ def strikers_of(ensemble: Ensemble, system: System, recorded: Recorded, first: _
 
     *first* is the displacement of the first tip, over b; those of the others follow from their motions.
     """
-    others, length = ensemble.others, system.scale.length
-    assert others is not None
+    structure, run, length = ensemble.structure, ensemble.runs[0], system.scale.length
     tip = np.zeros((recorded.times.size, len(system.contacts)))
     tip[:, 0] = first
     follows = _follows(ensemble, system, recorded)
-    for j, sign in enumerate(others.signs):
-        row = others.rows[others.places[0, j]]
-        motion = tip_of(ensemble, system, j + 2, recorded.times) + sign * follows
-        motion -= recorded.q @ (row - ensemble.structure.row_of_beam(row))  # of a striker with mass its own
-        tip[:, j + 1] = ensemble.structure.sign * sign * (others.rest[0, j] + others.offset[0, j] + motion) / length
+    for j in range(1, len(system.contacts)):
+        upward = 1.0 if system.contacts[j].striker.side == "below" else -1.0
+        row = ensemble.contact_rows[run["contact_row"][j]]
+        motion = tip_of(ensemble, system, j + 1, recorded.times) + upward * structure.sign * follows
+        motion -= recorded.q @ (row - structure.row_of_beam(row))  # of a striker with mass its own
+        tip[:, j] = upward * (run["rest_contact"][j] + run["offset"][j] + motion) / length
     return {
         "striker_forces": recorded.contacts[:, :, 1],
         "striker_penetrations": recorded.contacts[:, :, 0] / length,
@@ -321,7 +321,7 @@ def run_dataset(
         variables["energy_striker"] = own
     variables["energy_dissipated"] = values[:, _COLUMN["dissipated"]]
     variables |= _around(ensemble, system, recorded, values)
-    if ensemble.others is not None:
+    if ensemble.contacts > 1:
         variables |= strikers_of(ensemble, system, recorded, variables["striker_displacement"])
     if ensemble.circuits:
         variables |= _harvested(ensemble, recorded, values)

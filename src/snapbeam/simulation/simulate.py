@@ -342,11 +342,8 @@ def end_state(ensemble: Ensemble, recorded: Recorded, summary: RunSummary) -> St
     """Return the state at the end of a run; None if the run failed."""
     if summary.status not in _ENDED:
         return None
-    last, time = recorded.last, int(recorded.accumulators_of_runs["time"][0])
-    states = states_of(
-        ensemble, last.q[None], last.p[None], np.array([last.well_sign]), last.contact_ticks[None], np.array([time])
-    )
-    return states[0]
+    q, p, well_sign, contact_ticks = (each[:, 0] for each in recorded.last)
+    return states_of(ensemble, q, p, well_sign, contact_ticks, recorded.accumulators_of_runs["time"])[0]
 
 
 @overload

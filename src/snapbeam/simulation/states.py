@@ -29,7 +29,7 @@ def states_of(
     *q* and *p*, of shape (runs, N), are coordinates of the linear modes about the well *well_sign*; *contact_ticks*, of
     shape (runs, strikers), is the time since each contact began, and *ticks* the time, in ticks.
     """
-    structure, runs = ensemble.structure, ensemble.runs
+    structure, runs, offset = ensemble.structure, ensemble.runs, ensemble.runs["offset"][:, 0]
     far = (well_sign < 0)[:, None]
     first = np.where(far, q + structure.shift, q)
     # the phase of a periodic drive is reduced to one period
@@ -39,13 +39,11 @@ def states_of(
         amplitude=structure.amplitudes(first),
         velocity=structure.velocities(p),
         phase=runs["phase"] + 2.0 * math.pi * turned,
-        striker_position=np.where(
-            runs["offset"] > FAR_AWAY, structure.sign * (runs["rest_contact"] + runs["offset"]), np.nan
-        ),
+        striker_position=np.where(offset > FAR_AWAY, structure.sign * (runs["rest_contact"][:, 0] + offset), np.nan),
         contact_time=np.where(contact_ticks < 0, -1.0, contact_ticks * tick[:, None]),
         striker_shift=structure.bodies_of(q),
         striker_rate=structure.bodies_of(p),
         indentation=structure.indentations_of(q),
         circuit=structure.circuits_of(q) * _units(ensemble),
-        modal=ModalState(q, p, well_sign.astype(np.float64), np.array(runs["offset"]), structure.hash),
+        modal=ModalState(q, p, well_sign.astype(np.float64), offset.copy(), structure.hash),
     )

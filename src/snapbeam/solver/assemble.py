@@ -5,71 +5,28 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.contact.base import ContactLaw
-from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.drive.base import HORIZON, Drive
-from snapbeam.model.early_termination import decidable_energy, passed_heights
+from snapbeam.model.early_termination import decidable_energy
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import numbered, quantities, section_of, split_name
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.solver.channels import channels_of
-from snapbeam.solver.ensemble import FAR_AWAY, RUN, CircuitCoupling, Ensemble, FurtherContactTable, Records
-from snapbeam.solver.excitation import displacements, motion_of, side_of, started
+from snapbeam.solver.ensemble import FAR_AWAY, CircuitCoupling, Ensemble, Records, run_dtype
+from snapbeam.solver.excitation import carried, displacements, motion_of, own_columns, side_of, started
 from snapbeam.solver.restrictions import check_integrable
-from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
+from snapbeam.solver.step_size import Plan, choose_base_step, clocked, most_steps
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.validation import InputError, shown
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
-
-
-# The strikers beside the first one, for every run of an ensemble.
-
-
-def others_of(
-    system: System, structure: Structure, columns: Mapping[str, _Array], runs: int, since: _Array
-) -> FurtherContactTable | None:
-    """Rows, laws and numbers of the further strikers of each run; None if there is at most one striker.
-
-    A striker stands where its tip touches the beam at rest in the first well, or its gap away from that.  *since* holds
-    the contact time of every striker, shape (runs or 1, strikers).
-    """
-    further = system.contacts[1:]
-    if not further:
-        return None
-    count = len(further)
-    offset, at_rest = np.zeros((2, runs, count))
-    places, signs = np.zeros((runs, count), dtype=np.int64), []
-    rows: list[_Array] = []
-    for j, each in enumerate(further):
-        number, striker = j + 2, each.striker
-        assert system.striker is not None
-        sign = 1.0 if striker.side == system.striker.side else -1.0
-        signs.append(sign)
-        section, moving = section_of("contact", number), section_of("drive", number)
-        location = columns[f"{section}.location"]
-        different, which = np.unique(location, return_inverse=True)
-        shapes = np.array([structure.model.shape_at(float(x)) for x in different])
-        places[:, j] = len(rows) + which
-        own_rows = np.array([structure.row(shape, j + 1, sign) for shape in shapes])
-        rows += list(own_rows)
-        at_rest[:, j] = sign * structure.sign * structure.rests(shapes)[which]
-        begun = displacements(striker.drive, _own(columns, moving, runs), system.scale, np.zeros(runs))
-        gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
-        rest = _reach_at_rest(system, structure, which, own_rows)
-        offset[:, j] = rest + np.where(np.isnan(gap), -begun, -gap)
-    return FurtherContactTable(
-        tuple(type(each.law) for each in further), tuple(signs), offset, at_rest,
-        np.broadcast_to(since[:, 1:], (runs, count)), places, np.array(rows),
-    )  # fmt: skip
 
 
 # What moves in every run of an ensemble.
@@ -79,15 +36,18 @@ _SHORTEST_PERIOD = 1e-300
 """Period of an excitation, s, below which its reciprocal and its products are not numbers."""
 
 
+def _runs_of(columns: Mapping[str, _Array]) -> int:
+    return next(iter(columns.values())).size if columns else 1
+
+
 def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
     """Seconds of one cycle of excitation of each run, or of the first mode where nothing moves, shape (runs,)."""
-    runs = next(iter(columns.values())).size if columns else 1
-    leads = system.primary_excitation
+    runs, leads = _runs_of(columns), system.primary_excitation
     if leads is None:
         return 2.0 * math.pi / (np.ones(runs) * system.scale.omega)
     section, drive = leads
     with np.errstate(all="ignore"):
-        periods = drive.cycle(_own(columns, section, runs), system.scale)
+        periods = drive.cycle(own_columns(columns, section, runs), system.scale)
     bad = np.flatnonzero(~((periods >= _SHORTEST_PERIOD) & np.isfinite(periods)))
     if bad.size:
         raise InputError(
@@ -105,13 +65,6 @@ def phases_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arra
     return columns.get(name, np.zeros(runs))
 
 
-def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
-    """Parameters of a section, of which there may be none."""
-    names = {name: split_name(name) for name in columns}
-    own = {field: columns[name] for name, (of, field) in names.items() if of == section}
-    return own or {"": np.zeros(runs)}
-
-
 def clock_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
     """Rate of the phase of each run, rad/s: of its one motion, or of the time since they began that several motions share."""
     if not system.moving:
@@ -119,7 +72,7 @@ def clock_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array
     if len(system.moving) > 1:
         return 2.0 * math.pi / (HORIZON * cycles_of(system, columns))
     section, drive = system.moving[0]
-    return drive.numbers(_own(columns, section, runs), system.scale)["omega"]
+    return drive.numbers(own_columns(columns, section, runs), system.scale)["omega"]
 
 
 def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
@@ -136,7 +89,7 @@ def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
         return np.full(runs, np.inf)
     if system.striker is None:
         return np.full(runs, -np.inf)
-    drive, own = system.striker.drive, _own(columns, "drive", runs)
+    drive, own = system.striker.drive, own_columns(columns, "drive", runs)
     if system.striker.side == "above" and drive.recorded:  # made in space; other motions are positive as it pushes
         return drive.mirrored_bounds(own, system.scale)
     return drive.bounds(own, system.scale)[0]
@@ -144,15 +97,12 @@ def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
 
 def _begun_at(system: System, columns: Mapping[str, _Array], clock: _Array, phase: _Array) -> _Array:
     """Displacement of the first tip from its mid-position at the start, m, in the frame of the ends; shape (runs,)."""
-    runs, base = phase.size, system.base_excitation
-    assert system.striker is not None
-    motions = [("drive", system.striker.drive, 1.0)]
-    if base is not None and not base.striker_on_base:
-        side = -1.0 if system.striker.side == "above" else 1.0
-        motions.append(("base_excitation", base.motion, -side if base.direction == "up" else side))
-    found = np.zeros(runs)
+    striker, base, found = system.contacts[0].striker, system.base_excitation, np.zeros(phase.size)
+    motions: list[tuple[str, Drive, float]] = [("drive", striker.drive, 1.0)]
+    if base is not None and (share := carried(system, striker)):
+        motions.append(("base_excitation", base.motion, share))
     for section, drive, share in motions:
-        own, times = started(system, _own(columns, section, runs), phase, clock)
+        own, times = started(system, own_columns(columns, section, phase.size), phase, clock)
         found = found + share * displacements(drive, own, system.scale, times)
     return found
 
@@ -162,7 +112,7 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
     found = np.zeros(runs)
     for section, drive in system.moving:
         if _is_around(section):
-            numbers = drive.numbers(_own(columns, section, runs), system.scale)
+            numbers = drive.numbers(own_columns(columns, section, runs), system.scale)
             found = np.maximum(found, numbers["fastest" if "fastest" in numbers else "omega"])
     return found
 
@@ -170,22 +120,14 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
 def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, tuple[_Array, _Array]]:
     """Displacement (m) and velocity (m/s) of the base in space; change of the load and external forces (N) and their rates.
 
-    By section.
-    *ensemble* is that of the one run, which may begin in the middle of its drives.
+    By section.  *ensemble* is that of the one run, which may begin in the middle of its drives.
     """
-    found = {}
+    found, base = {}, system.base_excitation
     for section, drive in system.moving:
-        if not _is_around(section):
-            continue
-        pairs = _motion_at(ensemble, system, section, drive, times)
-        sign = (
-            -1.0
-            if section == "base_excitation"
-            and system.base_excitation is not None
-            and system.base_excitation.direction == "down"
-            else 1.0
-        )
-        found[section] = sign * pairs[0], sign * pairs[1]
+        if _is_around(section):
+            sign = -1.0 if section == "base_excitation" and base is not None and base.direction == "down" else 1.0
+            value, rate, _ = sign * _motion_at(ensemble, system, section, drive, times)
+            found[section] = value, rate
     return found
 
 
@@ -259,7 +201,7 @@ def make_ensemble(
     check_integrable(system, integration.engine)
     columns = run_columns(system, points or {})
     state = system.start_state if start is None else start
-    runs = next(iter(columns.values())).size if columns else 1
+    runs = _runs_of(columns)
     if state.batch and runs in (1, state.batch[0]):
         runs = state.batch[0]
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
@@ -276,37 +218,35 @@ def make_ensemble(
     _require_clock(system, state)
     _require_valid(system, state)
     clock = clock_of(system, columns, runs)
-    table = np.zeros(runs, dtype=RUN)
-    places = _places(structure, table, columns.get("contact.location", np.full(runs, 0.5)))
-    since = state.flat.contact_times(max(1, len(system.contacts)))
+    table = np.zeros(runs, dtype=run_dtype(len(system.contacts)))
+    table["rest_center"] = structure.center_rest
+    table["contact_time"] = state.flat.contact_times(max(1, len(system.contacts)))
     units = np.array([each.unit for each in system.harvesters] or [1.0])
-    starts = _starts(structure, table, state, since, units)
+    starts = _starts(structure, table, state, units)
     table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
-    table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, clock)
-    highest = table["rest_contact"] + table["offset"] + highest_of(system, columns, runs)
-    time = clocked(table, system, integration, cycles_of(system, columns), plans, periods)
+    rows = _place(system, structure, state, columns, table, starts, clock)
+    cycles = clocked(table, system, integration, cycles_of(system, columns), plans, periods)
     _require_record(system, table, clock)
-    _decisions(table, system, structure, integration, time, places.location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
-    law: type[ContactLaw] = HertzContact if system.contact_law is None else type(system.contact_law)
     ensemble = Ensemble(
         structure=structure,
         scale=system.scale,
         order=plans[0].order,
-        law=law,
         runs=table,
         clock=clock,
         comes_round=len(system.moving) < 2 and all(drive.is_periodic for _, drive in system.moving),
-        location=places.location,
-        highest=highest,
-        contact_rows=places.rows,
+        location=columns.get("contact.location", np.full(runs, 0.5)),
+        highest=table["rest_contact"][:, 0] + table["offset"][:, 0] + highest_of(system, columns, runs),
+        contact_rows=rows,
         starts=starts,
         max_steps=most_steps(integration, system.model.modes),
         high_omega=integration.high_frequency_ratio * system.scale.omega,
-        cycles=time.cycles,
+        cycles=cycles,
         circuits=_circuits(system, columns, runs),
-        others=others_of(system, structure, columns, runs, since),
+        contacts=len(system.contacts),
+        impulsive=any(each.law.impulsive for each in system.contacts),
     )
+    _decide(ensemble, system, integration)
     if integration.engine == "python":
         return dataclasses.replace(ensemble, systems=_systems(system, points or {}, runs))
     return dataclasses.replace(ensemble, channels=channels_of(system, ensemble, columns))
@@ -344,19 +284,18 @@ def _require_clock(system: System, state: State) -> None:
     """Refuse a phase of one drive in a start of several motions, which share a clock and have their own phases."""
     if len(system.moving) < 2 or state.modal is not None:
         return
-    given = state.phase[~np.isnan(state.phase)]
-    if ((given < 0.0) | (given > _LONGEST_CLOCK)).any():
+    given = state.phase[(state.phase < 0.0) | (state.phase > _LONGEST_CLOCK)]  # not NaN, which is none
+    if given.size:
         names = ", ".join(f"{section}.phase" for section, _ in system.moving)
         raise InputError(
-            f"state phase = {shown(given[(given < 0.0) | (given > _LONGEST_CLOCK)][0])}: must not be given if several "
+            f"state phase = {shown(given[0])}: must not be given if several "
             f"motions act; give each motion its own phase ({names})"
         )
 
 
 def _require_valid(system: System, state: State) -> None:
     """Refuse one start at which a local force is not valid; of a batch, such runs end at once with the status DIVERGED."""
-    local = system.unloaded_potential
-    if state.batch or not system.local_forces or bool(local.holds(state.amplitude)):
+    if state.batch or not system.local_forces or bool(system.unloaded_potential.holds(state.amplitude)):
         return
     for force in system.local_forces:
         low, high = force.displacement_range(force.numbers)
@@ -373,7 +312,6 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
 
     *points* holds those that differ between the runs; the others are the system's own.
     """
-    size = next(iter(points.values())).size if points else 1
     own: dict[str, float] = {}
     for number, each in enumerate(system.contacts, 1):
         for part in (each.law, each.striker):
@@ -389,7 +327,7 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
     for section, motion in system.moving:
         if _is_around(section):
             own |= {f"{section}.{name}": value for name, value in motion.values().items()}
-    columns = {name: np.full(size, value) for name, value in own.items()}
+    columns = {name: np.full(_runs_of(points), value) for name, value in own.items()}
     for name, values in points.items():
         section, field = split_name(name)
         kind, number = numbered(section)
@@ -405,38 +343,29 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
 
     A striker with a mass meets the beam for a shorter time, as the two masses together do: m_s m/(m_s + m).
     """
-    plans = _plans_of(system, integration, columns)
-    further = [
-        _plans_of(system, integration, columns, section_of("contact", number), each.law)
-        for number, each in enumerate(system.contacts[1:], 2)
+    laws: list[tuple[str, Any]] = [
+        (section_of("contact", number), each.law) for number, each in enumerate(system.contacts, 1)
     ]
-    if further:
-        plans = [_serving(each) for each in zip(plans, *further, strict=True)]
-    if integration.step is None and plans[0].order == 6 and _depends_on_velocity(system):
-        plans = [each.scaled(_GENERAL) for each in plans]
-    if integration.step is None and any(_is_around(section) for section, _ in system.moving):
-        fastest = fastest_of(system, columns, len(plans))
-        plans = [
-            each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate))) if rate > 0.0 else each
-            for each, rate in zip(plans, fastest.tolist(), strict=True)
-        ]
-    if integration.step is None and system.harvesters:
-        plans = _with_circuits(plans, system, columns, integration.accuracy)
-    if integration.step is None and system.local_forces:
-        longest = _longest_with_local_forces(system, integration.accuracy)
-        plans = [each._replace(step=min(each.step, longest)) for each in plans]
+    of_contacts = [_plans_of(system, integration, columns, *each) for each in laws or [("contact", None)]]
+    plans = [each[0] if len(each) == 1 else _serving(each) for each in zip(*of_contacts, strict=True)]
+    if integration.step is None:
+        if plans[0].order == 6 and _depends_on_velocity(system):
+            plans = [each.scaled(_GENERAL) for each in plans]
+        with np.errstate(divide="ignore"):
+            longest = 2.0 * math.pi / (_RESOLVED * fastest_of(system, columns, len(plans)))
+        if system.harvesters:
+            step = np.minimum([each.step for each in plans], longest)
+            longest = np.minimum(longest, _longest_with_circuits(step, system, columns, integration.accuracy))
+        if system.local_forces:
+            longest = np.minimum(longest, _longest_with_local_forces(system, integration.accuracy))
+        plans = [each._replace(step=min(each.step, own)) for each, own in zip(plans, longest.tolist(), strict=True)]
     masses = [each.striker.mass for each in system.contacts if each.striker.mass is not None]
     if not masses:
         return plans
-    mass = system.struck_model.lightest_contact_mass
-    more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / min(masses)) - 1e-9))
+    more = max(0, math.ceil(0.5 * math.log2(1.0 + system.struck_model.lightest_contact_mass / min(masses)) - 1e-9))
     return [
-        each._replace(
-            min_contact_halvings=each.min_contact_halvings + more,
-            max_halvings=each.max_halvings + more,
-            contact=each.contact * 0.5**more,
-        )
-        for each in plans
+        Plan(order, step, longest + more, shortest + more, contact * 0.5**more)
+        for order, step, longest, shortest, contact in plans
     ]
 
 
@@ -464,16 +393,14 @@ def _longest_with_local_forces(system: System, accuracy: str) -> float:
     return _TAPPED[accuracy] / max(math.sqrt(squared), decay, 1e-300)
 
 
-def _with_circuits(plans: list[Plan], system: System, columns: Mapping[str, _Array], accuracy: str) -> list[Plan]:
-    """Steps that resolve circuits.
+def _longest_with_circuits(step: _Array, system: System, columns: Mapping[str, _Array], accuracy: str) -> _Array:
+    """Longest steps that resolve circuits, s, of runs whose other parts ask for a *step*.
 
     The stiffness t.t of circuits with inertia, and the damping rate t.t of those without, are in the kicks.  The decay lam h of a
     circuit in a step is at most 3, or over 8: then it follows the beam.
     """
-    model, runs = system.struck_model, len(plans)
-    squared, decay, longest = 0.0, np.zeros(runs), np.full(runs, math.inf)
-    step = np.array([each.step for each in plans])
-    for harvester, circuit in zip(system.harvesters, _circuits(system, columns, runs), strict=True):
+    model, squared, decay, longest = system.struck_model, 0.0, np.zeros(step.size), np.full(step.size, math.inf)
+    for harvester, circuit in zip(system.harvesters, _circuits(system, columns, step.size), strict=True):
         row = model.linear_modes.T @ harvester.row(model)
         if harvester.inertia > 0.0:
             squared += float(row @ row) / harvester.inertia
@@ -482,8 +409,7 @@ def _with_circuits(plans: list[Plan], system: System, columns: Mapping[str, _Arr
         else:
             decay += float(row @ row) * circuit.rate
     exchange = np.maximum(np.maximum(math.sqrt(squared), decay), 1e-300)
-    longest = np.minimum(longest, 2.0 * _TAPPED[accuracy] / exchange)
-    return [each._replace(step=min(each.step, own)) for each, own in zip(plans, longest.tolist(), strict=True)]
+    return np.minimum(longest, 2.0 * _TAPPED[accuracy] / exchange)
 
 
 def _serving(plans: Sequence[Plan]) -> Plan:
@@ -491,41 +417,22 @@ def _serving(plans: Sequence[Plan]) -> Plan:
     step = min(each.step for each in plans)
     longest = min(each.step * 0.5**each.min_contact_halvings for each in plans)
     shortest = min(each.step * 0.5**each.max_halvings for each in plans)
-    min_contact_halvings, max_halvings = (math.ceil(math.log2(step / each) - 1e-9) for each in (longest, shortest))
-    return plans[0]._replace(
-        step=step,
-        min_contact_halvings=max(0, min_contact_halvings),
-        max_halvings=max(0, min_contact_halvings, max_halvings),
-        contact=min(each.contact for each in plans),
-    )
+    least, most = (max(0, math.ceil(math.log2(step / each) - 1e-9)) for each in (longest, shortest))
+    return Plan(plans[0].order, step, least, max(least, most), min(each.contact for each in plans))
 
 
 def _plans_of(
-    system: System,
-    integration: Integration,
-    columns: Mapping[str, _Array],
-    section: str = "contact",
-    contact: ContactLaw | None = None,
+    system: System, integration: Integration, columns: Mapping[str, _Array], section: str, contact: Any
 ) -> list[Plan]:
-    """The steps that a contact asks for: that of the first striker, or another one's."""
-    contact = contact or system.contact_law
+    """The steps that a contact law asks for, or the beam alone, None."""
     known = () if contact is None else quantities(type(contact))
     of_contact = {name: columns[at] for name in known if (at := f"{section}.{name}") in columns}
-    step, accuracy = integration.step, integration.accuracy
-    runs = next(iter(columns.values())).size if columns else 1
+    how: dict[str, Any] = {"step": integration.step, "accuracy": integration.accuracy}
     if contact is None or not of_contact:
-        return [choose_base_step(system.struck_model, contact, step=step, accuracy=accuracy)] * runs
-    table = np.stack(list(of_contact.values()), axis=1)
-    different, which = np.unique(table, axis=0, return_inverse=True)
-    plans = [
-        choose_base_step(
-            system.struck_model,
-            dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))),  # type: ignore[type-var]
-            step=step,
-            accuracy=accuracy,
-        )
-        for row in different
-    ]
+        return [choose_base_step(system.struck_model, contact, **how)] * _runs_of(columns)
+    different, which = np.unique(np.stack(list(of_contact.values()), axis=1), axis=0, return_inverse=True)
+    laws = [dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))) for row in different]
+    plans = [choose_base_step(system.struck_model, law, **how) for law in laws]
     return [plans[i] for i in which.ravel()]
 
 
@@ -540,30 +447,15 @@ def _side(system: System, state: State, goes_on: bool) -> str:
         # the same from call to call, whichever well it comes to
         return "below"
     # measured from the well the beam starts in, so that mirror images are mirrored to the bit
-    first = state.flat[0]
-    return "above" if float(first.amplitude @ system.model.midspan_shape) > 0.0 else "below"
+    return "above" if float(state.flat[0].amplitude @ system.model.midspan_shape) > 0.0 else "below"
 
 
-class _Places(NamedTuple):
-    location: _Array
-    rows: _Array
-
-
-def _places(structure: Structure, table: Records, location: _Array) -> _Places:
-    different, which = np.unique(location, return_inverse=True)
-    shapes = np.array([structure.model.shape_at(float(x)) for x in different])
-    table["contact_row"] = which
-    table["rest_contact"] = structure.sign * structure.rests(shapes)[which]
-    table["rest_center"] = structure.center_rest
-    return _Places(location, np.array([structure.row(shape) for shape in shapes]))
-
-
-def _starts(structure: Structure, table: Records, state: State, since: _Array, units: _Array) -> _Array:
-    """q and p of every start; which start, well and contact time *since* each run has is entered in the table."""
+def _starts(structure: Structure, table: Records, state: State, units: _Array) -> _Array:
+    """q and p of every start; which start and well each run has is entered in the table."""
     flat, modal = state.flat, state.flat.modal
     count = flat.batch[0]
     table["start_row"] = np.arange(table.size) if count > 1 else 0
-    table["well_sign"], table["contact_time"] = 1.0, since[:, 0]
+    table["well_sign"] = 1.0
     if modal is not None and modal.structure == structure.hash:
         table["well_sign"] = modal.well_sign
         return np.stack((modal.q, modal.p), axis=1)
@@ -577,35 +469,55 @@ def modal_of(structure: Structure, flat: State, units: _Array) -> _Array:
     return np.array([structure.to_modal(*each) for each in zip(*parts, strict=True)])
 
 
-def _offsets(
+def _place(
     system: System,
     structure: Structure,
     state: State,
     columns: Mapping[str, _Array],
     table: Records,
-    rows: _Array,
     starts: _Array,
     clock: _Array,
 ) -> _Array:
-    """Penetration of the tip at mid-stroke into the beam at rest in the first well."""
-    if system.striker is None:
-        return np.full(table.size, FAR_AWAY)
-    flat, modal = state.flat, state.flat.modal
-    position = structure.sign * flat.striker_position - table["rest_contact"]
-    if modal is not None and modal.structure == structure.hash:
-        # to the bit, unless the striker now strikes at another place
-        same = structure.sign * (table["rest_contact"] + modal.offset) == flat.striker_position
-        return np.where(same, modal.offset, position)
-    pairs = {(int(run["contact_row"]), int(run["start_row"])) for run in table}
-    reach = {(workspace, at): float(rows[workspace] @ starts[at, 0]) for workspace, at in pairs}
-    touching = np.array([reach[int(run["contact_row"]), int(run["start_row"])] for run in table])
-    begun = _begun_at(system, columns, clock, table["phase"])
-    offset = touching - begun
-    if "contact.gap" in columns:
+    """Enter the row of every contact, its rest and its offset: penetration of the tip at mid-stroke into the beam at rest.
+
+    A tip touches the beam or stands its gap away from the beam at rest.  The first one touches the beam as the run begins
+    unless the state says where it is, the others touch it at rest.  Returns the rows of all contacts; of a beam alone that of mid-span.
+    """  # fmt: skip
+    runs, rows = table.size, list[_Array]()
+    table["offset"] = FAR_AWAY
+    for j in range(max(1, len(system.contacts))):
+        section, sign = section_of("contact", j + 1), 1.0
+        if j and system.contacts[j].striker.side != system.contacts[0].striker.side:
+            sign = -1.0
+        different, which = np.unique(columns.get(f"{section}.location", np.full(runs, 0.5)), return_inverse=True)
+        shapes = np.array([structure.model.shape_at(float(x)) for x in different])
+        own = np.array([structure.row(shape, j, sign) for shape in shapes])
+        table["contact_row"][:, j] = len(rows) + which
+        table["rest_contact"][:, j] = sign * structure.sign * structure.rests(shapes)[which]
+        rows += list(own)
+        if not system.contacts:
+            continue
         # the gap is that to the beam at rest, which a local force moves out of the well of the structure
-        rest = _reach_at_rest(system, structure, table["contact_row"], rows)
-        offset = np.where(np.isnan(columns["contact.gap"]), offset, rest - columns["contact.gap"])
-    return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
+        resting = touching = _reach_at_rest(system, structure, which, own)
+        if j:
+            drive = system.contacts[j].striker.drive
+            parameters = own_columns(columns, section_of("drive", j + 1), runs)
+            begun = displacements(drive, parameters, system.scale, np.zeros(runs))
+        else:
+            pairs = zip(which.tolist(), table["start_row"].tolist(), strict=True)
+            touching = np.array([float(own[place] @ starts[at, 0]) for place, at in pairs])
+            begun = _begun_at(system, columns, clock, table["phase"])
+        gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
+        table["offset"][:, j] = np.where(np.isnan(gap), touching - begun, resting - gap)
+    given, modal = state.flat.striker_position, state.flat.modal
+    if system.contacts and not np.isnan(given).all():
+        rest, offset = table["rest_contact"][:, 0], table["offset"][:, 0]
+        position = structure.sign * given - rest
+        if modal is not None and modal.structure == structure.hash:
+            # to the bit, unless the striker now strikes at another place
+            position = np.where(structure.sign * (rest + modal.offset) == given, modal.offset, position)
+        table["offset"][:, 0] = np.where(np.isnan(given), offset, position)
+    return np.array(rows)
 
 
 def _reach_at_rest(system: System, structure: Structure, which: _Integers, rows: _Array) -> _Array | float:
@@ -636,23 +548,14 @@ def _circuits(system: System, columns: Mapping[str, _Array], runs: int) -> tuple
     return tuple(found)
 
 
-def _decisions(
-    table: Records,
-    system: System,
-    structure: Structure,
-    integration: Integration,
-    time: Clocked,
-    location: _Array,
-    highest: _Array,
-) -> None:
+def _decide(ensemble: Ensemble, system: System, integration: Integration) -> None:
     """Set the criteria of early termination of each run: crossings, energy and reach of the tip."""
+    table, structure = ensemble.runs, ensemble.structure
     table["decide_crossings"], table["decide_energy"] = -1, -math.inf
     if not integration.early_termination or len(system.contacts) > 1 or system.local_forces:
         return
     if system.striker is not None and structure.wells_are_mirror_images:
         # elsewhere the class also depends on whether the other well is reached
-        table["decide_crossings"] = int(time.cycles / 20.0)
-    table["decide_reach"] = np.maximum(highest, 0.0)
-    if not structure.wells_are_mirror_images:
-        table["decide_reach"] = passed_heights(structure.model, location, highest)
-    table["decide_energy"] = decidable_energy(structure.model, location, highest)
+        table["decide_crossings"] = int(ensemble.cycles / 20.0)
+    table["decide_reach"] = ensemble.reach
+    table["decide_energy"] = decidable_energy(structure.model, ensemble.location, ensemble.highest)

@@ -35,10 +35,10 @@ from snapbeam.model.local_force import (
     MagneticForce,
     QuadraticDamping,
 )
-from snapbeam.model.quantity import section_of, split_name
+from snapbeam.model.quantity import section_of
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.system import System
-from snapbeam.solver.excitation import side_of, started
+from snapbeam.solver.excitation import carried, own_columns, side_of, started
 from snapbeam.solver.structure import Structure
 from snapbeam.solver.user_laws import UserLaw, contact_law, local_force
 
@@ -112,48 +112,35 @@ class Channels:
             np.any(self.signals[:, :, 1] * (self.kinds != 1)) or np.any(self.pieces[:, 1:]) or np.any(self.kinds == 2)
         )
 
-    def check(self) -> None:
-        """Raise the first error that a law of a user raised in the core."""
-        for law in self.of_user:
-            for function in law.functions:
-                function.check()
-
-    @property
-    def calls_python(self) -> bool:
-        """True if a law holds the interpreter's lock, so that threads would wait for each other."""
-        return any(function.why_slow for law in self.of_user for function in law.functions)
-
 
 class _Builder:
     """Channels and signals, one after the other."""
 
-    def __init__(self, runs: int) -> None:
+    def __init__(self, runs: int, rows: _Array) -> None:
         self.runs = runs
-        self.laws: list[int] = []
-        self.numbers: list[_Array] = []
-        self.offset: list[_Array] = []
-        self.since: list[_Array] = []
-        self.rows: list[_Array] = []
-        self.row_of: list[NDArray[np.int64]] = []
-        self.rest: list[_Array] = []
-        self.uses: list[dict[str, float]] = []
-        self.sections: list[str] = []
-        self.kinds: list[int] = []
-        self.windows: list[int] = []
-        self.signals: list[_Array] = []
+        self.channels: list[tuple[int, _Array, dict[str, float], _Array, _Array]] = []
+        """Law, numbers, factors of signals, offset and time in contact."""
+        self.rows: list[_Array] = [rows]
+        self.places: list[tuple[_Array, _Array]] = []
+        """Row of each run, and the displacement along it at rest."""
+        self.signals: list[tuple[str, int, _Array, int]] = []
+        """Section, kind, numbers and window."""
         self.pieces: list[_Array] = []
         self.jumps: dict[str, _Array] = {}
         self.of_user: list[UserLaw] = []
 
-    def add(self, law: int, rows: _Array, which: Any, rest: Any, uses: dict[str, float], numbers: Any = (), offset: Any = 0.0, since: Any = -1.0) -> None:  # fmt: skip
-        """Add a channel: its law, rows and which of them each run has, and the factors of its signals."""
-        own = [np.broadcast_to(np.asarray(value, float), self.runs) for value in numbers]
-        self.laws.append(law)
-        self.numbers.append(np.stack(own, axis=1) if own else np.zeros((self.runs, 0)))
+    def each(self, value: Any) -> _Array:
+        """A number of each run."""
+        return np.broadcast_to(np.asarray(value, float), self.runs)
+
+    def add(
+        self, law: int, rows: _Array | None, which: Any = 0, rest: Any = 0.0, uses: dict[str, float] | None = None,
+        numbers: Any = (), offset: Any = 0.0, since: Any = -1.0,
+    ) -> None:  # fmt: skip
+        """Add a channel: its law, rows (None: those there are) and which of them each run has, and the factors of its signals."""
+        own = np.array([self.each(value) for value in numbers]).reshape(-1, self.runs).T
+        self.channels.append((law, own, uses or {}, self.each(offset), self.each(since)))
         self.place(rows, which, rest)
-        self.uses.append(uses)
-        self.offset.append(np.broadcast_to(np.asarray(offset, float), self.runs))
-        self.since.append(np.broadcast_to(np.asarray(since, float), self.runs))
 
     def law(self, law: ContactLaw | LocalForce, model: ReducedModel) -> tuple[int, tuple[float, ...], tuple[str, ...]]:
         """Number of a law in the core, what is told of a user's, and the names of the law's own numbers."""
@@ -169,19 +156,17 @@ class _Builder:
         self.of_user.append(own)
         return USER_LAWS[own.kind], own.head, kind.numbers_type()._fields
 
-    def place(self, rows: _Array, which: Any, rest: Any) -> None:
+    def place(self, rows: _Array | None, which: Any, rest: Any) -> None:
         """Add rows, and which of them each run has."""
-        first = sum(len(each) for each in self.rows)
-        self.rows.append(np.atleast_2d(rows))
-        self.row_of.append(np.broadcast_to(np.asarray(which) + first, self.runs))
-        self.rest.append(np.broadcast_to(np.asarray(rest, float), self.runs))
+        first = 0
+        if rows is not None:
+            first = sum(map(len, self.rows))
+            self.rows.append(np.atleast_2d(rows))
+        self.places.append((self.each(np.asarray(which) + first), self.each(rest)))
 
     def add_signal(self, section: str, kind: int, numbers: _Array, window: int | None = None) -> int:
         """Add a signal of a section; returns its number."""
-        self.sections.append(section)
-        self.kinds.append(kind)
-        self.windows.append(-1 if window is None else window)
-        self.signals.append(numbers)
+        self.signals.append((section, kind, numbers, -1 if window is None else window))
         return len(self.signals) - 1
 
     def add_pieces(self, section: str, each: Pieces, begun: _Array, most: _Array | None = None, sign: float = 1.0) -> int:  # fmt: skip
@@ -202,21 +187,34 @@ class _Builder:
 
     def built(self, contacts: int, circuits: int) -> Channels:
         """Everything as arrays."""
-        most = max((each.shape[1] for each in self.numbers), default=0)
-        padded = [np.pad(each, ((0, 0), (0, most - each.shape[1]))) for each in self.numbers]
-        shape = (len(self.laws), self.runs)
-        uses = np.array([[each.get(name, 0.0) for name in self.sections] for each in self.uses])
-        signals = np.stack(self.signals, axis=1) if self.signals else np.zeros((self.runs, 0, len(SIGNAL)))
-        jumps = np.stack(list(self.jumps.values()), axis=1) if self.jumps else np.zeros((self.runs, 0))
+        count, most = len(self.channels), max((each[1].shape[1] for each in self.channels), default=0)
+        numbers = np.zeros((self.runs, count, most))
+        for j, (_, own, *_) in enumerate(self.channels):
+            numbers[:, j, : own.shape[1]] = own
+        sections, kinds, signals, windows = zip(*self.signals, strict=True) if self.signals else ((), (), (), ())
+        offset, since = np.array([each[3:] for each in self.channels]).reshape(count, 2, self.runs).transpose(1, 2, 0)
+        row_of, rest = np.array(self.places).transpose(1, 2, 0)
+        jumps = [*self.jumps.values()]
         return Channels(
-            np.array(self.laws, np.int32), contacts, circuits, uses.reshape(len(self.laws), len(self.sections)), signals,
-            np.array(self.kinds, np.int32), np.array(self.windows, np.int32),
-            np.concatenate(self.pieces) if self.pieces else np.zeros((0, 7)), jumps,
-            np.stack(padded, axis=1) if self.laws else np.zeros((self.runs, 0, 0)),
-            np.array(self.offset).reshape(shape).T.copy(), np.array(self.since).reshape(shape).T.copy(),
-            np.concatenate(self.rows), np.ascontiguousarray(np.array(self.row_of, np.int32).T), np.array(self.rest).T.copy(),
-            tuple(self.of_user),
-        )  # fmt: skip
+            laws=np.array([each[0] for each in self.channels], np.int32),
+            contacts=contacts,
+            circuits=circuits,
+            uses=np.array([[each[2].get(of, 0.0) for of in sections] for each in self.channels]).reshape(
+                count, len(sections)
+            ),
+            signals=np.stack(signals, axis=1) if signals else np.zeros((self.runs, 0, len(SIGNAL))),
+            kinds=np.array(kinds, np.int32),
+            windows=np.array(windows, np.int32),
+            pieces=np.concatenate([np.zeros((0, 7)), *self.pieces]),
+            jumps=np.stack(jumps, axis=1) if jumps else np.zeros((self.runs, 0)),
+            numbers=numbers,
+            offset=offset.copy(),
+            since=since.copy(),
+            rows=np.concatenate(self.rows),
+            row_of=row_of.astype(np.int32, order="C"),
+            rest=rest.copy(),
+            of_user=tuple(self.of_user),
+        )
 
 
 def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) -> Channels:
@@ -228,51 +226,44 @@ def channels_of(system: System, ensemble: Any, columns: Mapping[str, _Array]) ->
         If the native core does not have a part of the system.
     """
     structure, table, runs = ensemble.structure, ensemble.runs, ensemble.size
-    built = _Builder(runs)
+    built = _Builder(runs, ensemble.contact_rows)
     for section, drive in _motions(system):
         _add_motion(built, system, ensemble, columns, section, drive)
     base = system.base_excitation
-    up = 1.0 if base is None or base.direction == "up" else -1.0
-    others = ensemble.others
     for number, contact in enumerate(system.contacts, 1):
         section = section_of("contact", number)
         law, head, names = built.law(contact.law, system.model)
-        uses = {section_of("drive", number): 1.0}
-        if base is not None and not base.striker_on_base:
-            uses["base_excitation"] = -up if contact.striker.side == "below" else up
+        uses = {section_of("drive", number): 1.0, "base_excitation": carried(system, contact.striker)}
         left = None
         if contact.law.memory:
             left = ensemble.starts[table["start_row"], 0, structure.mode_of_indentation(number - 1)]
         values = [*head, *(left if name == contact.law.memory else columns[f"{section}.{name}"] for name in names)]
-        if number == 1:
-            rows, which, rest = ensemble.contact_rows, table["contact_row"], table["rest_contact"]
-            offset, since = table["offset"], table["contact_time"]
-        else:
-            rows, which, rest = others.rows, others.places[:, number - 2], others.rest[:, number - 2]
-            offset, since = others.offset[:, number - 2], others.since[:, number - 2]
+        which, rest, offset, since = (
+            table[name][:, number - 1] for name in ("contact_row", "rest_contact", "offset", "contact_time")
+        )
         if contact.law.impulsive:
-            values.append(_cancelled(structure, rows)[which])
-        built.add(law, rows, which, rest, uses, values, offset, since)
+            values.append(_cancelled(structure, ensemble.contact_rows)[which])
+        built.add(law, None, which, rest, uses, values, offset, since)
     for force, row in zip(system.local_forces, structure.local_forces, strict=True):
         law, head, names = built.law(force, system.model)
-        built.add(law, row.row, 0, row.rest, {}, [*head, *(getattr(force.numbers, name) for name in names)])
+        own = [*head, *(getattr(force.numbers, name) for name in names)]
+        built.add(law, row.row, rest=row.rest, numbers=own)
     sections = [section for section, _ in system.moving if section.startswith("force")]
     for section, external in zip(sections, structure.force_rows, strict=True):
-        built.add(EXTERNAL_FORCE, external, 0, 0.0, {section: 1.0})
+        built.add(EXTERNAL_FORCE, external, uses={section: 1.0})
     if base is not None:
-        built.add(BASE, structure.base_load, 0, 0.0, {"base_excitation": up})
+        built.add(BASE, structure.base_load, uses={"base_excitation": 1.0 if base.direction == "up" else -1.0})
     if system.axial_load is not None:
-        built.add(AXIAL_LOAD, np.zeros(structure.omega.size), 0, 0.0, {"axial_load": 1.0})
+        built.add(AXIAL_LOAD, np.zeros(structure.omega.size), uses={"axial_load": 1.0})
     for row, coefficient in zip(structure.damping_rows, structure.damping_coefficients, strict=True):
-        built.add(LINEAR_DAMPING, row, 0, 0.0, {}, [coefficient])
+        built.add(LINEAR_DAMPING, row, numbers=[coefficient])
     starts = structure.circuits_of(ensemble.starts[:, 0]).reshape(len(ensemble.starts), -1)
     for circuit, coupling, state in zip(structure.circuits, ensemble.circuits, starts.T, strict=False):
-        if circuit.mode is None:
-            built.add(LINEAR_DAMPING, circuit.row, 0, 0.0, {}, [coupling.rate])
-        else:
-            built.add(CIRCUIT, circuit.row, 0, 0.0, {}, [coupling.rate, 0.0, state[table["start_row"]]])
-    observed = np.array([structure.row_of_beam(row) for row in ensemble.contact_rows])
-    built.place(observed, table["contact_row"], table["rest_contact"])
+        own = [coupling.rate] if circuit.mode is None else [coupling.rate, 0.0, state[table["start_row"]]]
+        built.add(LINEAR_DAMPING if circuit.mode is None else CIRCUIT, circuit.row, numbers=own)
+    first = ensemble.contact_rows[: 1 + int(table["contact_row"][:, 0].max())]
+    observed = np.array([structure.row_of_beam(row) for row in first])
+    built.place(observed, table["contact_row"][:, 0], table["rest_contact"][:, 0])
     return built.built(len(system.contacts), len(structure.circuits))
 
 
@@ -291,11 +282,6 @@ _FAR = 1e300
 """Bound of a motion that has none."""
 
 
-def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
-    own = {field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section}
-    return own or {"": np.zeros(runs)}
-
-
 def _bounds(drive: Drive, own: Mapping[str, _Array], system: System) -> _Array:
     """Bounds of the value, slope and second derivative of a motion, shape (runs, 3)."""
     runs = next(iter(own.values())).size
@@ -312,14 +298,14 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
     runs, table = ensemble.size, ensemble.runs
     if isinstance(drive, FixedStop):
         return
-    own, begun = started(system, _own(columns, section, runs), table["phase"], ensemble.clock)
+    own, begun = started(system, own_columns(columns, section, runs), table["phase"], ensemble.clock)
     repeats = len(system.moving) < 2 and drive.is_periodic
     bounds = _bounds(drive, own, system)
     components = drive.components_until(own, system.scale, begun + table["end"] * table["tick"])
     windows: dict[int, int] = {}
     for each in components:
         signal = np.zeros((runs, len(SIGNAL)))
-        most, window = bounds, None
+        most, window, kind_of = bounds, None, 0
         if isinstance(each, Tone):
             size, rate = np.abs(each.amplitude), each.rate
             signal[:, 0], signal[:, 1], signal[:, 2] = each.mean, each.amplitude, rate
@@ -332,7 +318,6 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
                 if id(each.window) not in windows:
                     windows[id(each.window)] = built.add_pieces(f"{section} window", each.window, begun)
                 window = windows[id(each.window)]
-            kind_of = 0
         elif isinstance(each, Sweep):
             signal[:, 0], signal[:, 1], signal[:, 2], signal[:, 3] = each.size, each.first, each.last, begun
             signal[:, 4], signal[:, 5], signal[:, 6] = each.duration, float(each.exponential), each.power

@@ -8,19 +8,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.drive.base import Scale
+from snapbeam.model.early_termination import passed_heights
 from snapbeam.solver.structure import Structure
 
 _REALS = (
-    "offset",  # penetration of the tip at mid-stroke into the beam at rest
     "phase",  # argument of the drive at the start, rad
-    "rest_contact",  # displacement of the contact point and of the centre in the well that q is counted from
-    "rest_center",
+    "rest_center",  # displacement of the centre in the well that q is counted from
     "tick",  # s
     "decide_energy",  # energy above the well below which a beam in the far well stays there; -inf: never decide
     "decide_reach",  # highest future position of the tip, or 0 if that is higher
-    "contact_time",  # s since the present contact began; negative: apart; NaN: the penetration decides
     "lowest",  # height of a flight that is too low to be resolved, m
     "contact_step",  # longest step in contact, s
     "well_sign",  # +1 if q and p are counted from the first well, -1 from the other
@@ -34,8 +31,13 @@ _INTEGERS = (
     "decide_crossings",  # crossings in the last quarter beyond which it is continuous; -1: never decide
     "min_contact_halvings",  # halvings of the flight step that make the longest contact step
     "max_halvings",  # and the shortest
-    "contact_row",
     "start_row",
+)
+_OF_CONTACTS = (
+    ("offset", np.float64),  # penetration of the tip at mid-stroke into the beam at rest
+    ("rest_contact", np.float64),  # displacement of the contact point in the well that q is counted from
+    ("contact_time", np.float64),  # s since the present contact began; negative: apart; NaN: the penetration decides
+    ("contact_row", np.int64),
 )
 
 
@@ -63,25 +65,6 @@ class CircuitCoupling(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class FurtherContactTable:
-    """The strikers beside the first one of every run."""
-
-    laws: tuple[type[ContactLaw], ...]
-    signs: tuple[float, ...]
-    """+1 of one that pushes as the first does."""
-    offset: _Array
-    """Penetration of each tip at mid-stroke into the beam at rest, shape (runs, strikers)."""
-    rest: _Array
-    """Displacement of the contact points in the first well, shape (runs, strikers)."""
-    since: _Array
-    """s since the contact began; negative: apart; NaN: the penetration decides; shape (runs, strikers)."""
-    places: _Integers
-    """Row of each contact, shape (runs, strikers)."""
-    rows: _Array
-    """Contact rows, each with the sign of its own side, shape (rows, N)."""
-
-
-@dataclass(frozen=True, eq=False)
 class Ensemble:
     """Runs of one structure, ready for any engine."""
 
@@ -89,19 +72,18 @@ class Ensemble:
     scale: Scale
     order: int
     """Order of the composition."""
-    law: type[ContactLaw]
     runs: Records
-    """Records of :data:`~snapbeam.solver.ensemble.RUN`, shape (runs,)."""
+    """Records of :func:`~snapbeam.solver.ensemble.run_dtype`, shape (runs,)."""
     clock: _Array
     """Rate of the phase of each run, rad/s."""
     comes_round: bool
     """True if the phase repeats after one turn."""
     location: _Array
-    """x_s of each run."""
+    """x_s of the first striker of each run."""
     highest: _Array
-    """Highest position that the tip of each run ever has, m; -inf without one."""
+    """Highest position that the first tip of each run ever has, m; -inf without one."""
     contact_rows: _Array
-    """V^T phi of every location, shape (locations, N), as the striker pushes: positive into the beam."""
+    """V^T phi of every location of every contact, shape (rows, N), as its striker pushes: positive into the beam."""
     starts: _Array
     """q and p of every start, shape (starts, 2, N)."""
     max_steps: int
@@ -111,7 +93,9 @@ class Ensemble:
     """Cycles of excitation of each run."""
     circuits: tuple[CircuitCoupling, ...] = ()
     """Circuits of the harvesters."""
-    others: FurtherContactTable | None = None
+    contacts: int = 0
+    impulsive: bool = False
+    """True if a contact acts by impulses, without a force."""
     channels: Any = None
     """:class:`~snapbeam.solver.channels.Channels` for the native core; None with the Python engine."""
     on_gpu: bool = False
@@ -120,14 +104,16 @@ class Ensemble:
     """The :class:`~snapbeam.System` of each run, for the Python engine."""
 
     @property
-    def circuit_rates(self) -> _Array:
-        """Rates of loss, shape (runs, circuits)."""
-        return np.array([each.rate for each in self.circuits]).reshape(len(self.circuits), self.size).T.copy()
+    def reach(self) -> _Array:
+        """Displacement that the first contact point must pass so that the tip never meets it again, m; shape (runs,)."""
+        if self.structure.wells_are_mirror_images:
+            return np.maximum(self.highest, 0.0)
+        return passed_heights(self.structure.model, self.location, self.highest)
 
     @property
     def has_striker(self) -> bool:
         """Return whether the ensemble has a striker."""
-        return bool((self.runs["offset"] > FAR_AWAY).any())
+        return self.contacts > 0
 
     @property
     def size(self) -> int:
@@ -139,25 +125,23 @@ class Ensemble:
         """-1 for a run that starts in the well away from which the striker pushes, +1 for the other one."""
         moved = np.array([float(start[0] @ self.structure.center) for start in self.starts])
         center = self.runs["well_sign"] * self.runs["rest_center"] + moved[self.runs["start_row"]]
-        side: _Integers = np.where(center - self.structure.dividing_height > 0.0, 1, -1)
-        return side
+        return np.asarray(np.where(center - self.structure.dividing_height > 0.0, 1, -1))
 
     @property
     def work(self) -> _Array:
         """Expected work of each run in flight steps, shape (runs,)."""
-        work: _Array = self.runs["end"] / self.runs["step"]
-        return work
+        return np.asarray(self.runs["end"] / self.runs["step"])
 
     @property
     def step_times(self) -> _Array:
         """Flight step of each run, s."""
-        times: _Array = self.runs["step"] * self.runs["tick"]
-        return times
+        return np.asarray(self.runs["step"] * self.runs["tick"])
 
 
-# What describes one run of an ensemble to an engine: a record by name, SI units, as the striker pushes: positive into the beam.
+def run_dtype(contacts: int = 1) -> np.dtype[Any]:
+    """One run to an engine: a record by name, SI units, as the striker pushes, positive into the beam.
 
-
-RUN: np.dtype[Any] = np.dtype(
-    [(name, np.float64) for name in _REALS] + [(name, np.int64) for name in _INTEGERS], align=True
-)
+    What holds of contacts has shape (contacts,); without one, the only entry is the place at which the beam is observed.
+    """
+    fields: list[Any] = [(name, np.float64) for name in _REALS] + [(name, np.int64) for name in _INTEGERS]
+    return np.dtype(fields + [(name, kind, (max(1, contacts),)) for name, kind in _OF_CONTACTS], align=True)

@@ -10,10 +10,17 @@ from numpy.typing import NDArray
 
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.components import Motion
-from snapbeam.model.quantity import numbered
+from snapbeam.model.quantity import numbered, split_name
+from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
 
 _Array = NDArray[np.float64]
+
+
+def own_columns(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
+    """Parameters of a section, of which there may be none."""
+    own = {field: values for name, values in columns.items() for of, field in [split_name(name)] if of == section}
+    return own or {"": np.zeros(runs)}
 
 
 def motion_of(drive: Drive, scale: Scale, until: float, columns: Mapping[str, _Array] | None = None) -> Motion:
@@ -35,6 +42,14 @@ def started(
     if len(system.moving) < 2 and "phase" in own:
         return {**own, "phase": phase}, np.zeros(phase.size)
     return dict(own), phase / clock
+
+
+def carried(system: System, striker: Striker) -> float:
+    """Share of the motion of the base in that of a tip, in the frame of the ends and as the tip pushes."""
+    base = system.base_excitation
+    if base is None or base.striker_on_base:
+        return 0.0
+    return -1.0 if (base.direction == "up") == (striker.side == "below") else 1.0
 
 
 def side_of(system: System, section: str, drive: Drive) -> float:

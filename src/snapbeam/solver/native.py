@@ -13,25 +13,11 @@ from numpy.typing import NDArray
 
 from snapbeam import _core
 from snapbeam.model.matrix_pairs import coupled_blocks
-from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP, Channels
+from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP
 from snapbeam.solver.ensemble import Ensemble, Records
-from snapbeam.solver.statistics import (
-    CIRCUIT_LATE_LOSS,
-    CIRCUIT_LOSS,
-    CIRCUIT_PEAK,
-    OTHER_IMPACTS,
-    OTHER_IMPULSE,
-    OTHER_PEAK,
-    OTHER_WORK,
-    SAMPLED,
-    Last,
-    OutputStates,
-    Recorded,
-    empty_accumulators,
-    updated,
-)
+from snapbeam.solver.statistics import OF_CONTACT, OF_CORE, SAMPLED, OutputStates, Recorded, empty_accumulators, updated
 from snapbeam.solver.step_size import CALM, PARTS, barrier_of, composition_of
-from snapbeam.solver.user_laws import updates_of
+from snapbeam.solver.user_laws import Function, updates_of
 from snapbeam.util.cores import instruction_set, usable_cores
 from snapbeam.util.status_codes import RunStatus
 
@@ -43,29 +29,15 @@ RUN = (
     "decide_reach", "decide_crossings", "max_steps", "stretch", "calm_energy", "lowest",
 )  # fmt: skip
 """Numbers of a run, in the order of ``core/api.hpp: RunNumber``."""
-STATISTICS = (
-    "status", "time", "side", "zero_crossings", "zero_crossings_last_quarter", "last_zero_crossing", "steps", "trials",
-    "sampled_steps", "min_displacement", "max_displacement", "min_center", "max_center", "peak_velocity",
-    "peak_midspan_velocity", "square_displacement", "square_center", "square_velocity", "square_midspan_velocity",
-    "energy_time", "high_energy_time", "dissipated", "first_energy", "energy", "displacement", "center", "early_stop_time",
-)  # fmt: skip
 OF_CHANNEL = (
-    "impacts",
-    "impulse",
-    "work",
-    "gross_work",
-    "lost",
-    "late_lost",
-    "peak_force",
-    "deepest",
-    "contact_time",
-    "touching",
-    "onset",
-)
+    "impacts", "impulse", "work", "gross_work", "lost", "late_lost", "peak_force", "deepest", "contact_time", "touching", "onset"
+)  # fmt: skip
+_IN_TICKS = ("step", "end", "output_interval", "last_quarter")
 STATUS = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED, RunStatus.DIVERGED, RunStatus.STEP_LIMIT)
 """Status of a run by its number in the core."""
 OF_SAMPLE, CHANNEL_SAMPLE = 3, 6
 """Numbers of a sample, and of each channel in it."""
+_WORKS = {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work", LINEAR_DAMPING: "dissipated"}
 FEW_MODES = 16
 """Modes up to which runs are integrated side by side."""
 _MOST_TICKS = 2.0**52
@@ -111,119 +83,100 @@ class _Arrays:
     """An ensemble as the arrays of the core."""
 
     def __init__(self, ensemble: Ensemble, graded: int = 0) -> None:
-        channels, structure = ensemble.channels, ensemble.structure
+        channels, structure, table = ensemble.channels, ensemble.structure, ensemble.runs
         assert channels is not None
         self.ensemble, self.channels = ensemble, channels
         self.updated = updated()
         self.updates = updates_of(self.updated)
         # charges and residual indentations are states of laws
-        states: list[int] = [each.mode for each in structure.circuits if each.mode is not None]
         first = structure.modes_of_bodies.stop
-        states += range(first, first + len(structure.indentations))
-        kept = np.setdiff1d(np.arange(structure.omega.size), states)
+        states = [each.mode for each in structure.circuits if each.mode is not None]
+        kept = np.setdiff1d(
+            np.arange(structure.omega.size), [*states, *range(first, first + len(structure.indentations))]
+        )
         order, sizes = coupled_blocks(structure.coupling[np.ix_(kept, kept)] != 0.0)
         self.order = kept[order]
-        n, modes = kept.size, structure.equilibrium.size
-        halvings = (ensemble.runs["max_halvings"] - ensemble.runs["min_contact_halvings"]).astype(float)
-        halvings += graded
+        count = channels.laws.size
+        self.circuits = np.arange(count)[count - channels.circuits :]
+        """Channels of the circuits."""
+        halvings = (table["max_halvings"] - table["min_contact_halvings"]).astype(float) + graded
         if np.isin(channels.laws, STEEP).any() or any(each.limited for each in channels.of_user):
             halvings += _STEEP  # near a magnet or an electrode
-        lossy = bool(np.isin(channels.laws, _core.LOSSY).any())
         fewest, per_decay = PARTS[ensemble.order]
-        wells = structure.unequal_wells
         has_two = structure.stretch > 0.0
+        wells = structure.unequal_wells if has_two else None
         high = structure.high_modes(ensemble.high_omega)
-
-        def row(values: Any) -> _Array:
-            return np.ascontiguousarray(np.asarray(values, dtype=float)[..., self.order])
-
-        self.row = row
-        self.circuits = np.arange(channels.laws.size)[channels.laws.size - channels.circuits :]
-        """Channels of the circuits."""
-        self.problem = {
-            "omega": row(structure.omega),
-            "sigma": row(structure.damping_ratio * structure.omega),
-            "G": np.ascontiguousarray(structure.coupling[np.ix_(self.order, self.order)]),
-            "g": row(structure.well),
-            "gamma": float(structure.nonlinear_stiffness),
-            "shift": row(structure.shift) if has_two else None,
-            "far_force": row(wells.force) if has_two and wells is not None else None,
-            "second": row(wells.second) if has_two and wells is not None else None,
-            "high": row(high) if high.any() else None,
-            "beam": row(np.arange(structure.omega.size) < modes),
-            "lift": float(wells.lift) if has_two and wells is not None else 0.0,
-            "block_sizes": sizes,
-            "composition": composition_of(ensemble.order, lossy),
-            "laws": channels.laws,
-            "signals": channels.signals.shape[1],
-            "uses": channels.uses,
-            "signal_kinds": channels.kinds,
-            "windows": channels.windows,
-            "jumps": channels.jumps.shape[1],
-            "law_numbers": channels.numbers.shape[2],
-            "center": row(structure.center),
-            "center_rest": float(structure.center_rest),
-            "dividing_height": float(structure.dividing_height),
-            "fewest_parts": fewest,
-            "parts_per_decay": per_decay,
-            "update": np.array([each.address for each in self.updates], np.int64),
-        }
-        table = ensemble.runs
         # finer ticks than those of the table, so that an event lies on one to rounding
         longest = float(np.maximum(table["end"], 1).max())
-        finer = 2.0 ** max(0, min(_FINER, math.floor(math.log2(_MOST_TICKS / longest))))
-        self.finer = finer
+        self.finer = finer = 2.0 ** max(0, min(_FINER, math.floor(math.log2(_MOST_TICKS / longest))))
         run = np.zeros((ensemble.size, len(RUN)))
-        for k, name in enumerate(RUN):
-            if name in (table.dtype.names or ()):
-                run[:, k] = table[name]
-        for name in ("step", "end", "output_interval", "last_quarter"):
-            run[:, RUN.index(name)] *= finer
-        run[:, RUN.index("tick")] /= finer
-        run[:, RUN.index("output_interval")] = np.minimum(
-            run[:, RUN.index("output_interval")], run[:, RUN.index("end")]
-        )
+        of = dict(zip(RUN, run.T, strict=True))
+        for name in set(RUN) & set(table.dtype.names):
+            of[name][:] = table[name] * (finer if name in _IN_TICKS else 1.0)
+        of["tick"] /= finer
+        np.minimum(of["output_interval"], of["end"], out=of["output_interval"])
         least = 2.0**halvings
-        contact = np.minimum(table["contact_step"] / (table["tick"] / finer), run[:, RUN.index("step")])
-        run[:, RUN.index("contact_step")] = least * np.maximum(np.floor(contact / least), 1.0)
-        between = np.ceil(np.log2(run[:, RUN.index("step")] / run[:, RUN.index("contact_step")]) - 1e-9) - 1.0
+        contact = np.minimum(table["contact_step"] / of["tick"], of["step"])
+        of["contact_step"][:] = least * np.maximum(np.floor(contact / least), 1.0)
         if ensemble.order == 4:  # halves of the flight step that are longer than the contact step
+            between = np.ceil(np.log2(of["step"] / of["contact_step"]) - 1e-9) - 1.0
             halvings = halvings + np.maximum(between, 0.0)
-        run[:, RUN.index("halvings")] = halvings
-        self.problem["levels"] = int(halvings.max()) + 2
-        run[:, RUN.index("max_steps")] = ensemble.max_steps
-        run[:, RUN.index("stretch")] = structure.stretch
-        run[:, RUN.index("calm_energy")] = CALM[ensemble.order] * barrier_of(structure) or math.inf
-        signals = channels.signals.copy()
-        tones = channels.kinds == 0
+        of["halvings"][:], of["max_steps"][:], of["stretch"][:] = halvings, ensemble.max_steps, structure.stretch
+        of["calm_energy"][:] = CALM[ensemble.order] * barrier_of(structure) or math.inf
+        row = self.row
+        self.problem = {
+            "omega": row(structure.omega), "sigma": row(structure.damping_ratio * structure.omega), "g": row(structure.well),
+            "G": np.ascontiguousarray(structure.coupling[np.ix_(self.order, self.order)]),
+            "gamma": float(structure.nonlinear_stiffness), "shift": row(structure.shift) if has_two else None,
+            "far_force": None if wells is None else row(wells.force), "second": None if wells is None else row(wells.second),
+            "lift": 0.0 if wells is None else float(wells.lift), "high": row(high) if high.any() else None,
+            "beam": row(np.arange(structure.omega.size) < structure.equilibrium.size), "block_sizes": sizes,
+            "composition": composition_of(ensemble.order, bool(np.isin(channels.laws, _core.LOSSY).any())),
+            "laws": channels.laws, "uses": channels.uses, "signal_kinds": channels.kinds, "windows": channels.windows,
+            "signals": channels.kinds.size, "jumps": channels.jumps.shape[1], "law_numbers": channels.numbers.shape[2],
+            "center": row(structure.center), "center_rest": float(structure.center_rest),
+            "dividing_height": float(structure.dividing_height), "fewest_parts": fewest, "parts_per_decay": per_decay,
+            "levels": int(halvings.max()) + 2, "update": np.array([each.address for each in self.updates], np.int64),
+        }  # fmt: skip
+        signals, tones, tick = channels.signals.copy(), channels.kinds == 0, run[:, :1]
         signals[:, tones, 4] *= finer
         signals[:, :, 4][(signals[:, :, 4] > _MOST_TICKS) & tones] = 0.0
-        jumps = np.sort(np.maximum(np.floor(channels.jumps / run[:, :1]) + 1.0, 0.0), axis=1)
-        self.run = run
-        ticks = np.rint(channels.since / run[:, :1])
+        jumps = np.sort(np.maximum(np.floor(channels.jumps / tick) + 1.0, 0.0), axis=1)
         start = table["start_row"]
         self.batch: dict[str, Any] = {
-            "run": run,
-            "signals": signals,
-            "pieces": channels.pieces,
-            "jumps": np.minimum(jumps, 1e300),
-            "numbers": channels.numbers,
-            "offset": channels.offset,
-            "since": np.where(channels.since >= 0.0, ticks, channels.since),
-            "rows": row(channels.rows),
-            "row_of": channels.row_of,
-            "rest": channels.rest,
-            "q": row(ensemble.starts[start, 0]),
-            "p": row(ensemble.starts[start, 1]),
-            "order": np.argsort(-ensemble.work, kind="stable").astype(np.int32),
-            "outputs": 0,
-            "states": np.zeros((ensemble.size, 0, 2 * n + 1 + 2 * channels.laws.size)),
-            "statistics": np.empty((ensemble.size, len(STATISTICS))),
-            "of_channels": np.empty((ensemble.size, channels.laws.size, len(OF_CHANNEL))),
-            "held": np.empty((ensemble.size, len(self.updated))),
-            "account": 0,
-        }
+            "run": run, "signals": signals, "pieces": channels.pieces, "jumps": np.minimum(jumps, 1e300),
+            "numbers": channels.numbers, "offset": channels.offset,
+            "since": np.where(channels.since >= 0.0, np.rint(channels.since / tick), channels.since),
+            "rows": row(channels.rows), "row_of": channels.row_of, "rest": channels.rest,
+            "q": row(ensemble.starts[start, 0]), "p": row(ensemble.starts[start, 1]),
+            "order": np.argsort(-ensemble.work, kind="stable").astype(np.int32), "account": 0,
+            "statistics": np.empty((ensemble.size, len(OF_CORE))), "held": np.empty((ensemble.size, len(self.updated))),
+            "of_channels": np.empty((ensemble.size, count, len(OF_CHANNEL))),
+        }  # fmt: skip
+        self.hand_out(0)
         self.begin()
+
+    def row(self, values: Any) -> _Array:
+        """Rows in the order of the modes in the core."""
+        return np.ascontiguousarray(np.asarray(values, dtype=float)[..., self.order])
+
+    def hand_out(self, outputs: int, interval: _Array | None = None) -> None:
+        """Make room for so many states of each run, one after each *interval*, ticks of the core."""
+        width = 2 * self.order.size + 1 + 2 * self.channels.laws.size
+        self.batch |= {"outputs": outputs, "states": np.full((self.ensemble.size, outputs, width), np.nan)}
+        if interval is not None:
+            self.batch["run"][:, RUN.index("output_interval")] = interval
+
+    def hand_out_end(self) -> None:
+        """Make room for the state at the end of each run."""
+        self.hand_out(1, self.batch["run"][:, RUN.index("end")])
+
+    def states(self) -> tuple[Any, ...]:
+        """q, p, wells and contact ticks of the states handed out, shape (runs, outputs, ...)."""
+        found, contacts, n = self.batch["states"], self.channels.contacts, self.order.size
+        q, p = self.modes_of(found, found[..., 2 * n + 1 + self.channels.laws.size :])
+        ticks = found[..., 2 * n + 1 : 2 * n + 1 + contacts] if contacts else np.full((*found.shape[:2], 1), -1.0)
+        return q, p, found[..., 2 * n].copy(), np.where(ticks > 0.0, ticks / self.finer, ticks)
 
     def begin(self) -> None:
         """Outputs as they are before a run."""
@@ -251,7 +204,7 @@ class _Arrays:
         batch, channels, n = self.batch, self.channels.laws.size, self.order.size
         shapes: dict[str, tuple[int, ...]] = {
             "q": (n,), "p": (n,), "numbers": batch["numbers"].shape[1:], "laws": (channels,), "offset": (channels,), "rest": (channels + 1,),
-            "rows": (channels + 1, n), "signals": batch["signals"].shape[1:], "end": (), "statistics": (len(STATISTICS),),
+            "rows": (channels + 1, n), "signals": batch["signals"].shape[1:], "end": (), "statistics": (len(OF_CORE),),
             "of_channels": (channels, len(OF_CHANNEL)), "jumps": batch["jumps"].shape[1:],
         }  # fmt: skip
         found = {name: np.zeros((self.ensemble.size, _core.DIRECTIONS, *shape)) for name, shape in shapes.items()}
@@ -260,24 +213,19 @@ class _Arrays:
 
     def changes(self, above: Ensemble, below: Ensemble, distance: float) -> dict[str, _Array]:
         """Derivatives of the arrays by a parameter: differences of what is assembled, which no run is in."""
-        parts = []
+        parts, of_structure = [], not unchanged(above, below)
+        order = np.argsort(self.channels.jumps, axis=1, kind="stable")
         for arrays in (_Arrays(above), _Arrays(below)):
-            batch = arrays.batch
-            end = batch["run"][:, RUN.index("end")] * batch["run"][:, RUN.index("tick")]
-            parts.append(
-                {"rows": batch["rows"][batch["row_of"]], "end": end}
-                | {name: batch[name] for name in ("q", "p", "numbers", "offset", "rest", "signals")}
-            )
-            order = np.argsort(self.channels.jumps, axis=1, kind="stable")
-            parts[-1] |= {
-                "jumps": np.take_along_axis(arrays.channels.jumps, order, axis=1),
-                "pieces": arrays.channels.pieces,
-            }
-            if not unchanged(above, below):
-                problem = {name: arrays.problem[name] for name in (*_ROWS, *_SCALARS, "G")}
+            batch, problem = arrays.batch, arrays.problem
+            part = {name: batch[name] for name in ("q", "p", "numbers", "offset", "rest", "signals", "pieces")}
+            part["rows"] = batch["rows"][batch["row_of"]]
+            part["end"] = batch["run"][:, RUN.index("end")] * batch["run"][:, RUN.index("tick")]
+            part["jumps"] = np.take_along_axis(arrays.channels.jumps, order, axis=1)
+            if of_structure:
                 rows = [np.zeros(self.order.size) if problem[name] is None else problem[name] for name in _ROWS]
-                structures = {"structure": np.array(rows), "scalars": np.array([problem[name] for name in _SCALARS])}
-                parts[-1] |= structures | {"G": problem["G"]}
+                part |= {"structure": np.array(rows), "scalars": np.array([problem[name] for name in _SCALARS])}
+                part["G"] = problem["G"]
+            parts.append(part)
         with np.errstate(invalid="ignore"):  # a jump that never is
             found = {name: np.nan_to_num((parts[0][name] - parts[1][name]) / distance) for name in parts[0]}
         if not found["pieces"].any():
@@ -294,60 +242,53 @@ class _Arrays:
         bodies = structure.modes_of_bodies.stop
         return found | {contact: q[..., mode] for mode, contact in enumerate(structure.indentations, bodies)}
 
+    @property
+    def _functions(self) -> list[Function]:
+        """Functions of a user."""
+        return [*(each for law in self.channels.of_user for each in law.functions), *self.updates]
+
     def check(self) -> None:
         """Raise the first error that a function of a user raised in the core."""
-        self.channels.check()
-        for each in self.updates:
+        for each in self._functions:
             each.check()
 
-    @property
-    def calls_python(self) -> bool:
-        """True if a function of a user holds the interpreter's lock, so that threads would wait for each other."""
-        return self.channels.calls_python or any(each.why_slow for each in self.updates)
+    def threads(self, asked: int | None) -> int:
+        """Threads: one if a function of a user holds the interpreter's lock, so that they would wait for each other."""
+        return 1 if any(each.why_slow for each in self._functions) else asked or usable_cores()
 
     def accumulators(self) -> Records:
         """The records of the runs."""
-        statistics, of_channels = self.batch["statistics"], self.batch["of_channels"]
-        channels = self.channels
-        further = max(0, channels.contacts - 1)
-        found = empty_accumulators(self.ensemble.size, further, len(self.circuits))
+        statistics, channels = self.batch["statistics"], self.channels
+        of = dict(zip(OF_CHANNEL, np.moveaxis(self.batch["of_channels"], 2, 0), strict=True))
+        found = empty_accumulators(self.ensemble.size, channels.contacts, len(self.circuits))
         begun = statistics[:, 0] >= 0.0
-        for k, name in enumerate(STATISTICS):
-            if name in (found.dtype.names or ()) and name not in ("status", "time"):
-                found[name][begun] = statistics[begun, k]
+        for k, name in enumerate(OF_CORE):
+            found[name][begun] = statistics[begun, k]
         found["status"][begun] = np.array(STATUS, dtype=np.int64)[statistics[begun, 0].astype(int)]
         found["time"][begun] = np.rint(statistics[begun, 1] / self.finer)
         for row, held in zip(self.updated, self.batch["held"].T, strict=True):
             found[f"own_{row.name}"] = held
-        contacts = {name: of_channels[:, : channels.contacts, k] for k, name in enumerate(OF_CHANNEL)}
-        for name, column in (("impacts", "impacts"), ("total_impulse", "impulse"), ("work", "work"), ("lost", "lost"), ("contact_time", "contact_time")):  # fmt: skip
-            found[name] = contacts[column].sum(axis=1)
+        for name in ("impacts", "impulse", "work", "lost", "contact_time"):
+            found["total_impulse" if name == "impulse" else name] = of[name][:, : channels.contacts].sum(axis=1)
         if channels.contacts:
-            found["peak_force"], found["touching"] = contacts["peak_force"][:, 0], contacts["touching"][:, 0]
-            found["onset"] = np.rint(contacts["onset"][:, 0] / self.finer)
-        if further:
-            for at, name in ((OTHER_IMPACTS, "impacts"), (OTHER_PEAK, "peak_force"), (OTHER_IMPULSE, "impulse"), (OTHER_WORK, "work")):  # fmt: skip
-                found["others"][:, :, at] = contacts[name][:, 1:]
+            found["contacts"] = np.stack([of[name][:, : channels.contacts] for name in OF_CONTACT], axis=2)
+            found["peak_force"] = of["peak_force"][:, : channels.contacts].max(axis=1)
         if self.circuits.size:
-            for at, name in ((CIRCUIT_LOSS, "lost"), (CIRCUIT_LATE_LOSS, "late_lost"), (CIRCUIT_PEAK, "peak_force")):
-                found["circuits"][:, :, at] = of_channels[:, self.circuits, OF_CHANNEL.index(name)]
-        works = OF_CHANNEL.index("work"), OF_CHANNEL.index("gross_work"), OF_CHANNEL.index("lost")
-        found["gross_work"] = of_channels[:, :, works[1]].sum(axis=1)
-        for j, law in enumerate(channels.laws.tolist()):
-            if j < channels.contacts or j in self.circuits:
-                continue
-            if law == LINEAR_DAMPING:  # of the structure
-                found["dissipated"] += self.batch["account"] * of_channels[:, j, works[2]]
-            else:
-                found[_work_of(law)] += of_channels[:, j, works[0]] - of_channels[:, j, works[2]]
-        if self.batch["account"]:
+            found["circuits"] = np.stack(
+                [of[name][:, self.circuits] for name in ("lost", "late_lost", "peak_force")], axis=2
+            )
+        found["gross_work"] = of["gross_work"].sum(axis=1)
+        account = self.batch["account"]
+        for j, name in self.works():
+            found[name] += account * of["lost"][:, j] if name == "dissipated" else of["work"][:, j] - of["lost"][:, j]
+        if account:
             found["dissipated"] += found["lost"]
         return found
 
-
-def _work_of(law: int) -> str:
-    """The accumulator of the work of a channel that is no contact."""
-    return {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work"}.get(law, "local_force_work")
+    def works(self) -> list[tuple[int, str]]:
+        """Channels that are no contacts or circuits, and the accumulators of what they do."""
+        first, last = self.channels.contacts, self.channels.laws.size - self.channels.circuits
+        return [(j, _WORKS.get(int(self.channels.laws[j]), "local_force_work")) for j in range(first, last)]
 
 
 def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) -> None:
@@ -359,8 +300,7 @@ def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) 
         cuda.integrate(arrays.problem, arrays.batch, progress)
     else:
         layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
-        cores = 1 if arrays.calls_python else threads or usable_cores()
-        _core.integrate(arrays.problem, arrays.batch, layout, instruction_set(), cores, progress)
+        _core.integrate(arrays.problem, arrays.batch, layout, instruction_set(), arrays.threads(threads), progress)
     arrays.check()
     if progress is not None:
         progress(arrays.ensemble.size, arrays.ensemble.size)
@@ -379,18 +319,9 @@ def integrate_with_output_states(
     """Integrate as :func:`run_ensemble`, with the states at every output time."""
     arrays = _Arrays(ensemble)
     outputs = int(-(-ensemble.runs["end"][0] // ensemble.runs["output_interval"][0]))
-    n, count = arrays.order.size, arrays.channels.laws.size
-    arrays.batch["outputs"] = outputs
-    states = np.full((ensemble.size, outputs, 2 * n + 1 + 2 * count), np.nan)
-    arrays.batch["states"] = states
+    arrays.hand_out(outputs)
     _integrate(arrays, threads, progress)
-    q, p = arrays.modes_of(states, states[..., 2 * n + 1 + count :])
-    ticks = states[..., 2 * n + 1 : 2 * n + 1 + max(1, arrays.channels.contacts)]
-    if not arrays.channels.contacts:
-        ticks = np.full((ensemble.size, outputs, 1), -1.0)
-    return OutputStates(
-        arrays.accumulators(), q, p, states[..., 2 * n], np.where(ticks > 0.0, ticks / arrays.finer, ticks)
-    )
+    return OutputStates(arrays.accumulators(), *arrays.states())
 
 
 _ROWS = ("omega", "sigma", "g", "shift", "far_force", "center", "second")
@@ -409,9 +340,8 @@ def differentiable(above: Ensemble, below: Ensemble) -> bool:
     """Return whether two ensembles differ only in numbers of which the core takes derivatives, and little."""
     one, other = above.channels, below.channels
     assert one is not None and other is not None
-    if one.pieces.shape != other.pieces.shape or one.jumps.shape != other.jumps.shape:
-        return False
-    if not (one.jumps.argsort(axis=1, kind="stable") == other.jumps.argsort(axis=1, kind="stable")).all():
+    jumps = (each.jumps.argsort(axis=1, kind="stable") for each in (one, other))
+    if one.pieces.shape != other.pieces.shape or not np.array_equal(*jumps):
         return False
     if not _same(above, below, {"levels", "G", *_ROWS, *_SCALARS}):
         return False
@@ -482,17 +412,12 @@ def _seed(seeds: dict[str, _Array], name: str, directions: slice, change: _Array
 def _differentiated(ensemble: Ensemble) -> _Arrays:
     """Arrays of runs with derivatives, which end with an output."""
     arrays = _Arrays(ensemble, _GRADED if ensemble.order == 4 else 0)
-    batch, width = arrays.batch, 2 * arrays.order.size + 1 + 2 * arrays.channels.laws.size
-    batch["outputs"], batch["run"][:, RUN.index("output_interval")] = 1, batch["run"][:, RUN.index("end")]
-    batch["states"] = np.full((ensemble.size, 1, width), np.nan)
+    arrays.hand_out_end()
     return arrays
 
 
 def _integrate_tangents(arrays: _Arrays, seeds: dict[str, _Array], threads: int | None) -> None:
-    _core.integrate_tangents(
-        arrays.problem, arrays.batch, seeds, instruction_set(),
-        1 if arrays.calls_python else threads or usable_cores(), None,
-    )  # fmt: skip
+    _core.integrate_tangents(arrays.problem, arrays.batch, seeds, instruction_set(), arrays.threads(threads), None)
     arrays.check()
 
 
@@ -552,93 +477,51 @@ def record(
     ensemble: Ensemble, times: _Array, in_contact: bool, progress: Callable[[float], object] | None = None
 ) -> Iterator[Recorded]:
     """Integrate the one run of an ensemble once, and return its records, one part after the other."""
-    return Recording(ensemble, times, in_contact).pieces(progress)
+    arrays = _Arrays(ensemble)
+    n, channels = arrays.order.size, arrays.channels
+    arrays.batch["account"], count = 1, channels.laws.size
+    arrays.hand_out_end()
+    # one step may hold many instants
+    span, most = 2.0 * float(ensemble.step_times[0]), 0
+    for begin in range(0, times.size, _SAMPLES):  # a signal is heard between the parts
+        part = times[begin : begin + _SAMPLES]
+        found = np.searchsorted(times, part + span, side="right") - np.arange(begin, begin + part.size)
+        most = max(most, int(found.max()))
+    width = OF_SAMPLE + CHANNEL_SAMPLE * count
+    samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // (2 * n + width)), most + 8)
+    saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(OF_CORE) + 6 * channels.kinds.size + 32) * 8
+    marks = np.zeros(5, dtype=np.dtype("l"))
+    recorder: dict[str, Any] = {
+        "times": np.ascontiguousarray(times, dtype=float), "in_contact": int(in_contact), "rows": np.empty((samples, 2 * n)),
+        "values": np.empty((samples, width)), "impacts": np.empty((_IMPACTS + count, 5)), "marks": marks,
+        "saved": np.zeros(saved), "budget": _BUDGET,
+    }  # fmt: skip
+    layout = os.environ.get("SNAPBEAM_LAYOUT") or ("modes" if n > FEW_MODES else "thread")
+    running = True
+    while running:
+        _core.record(arrays.problem, arrays.batch, recorder, layout, instruction_set())
+        arrays.check()
+        piece = _recorded(arrays, recorder)
+        running = piece.accumulators_of_runs["status"][0] == RunStatus.INTERRUPTED
+        yield piece
+        if progress is not None:
+            progress(float(piece.accumulators_of_runs["time"][0]) / float(ensemble.runs["end"][0]))
+        marks[1] = marks[2] = 0
 
 
-class Recording:
-    """The one run of an ensemble, ready to be integrated any number of times."""
-
-    def __init__(self, ensemble: Ensemble, times: _Array, in_contact: bool) -> None:
-        self.arrays = arrays = _Arrays(ensemble)
-        n = arrays.order.size
-        channels: Channels = arrays.channels
-        arrays.batch["account"], arrays.batch["outputs"] = 1, 1
-        arrays.batch["run"][:, RUN.index("output_interval")] = arrays.batch["run"][:, RUN.index("end")]
-        count = channels.laws.size
-        arrays.batch["states"] = np.empty((1, 1, 2 * n + 1 + 2 * count))
-        # one step may hold many instants
-        span = 2.0 * float(ensemble.step_times[0])
-        most = 0
-        for begin in range(0, times.size, _SAMPLES):  # a signal is heard between the parts
-            part = times[begin : begin + _SAMPLES]
-            found = np.searchsorted(times, part + span, side="right") - np.arange(begin, begin + part.size)
-            most = max(most, int(found.max()))
-        width = 2 * n + OF_SAMPLE + CHANNEL_SAMPLE * count
-        samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // width), most + 8)
-        saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(STATISTICS) + 6 * channels.kinds.size + 32) * 8
-        self.recorder: dict[str, Any] = {
-            "times": np.ascontiguousarray(times, dtype=float),
-            "in_contact": int(in_contact),
-            "rows": np.empty((samples, 2 * n)),
-            "values": np.empty((samples, OF_SAMPLE + CHANNEL_SAMPLE * count)),
-            "impacts": np.empty((_IMPACTS + count, 5)),
-            "marks": np.zeros(5, dtype=np.dtype("l")),
-            "saved": np.zeros(saved),
-            "budget": _BUDGET,
-        }
-        self.layout = os.environ.get("SNAPBEAM_LAYOUT") or ("modes" if n > FEW_MODES else "thread")
-        self.set = instruction_set()
-
-    def pieces(self, progress: Callable[[float], object] | None = None) -> Iterator[Recorded]:
-        """Integrate the run from its beginning, and return its records, one part after the other."""
-        arrays, recorder = self.arrays, self.recorder
-        arrays.begin()
-        arrays.batch["states"].fill(np.nan)
-        marks = recorder["marks"]
-        marks.fill(0)
-        while True:
-            _core.record(arrays.problem, arrays.batch, recorder, self.layout, self.set)
-            arrays.check()
-            accumulators = arrays.accumulators()
-            held, impacts = int(marks[1]), int(marks[2])
-            running = accumulators["status"][0] == RunStatus.INTERRUPTED
-            yield _recorded(arrays, recorder, held, impacts, accumulators)
-            if progress is not None:
-                progress(float(accumulators["time"][0]) / float(arrays.ensemble.runs["end"][0]))
-            if not running:
-                return
-            marks[1] = marks[2] = 0
-
-
-def _recorded(arrays: _Arrays, recorder: Any, held: int, impacts: int, accumulators: Records) -> Recorded:
-    channels = arrays.channels
-    rows, values = recorder["rows"][:held], recorder["values"][:held]
+def _recorded(arrays: _Arrays, recorder: Any) -> Recorded:
+    """The piece of a run that a recorder holds; its state is not finite if the run diverged."""
+    channels, (held, impacts) = arrays.channels, recorder["marks"][1:3].tolist()
+    values, table = recorder["values"][:held], recorder["impacts"][:impacts]
     own = values[:, OF_SAMPLE:].reshape(held, channels.laws.size, CHANNEL_SAMPLE)
-    q, p = arrays.modes_of(rows, own[:, :, 5])
-    contacts, others = own[:, : channels.contacts], own[:, channels.contacts :]
+    q, p = arrays.modes_of(recorder["rows"][:held], own[:, :, 5])
+    contacts = own[:, : channels.contacts]
     found = np.zeros((held, len(SAMPLED) + arrays.circuits.size))
-    lost = contacts[:, :, 4].sum(axis=1)
-    found[:, :5] = np.stack(
-        (values[:, 1], contacts[:, :, 2].sum(axis=1), contacts[:, :, 3].sum(axis=1), values[:, 2] + lost, lost), axis=1
-    )
+    stored, work, lost = contacts[:, :, 2:5].sum(axis=1).T
+    found[:, :5] = np.stack((values[:, 1], stored, work, values[:, 2] + lost, lost), axis=1)
     found[:, len(SAMPLED) :] = own[:, arrays.circuits, 4]
-    for j, law in enumerate(channels.laws[channels.contacts :].tolist()):
-        if channels.contacts + j in arrays.circuits:
-            continue
-        if law == LINEAR_DAMPING:
-            found[:, SAMPLED.index("dissipated")] += others[:, j, 4]
-            continue
-        found[:, SAMPLED.index(_work_of(law))] += others[:, j, 3] - others[:, j, 4]
-    table = recorder["impacts"][:impacts]
+    for j, name in arrays.works():
+        found[:, SAMPLED.index(name)] += own[:, j, 4] if name == "dissipated" else own[:, j, 3] - own[:, j, 4]
     table = np.concatenate((table[:, 1:], table[:, :1] + 1.0), axis=1) if channels.contacts > 1 else table[:, 1:].copy()
-    state = _last(arrays, recorder, accumulators)
-    return Recorded(values[:, 0].copy(), q, p, contacts[:, :, :2].copy(), found, table, accumulators, state)
-
-
-def _last(arrays: _Arrays, recorder: Any, accumulators: Records) -> Last:
-    """State of the run where it stands; not finite if it diverged."""
-    n, contacts = arrays.order.size, max(1, arrays.channels.contacts)
-    final, count = arrays.batch["states"], arrays.channels.laws.size
-    q, p = arrays.modes_of(final[0, 0], final[0, 0, 2 * n + 1 + count :])
-    ticks = final[0, 0, 2 * n + 1 : 2 * n + 1 + contacts] if arrays.channels.contacts else np.full(1, -1.0)
-    return Last(q, p, int(final[0, 0, 2 * n]), np.where(ticks > 0.0, ticks / arrays.finer, ticks))
+    at, pressed = values[:, 0].copy(), contacts[:, :, :2].copy()
+    return Recorded(at, q, p, pressed, found, table, arrays.accumulators(), arrays.states())

@@ -29,7 +29,7 @@ from scipy.integrate import solve_ivp
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.quantity import section_of
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.excitation import motion_of, side_of, started
+from snapbeam.solver.excitation import carried, motion_of, side_of, started
 from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records, nodes_of
 from snapbeam.solver.statistics import WORKS, OutputStates, Recorded
 from snapbeam.solver.step_size import seconds_of
@@ -97,30 +97,22 @@ class Equations:
 
             return moved
 
-        base, others = system.base_excitation, ensemble.others
+        base = system.base_excitation
         self.base = None if base is None else moves("base_excitation", base.motion)
         self.up = -1.0 if base is not None and base.direction == "down" else 1.0
         self.load = None if system.axial_load is None else moves("axial_load", system.axial_load.motion)
         histories = [moves("force", each.history) for each in system.external_forces]
         self.external = list(zip(structure.force_rows, histories, strict=True))
         self.local: list[Any] = [(each, type(each.law).owner) for each in structure.local_forces]
-        rates = ensemble.circuit_rates[run] if ensemble.circuits else []
-        self.circuits = [
-            (each.row, each.mode, float(rate)) for each, rate in zip(structure.circuits, rates, strict=True)
-        ]
-        self.contacts, self.since = [], []
+        circuits = zip(structure.circuits, ensemble.circuits, strict=True)
+        self.circuits = [(each.row, each.mode, float(coupling.rate[run])) for each, coupling in circuits]
         self.state = [APART] * len(system.contacts)
-        for j, each in enumerate(system.contacts):
-            side = 1.0 if each.striker.side == "below" else -1.0
-            row, offset, since = (ensemble.contact_rows[table["contact_row"]], table["offset"], table["contact_time"])
-            if j:
-                assert others is not None
-                row = others.rows[others.places[run, j - 1]]
-                offset, since = others.offset[run, j - 1], others.since[run, j - 1]
-            motion = moves(section_of("drive", j + 1), each.striker.drive)
-            follows = 0.0 if base is None or base.striker_on_base else -side * self.up
-            self.contacts.append(Contact(each.law, row, offset, motion, follows, structure.mode_of_indentation(j)))
-            self.since.append(float(since))
+        self.contacts = [
+            Contact(each.law, ensemble.contact_rows[table["contact_row"][j]], table["offset"][j],
+                moves(section_of("drive", j + 1), each.striker.drive), carried(system, each.striker),
+                structure.mode_of_indentation(j))
+            for j, each in enumerate(system.contacts)
+        ]  # fmt: skip
 
     def tip(self, j: int, t: float) -> tuple[float, float]:
         """w_j and w_j' in the frame of the ends."""
@@ -142,9 +134,8 @@ class Equations:
     def pressure(self, j: int, d: float, rate: float, numbers: Any) -> float:
         """F_j(d) + c_j(d) d', which a contact does not let fall below zero."""
         law, d = type(self.contacts[j].law), max(d, 1e-30)  # laws are given for d > 0
-        return float(
-            law.force(numbers, d) + (law.damping_coefficient(numbers, d) * rate if law.rate_dependent else 0.0)
-        )
+        damping = law.damping_coefficient(numbers, d) * rate if law.rate_dependent else 0.0
+        return float(law.force(numbers, d) + damping)
 
     def currents(self, s: _Array) -> list[float]:
         """z_k, in units in which z^2/2 is an energy; of a circuit without inertia -rate t.q'."""
@@ -258,10 +249,7 @@ class Simulation(Records):
 
     def space(self, each: Any, _: float, s: _Array) -> float:
         """Distance of a local force's displacement from the nearest end of its law's range; negative outside."""
-        u, (low, high) = (
-            each.rest + float(each.row @ s[: self.eq.n]),
-            type(each.law).owner.displacement_range(each.law),
-        )
+        u, (low, high) = each.rest + float(each.row @ s[: self.eq.n]), type(each.law).owner.displacement_range(each.law)
         return min(u - low, high - u)
 
     def happened(self, j: int, what: str) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.solver.ensemble import Ensemble
-from snapbeam.solver.statistics import CIRCUIT_PEAK, SAMPLED, WORKS, Last, Recorded, empty_accumulators
+from snapbeam.solver.statistics import CIRCUIT_PEAK, SAMPLED, WORKS, Recorded, empty_accumulators
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
@@ -32,9 +32,9 @@ class Records:
         self.ensemble, self.eq, self.t, self.s = ensemble, eq, 0.0, s
         self.times, self.in_contact, self.tick = times, in_contact, float(table["tick"])
         self.end, self.late = float(table["end"]) * self.tick, float(table["last_quarter"]) * self.tick
-        row = ensemble.contact_rows[table["contact_row"]]
+        row = ensemble.contact_rows[table["contact_row"][0]]
         self.places = np.stack((structure.row_of_beam(row), structure.center))
-        self.at_rest = np.array([float(table["rest_contact"]), structure.center_rest])
+        self.at_rest = np.array([float(table["rest_contact"][0]), structure.center_rest])
         self.level = float(structure.dividing_height)
         wells = ensemble.structure.unequal_wells
         self.second_well = ensemble.structure.shift + (0.0 if wells is None else wells.second)
@@ -43,7 +43,7 @@ class Records:
         self.loads = [False] * count
         """True for each contact with a memory whose law is on the way that changes the memory, not below it."""
         self.peaks, self.largest, self.hits = [0.0] * count, [0.0] * count, [0] * count
-        for j, since in enumerate(eq.since):
+        for j, since in enumerate(table["contact_time"][:count].tolist()):
             d, rate, numbers = eq.contact(j, 0.0, s)
             if d > 0.0:
                 eq.state[j] = PRESSING if eq.pressure(j, d, rate, numbers) > 0.0 else LOOSE
@@ -51,7 +51,7 @@ class Records:
                 self.loads[j] = self.at_yield(j)
         self.impacts: list[list[float]] = []
         self.samples: list[tuple[Any, ...]] = []
-        self.found = found = empty_accumulators(1, max(0, count - 1), len(eq.circuits))
+        self.found = found = empty_accumulators(1, count, len(eq.circuits))
         found["status"], found["first_energy"] = RunStatus.OK, self.energy()
         for i, name in enumerate(("displacement", "center")):
             found[f"min_{name}"] = found[f"max_{name}"] = self.at_rest[i] + self.places[i] @ s[: eq.n]
@@ -94,11 +94,8 @@ class Records:
         # the energy of the modes is counted from the well on whose side mid-span is
         far = (heights[1, : nodes.size] > self.level) & (structure.stretch > 0.0)
         q = inside[:n] - np.where(far, self.second_well[:, None], 0.0)
-        energies = (
-            0.5
-            * (inside[n : 2 * n] ** 2 + (eq.omega[:, None] * q) ** 2)
-            * (np.arange(n) < structure.equilibrium.size)[:, None]
-        )
+        energies = 0.5 * (inside[n : 2 * n] ** 2 + (eq.omega[:, None] * q) ** 2)
+        energies[structure.equilibrium.size :] = 0.0
         found["energy_time"] += weights @ energies.sum(axis=0)
         found["high_energy_time"] += weights @ energies[structure.high_modes(self.ensemble.high_omega)].sum(axis=0)
         if eq.circuits:
@@ -114,10 +111,8 @@ class Records:
             asked = np.union1d(asked, part.t[1:])
         for t, s in zip(asked.tolist(), part.sol(asked).T if asked.size else (), strict=True):
             pressed = [(eq.contact(j, t, s)[0], self.force(j, t, s)) for j in range(len(eq.contacts))]
-            sums, works = (
-                s[2 * n : 2 * n + len(SUMS)],
-                s[self.impulse(0) + 1 : self.impulse(len(eq.contacts)) : 2].sum(),
-            )
+            sums = s[2 * n : 2 * n + len(SUMS)]
+            works = s[self.impulse(0) + 1 : self.impulse(len(eq.contacts)) : 2].sum()
             stored = sum(eq.stored(j, t, s) for j in touching)
             values = (eq.energy(s), stored, works, sums[0] + sums[1], sums[0], *sums[3:])
             self.samples.append((t, s[:n], s[n : 2 * n], pressed, (*values, *s[s.size - len(eq.circuits) :])))
@@ -139,13 +134,12 @@ class Records:
         found["displacement"], found["center"] = self.at_rest + self.places @ s[:n]
         found["side"] = 1 if found["center"][0] > self.level else -1
         found["contact_time"] += sum(min(each * self.tick, self.t) for each in lasting if each >= 0.0)
-        found["touching"], found["onset"] = lasting[0] >= 0.0, found["time"] - max(0, round(lasting[0]))
-        found["peak_force"] = self.peaks[0] if self.peaks else 0.0
+        found["peak_force"] = max(self.peaks, default=0.0)
         if self.eq.circuits:
             losses = s[s.size - early.size :]
             found["circuits"][0, :, :CIRCUIT_PEAK] = np.stack((losses, losses - early), axis=1)
-        if len(self.eq.state) > 1:
-            found["others"][0] = np.stack((self.hits, self.peaks, impulses, works), axis=1)[1:]
+        if self.eq.state:
+            found["contacts"][0] = np.stack((self.hits, self.peaks, impulses, works), axis=1)
 
     def impact_ended(self, j: int) -> None:
         """Enter an impact."""
@@ -163,5 +157,5 @@ class Records:
             for each, shape in zip(columns, ((), (n,), (n,), (count, 2), (width,)), strict=True)
         )
         impacts = np.array(self.impacts).reshape(-1, 5)[:, : 5 if len(self.eq.state) > 1 else 4]
-        last = Last(self.s[:n], self.s[n : 2 * n], 1, np.array(self.lasting()))
+        last = tuple(np.array(each)[None, None] for each in (self.s[:n], self.s[n : 2 * n], 1.0, self.lasting()))
         return Recorded(at, q, p, contacts, values, impacts, self.found, last)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.early_termination import crossing_energy, decidable_energy, passed_heights
+from snapbeam.model.early_termination import crossing_energy, decidable_energy
 from snapbeam.model.extension import takes
 from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
@@ -63,48 +63,23 @@ SAMPLED = ("energy", "contact", "work", "dissipated", "lost", *WORKS)
 """Columns of the values of a sample; the energies lost in circuits follow."""
 
 
-# What every engine keeps: name, kind, value at the start.
-_KEPT: tuple[tuple[str, type, float], ...] = (
-    ("status", np.int64, int(RunStatus.NOT_RUN)),
-    ("time", np.int64, 0),  # ticks integrated
-    ("touching", np.int64, 0),
-    ("onset", np.int64, 0),  # tick at which the present contact began
-    ("side", np.int64, 0),  # sign of the centre displacement, -1 in the well the run began in
-    ("zero_crossings", np.int64, 0),
-    ("zero_crossings_last_quarter", np.int64, 0),
-    ("impacts", np.int64, 0),
-    ("steps", np.int64, 0),
-    ("last_zero_crossing", np.float64, math.nan),
-    ("min_displacement", np.float64, 0.0),
-    ("max_displacement", np.float64, 0.0),
-    ("min_center", np.float64, 0.0),
-    ("max_center", np.float64, 0.0),
-    ("peak_velocity", np.float64, 0.0),
-    ("peak_midspan_velocity", np.float64, 0.0),
-    ("square_displacement", np.float64, 0.0),  # integrals over time
-    ("square_center", np.float64, 0.0),
-    ("square_velocity", np.float64, 0.0),
-    ("square_midspan_velocity", np.float64, 0.0),
-    ("energy_time", np.float64, 0.0),  # integral of the modal energy, sampled
-    ("high_energy_time", np.float64, 0.0),  # of the modes above a frequency
-    ("peak_force", np.float64, 0.0),
-    ("contact_time", np.float64, 0.0),
-    ("total_impulse", np.float64, 0.0),
-    ("work", np.float64, 0.0),
-    ("gross_work", np.float64, 0.0),
-    ("dissipated", np.float64, 0.0),  # integrated, where an energy balance is computed
-    ("lost", np.float64, 0.0),  # in contact
-    *((name, np.float64, 0.0) for name in WORKS),
-    ("first_energy", np.float64, 0.0),
-    ("energy", np.float64, 0.0),  # at the end, contact included
-    ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
-    ("center", np.float64, 0.0),
-    ("early_stop_time", np.float64, math.nan),
-)
-
-
-OTHER_IMPACTS, OTHER_PEAK, OTHER_IMPULSE, OTHER_WORK = range(4)
-"""Columns of the statistics of each striker after the first."""
+OF_CORE = (
+    "status", "time", "side", "zero_crossings", "zero_crossings_last_quarter", "last_zero_crossing", "steps", "trials",
+    "sampled_steps", "min_displacement", "max_displacement", "min_center", "max_center", "peak_velocity",
+    "peak_midspan_velocity", "square_displacement", "square_center", "square_velocity", "square_midspan_velocity",
+    "energy_time", "high_energy_time", "dissipated", "first_energy", "energy", "displacement", "center", "early_stop_time",
+)  # fmt: skip
+"""Counts of the core for a run, as in ``core/api.hpp: Statistic``: the time in ticks; sides are -1 in the well that a run
+begins in; squares and energies of modes are integrals over time; the last energy has that of contacts."""
+_KEPT = (*OF_CORE, "impacts", "peak_force", "contact_time", "total_impulse", "work", "gross_work", "lost", *WORKS)
+"""Accumulators of every engine for a run: the same and those of all channels."""
+_COUNTED = frozenset(OF_CORE[:5]) | {"steps", "trials", "sampled_steps", "impacts"}
+_AT_START = {"status": float(RunStatus.NOT_RUN), "last_zero_crossing": math.nan, "early_stop_time": math.nan}
+"""Values at the start that are not 0."""
+OF_CONTACT = ("impacts", "peak_force", "impulse", "work")
+"""Columns of what is kept of each contact."""
+CIRCUIT_LOSS, CIRCUIT_LATE_LOSS, CIRCUIT_PEAK = range(3)
+"""Columns of each circuit: energy lost, J, with load; that in the last quarter; maximum of its coordinate."""
 
 
 @dataclass(frozen=True)
@@ -165,47 +140,51 @@ class Statistic:
         return found[1] if found else ""
 
 
+def _over(above: Values, below: Values) -> Values:
+    """A ratio, NaN where there is nothing to divide by."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(below > 0.0, above / below, np.nan)
+
+
 def _column(column: str) -> Callable[[Reading], Values]:
     return lambda reading: reading.accumulators[column]
 
 
-def _seen(column: str, factor: Callable[[Reading], float] = lambda _: 1.0) -> Callable[[Reading], Values]:
-    return lambda reading: reading.seen(column) * factor(reading)
+def _seen(column: str) -> Callable[[Reading], Values]:
+    return lambda reading: reading.seen(column)
 
 
-def _low_high(low: str, high: str, greatest: bool) -> Callable[[Reading], Values]:
+def _speed(column: str) -> Callable[[Reading], Values]:
+    return lambda reading: reading.seen(column) * (1.0 / reading.speed)
+
+
+def _low_high(of: str, greatest: bool) -> Callable[[Reading], Values]:
     """Minimum or maximum displacement over b, in the signs of space."""
 
     def value(reading: Reading) -> Values:
-        upward = reading.sign > 0.0
-        column = high if greatest == upward else low
-        return reading.sign * reading.seen(column) / reading.length + 0.0
+        end = "max" if greatest == (reading.sign > 0.0) else "min"
+        return reading.sign * reading.seen(f"{end}_{of}") / reading.length + 0.0
 
     return value
 
 
-def _peak(low: str, high: str) -> Callable[[Reading], Values]:
-    return lambda reading: np.maximum(np.abs(reading.seen(low)), np.abs(reading.seen(high))) / reading.length
+def _peak(of: str) -> Callable[[Reading], Values]:
+    ends = f"min_{of}", f"max_{of}"
+    return lambda reading: np.maximum(*(np.abs(reading.seen(end)) for end in ends)) / reading.length
 
 
-def _rms(column: str, per_speed: bool) -> Callable[[Reading], Values]:
+def _rms(of: str) -> Callable[[Reading], Values]:
     def value(reading: Reading) -> Values:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            mean = np.where(reading.duration > 0.0, reading.seen(column) / reading.duration, np.nan)
-        return np.asarray(np.sqrt(mean) / (reading.speed if per_speed else reading.length))
+        mean = _over(reading.seen(f"square_{of}"), reading.duration)
+        return np.asarray(np.sqrt(mean) / (reading.speed if "velocity" in of else reading.length))
 
     return value
 
 
 def _response(reading: Reading) -> Values:
-    accumulators = reading.accumulators
-    kinds = class_of(
-        accumulators["zero_crossings"],
-        accumulators["zero_crossings_last_quarter"],
-        reading.ensemble.cycles,
-        -reading.first_side * accumulators["side"],
-    )
-    ensemble = reading.ensemble
+    kept, ensemble = reading.accumulators, reading.ensemble
+    all_crossings, late = kept["zero_crossings"], kept["zero_crossings_last_quarter"]
+    kinds = class_of(all_crossings, late, ensemble.cycles, -ensemble.first_side * kept["side"])
     structure = ensemble.structure
     if not (structure.model.is_bistable and structure.wells_are_mirror_images and ensemble.has_striker):
         # the paper's rule is for equal wells and a striker; here the centre may cross far from the other well
@@ -213,16 +192,9 @@ def _response(reading: Reading) -> Values:
     return np.where(reading.good, kinds, ResponseClass.UNKNOWN)
 
 
-def _contact_share(reading: Reading) -> Values:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(reading.duration > 0.0, reading.accumulators["contact_time"] / reading.duration, np.nan)
-    return np.where(reading.good, share, np.nan)
-
-
 def _high_share(reading: Reading) -> Values:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = reading.seen("high_energy_time") / reading.seen("energy_time")
-    return np.where(reading.seen("energy_time") > 0.0, share, np.where(reading.good, 0.0, np.nan))
+    energy = reading.seen("energy_time")
+    return np.where(energy > 0.0, _over(reading.seen("high_energy_time"), energy), np.where(reading.good, 0.0, np.nan))
 
 
 def _dissipated(reading: Reading) -> Values:
@@ -230,28 +202,16 @@ def _dissipated(reading: Reading) -> Values:
     return given - (reading.seen("energy") - reading.seen("first_energy")) - _harvested(reading)
 
 
-def _in_loads(reading: Reading, column: int) -> Values:
+def _harvested(reading: Reading, column: int = CIRCUIT_LOSS) -> Values:
     """Energies lost in circuits that ended in their loads."""
-    found = np.zeros(reading.accumulators.size)
-    for i, circuit in enumerate(reading.ensemble.circuits):
-        found = found + circuit.share * reading.accumulators["circuits"][:, i, column]
-    return np.where(reading.good, found, np.nan)
-
-
-def _harvested(reading: Reading) -> Values:
-    return _in_loads(reading, CIRCUIT_LOSS)
-
-
-def _harvested_power(reading: Reading) -> Values:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(reading.duration > 0.0, _harvested(reading) / reading.duration, np.nan)
+    circuits = enumerate(reading.ensemble.circuits)
+    parts = (circuit.share * reading.accumulators["circuits"][:, i, column] for i, circuit in circuits)
+    return np.where(reading.good, sum(parts, start=np.zeros(reading.accumulators.size)), np.nan)
 
 
 def _harvested_per_cycle(reading: Reading) -> Values:
     runs = reading.ensemble.runs
-    with np.errstate(invalid="ignore", divide="ignore"):
-        done = reading.ensemble.cycles * reading.duration / (runs["end"] * runs["tick"])
-        return np.where(done > 0.0, _harvested(reading) / done, np.nan)
+    return _over(_harvested(reading), reading.ensemble.cycles * reading.duration / (runs["end"] * runs["tick"]))
 
 
 def _late_duration(reading: Reading) -> Values:
@@ -259,10 +219,6 @@ def _late_duration(reading: Reading) -> Values:
     runs = reading.ensemble.runs
     inside = (reading.accumulators["time"] - runs["last_quarter"]) * runs["tick"]
     return np.where(inside > 0.0, inside, np.nan)
-
-
-def _late_harvested_power(reading: Reading) -> Values:
-    return _in_loads(reading, CIRCUIT_LATE_LOSS) / _late_duration(reading)
 
 
 def _late_voltage(reading: Reading) -> Values:
@@ -276,15 +232,10 @@ def _late_voltage(reading: Reading) -> Values:
 
 
 def _peak_voltage(reading: Reading) -> Values:
-    if not reading.ensemble.circuits:
-        return np.where(reading.good, 0.0, np.nan)
-    peak = reading.accumulators["circuits"][:, 0, CIRCUIT_PEAK] * np.abs(reading.ensemble.circuits[0].volts)
+    peak: Any = 0.0
+    if reading.ensemble.circuits:
+        peak = reading.accumulators["circuits"][:, 0, CIRCUIT_PEAK] * np.abs(reading.ensemble.circuits[0].volts)
     return np.where(reading.good, peak, np.nan)
-
-
-def _mean_power(reading: Reading) -> Values:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(reading.duration > 0.0, reading.seen("work") / reading.duration, np.nan)
 
 
 _ERROR = "relative error of the integral over time, beside that of the run: at most about {} (standard), {} (reference)"
@@ -298,122 +249,77 @@ _PEAK = (
 _PEAK_VELOCITY = _PEAK.format("1e-4", "1e-5")
 _PEAK_VOLTAGE = _PEAK.format("5e-3", "1e-5")
 
-_ROWS = (
-    Statistic("response_class", "int8", "1", "response class", _response),
-    Statistic("status", "int8", "1", "status of the run", lambda reading: reading.status),
-    Statistic("zero_crossings", "int32", "1", "zero crossings of the centre displacement", _column("zero_crossings")),
-    Statistic(
-        "zero_crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _column("zero_crossings_last_quarter")
-    ),
-    Statistic("last_zero_crossing", "float64", "s", "time of the last zero crossing", _column("last_zero_crossing")),
-    Statistic(
-        "final_well", "int8", "1", "sign of the centre displacement at the end",
-        lambda reading: reading.sign * reading.accumulators["side"],
-    ),
-    Statistic(
-        "other_well_reached", "bool", "1",
+_TABLE: dict[str, tuple[Any, ...]] = {
+    "response_class": ("int8", "1", _response, "response class"),
+    "status": ("int8", "1", lambda reading: reading.status, "status of the run"),
+    "zero_crossings": ("int32", "1", _column("zero_crossings"), "zero crossings of the centre displacement"),
+    "zero_crossings_last_quarter":
+        ("int32", "1", _column("zero_crossings_last_quarter"), "zero crossings in the last quarter"),
+    "last_zero_crossing": ("float64", "s", _column("last_zero_crossing"), "time of the last zero crossing"),
+    "final_well": ("int8", "1", lambda reading: reading.sign * reading.accumulators["side"],
+        "sign of the centre displacement at the end"),
+    "other_well_reached": ("bool", "1", lambda reading: reading.other_well_reached,
         "whether the centre came more than half of the way from the border of the wells to the well it did not begin in, "
-        "or provably stays in that well; with one well, to the mirror image of its rest",
-        lambda reading: reading.other_well_reached,
-    ),
-    Statistic("final_well_proven", "bool", "1", "whether the run provably ends in its last well", lambda r: r.final),
-    Statistic(
-        "min_displacement", "float64", "1", "minimum beam displacement at the striker, over b",
-        _low_high("min_displacement", "max_displacement", greatest=False),
-    ),
-    Statistic(
-        "max_displacement", "float64", "1", "maximum beam displacement at the striker, over b",
-        _low_high("min_displacement", "max_displacement", greatest=True),
-    ),
-    Statistic(
-        "min_midspan_displacement", "float64", "1", "minimum mid-span displacement, over b",
-        _low_high("min_center", "max_center", greatest=False),
-    ),
-    Statistic(
-        "max_midspan_displacement", "float64", "1", "maximum mid-span displacement, over b",
-        _low_high("min_center", "max_center", greatest=True),
-    ),
-    Statistic("peak_force", "float64", "N", "peak contact force", lambda reading: reading.peak_force),
-    Statistic("impacts", "int32", "1", "impacts", _column("impacts")),
-    Statistic("contact_time_fraction", "float64", "1", "fraction of time in contact", _contact_share),
-    Statistic("early_stop_time", "float64", "s", "time at which the class became certain", _column("early_stop_time")),
-    Statistic(
-        "peak_displacement", "float64", "1", "maximum distance of the contact point from the straight beam, over b",
-        _peak("min_displacement", "max_displacement"),
-    ),
-    Statistic(
-        "peak_midspan_displacement", "float64", "1", "maximum distance of mid-span from the straight beam, over b",
-        _peak("min_center", "max_center"),
-    ),
-    Statistic(
-        "peak_velocity", "float64", "1", "maximum speed of the contact point, over b omega_1",
-        _seen("peak_velocity", lambda reading: 1.0 / reading.speed), comment=_PEAK_VELOCITY,
-    ),
-    Statistic(
-        "peak_midspan_velocity", "float64", "1", "maximum speed of mid-span, over b omega_1",
-        _seen("peak_midspan_velocity", lambda reading: 1.0 / reading.speed), comment=_PEAK_VELOCITY,
-    ),
-    Statistic(
-        "rms_displacement", "float64", "1", "root mean square displacement of the contact point, over b",
-        _rms("square_displacement", per_speed=False), comment=_RMS_DISPLACEMENT,
-    ),
-    Statistic(
-        "rms_midspan_displacement", "float64", "1", "root mean square displacement of the centre, over b",
-        _rms("square_center", per_speed=False), comment=_RMS_DISPLACEMENT,
-    ),
-    Statistic(
-        "rms_velocity", "float64", "1", "root mean square velocity of the contact point, over b omega_1",
-        _rms("square_velocity", per_speed=True), comment=_RMS_VELOCITY,
-    ),
-    Statistic(
-        "rms_midspan_velocity", "float64", "1", "root mean square velocity of the centre, over b omega_1",
-        _rms("square_midspan_velocity", per_speed=True), comment=_RMS_VELOCITY,
-    ),
-    Statistic("impulse", "float64", "N s", "impulse on the beam, all impacts", _seen("total_impulse")),
-    Statistic("striker_work", "float64", "J", "work done by the striker", _seen("work")),
-    Statistic(
-        "gross_work", "float64", "J", "work done by strikers, base, axial load and external forces, taken as positive",
-        _seen("gross_work"),
-    ),
-    Statistic("mean_power", "float64", "W", "work done by the striker over the time of the run", _mean_power),
-    Statistic(
-        "energy_dissipated", "float64", "J", "energy dissipated: all work less what the beam gained",
-        _dissipated,
-    ),
-    Statistic("energy_lost_contact", "float64", "J", "energy lost in contact", _seen("lost")),
-    Statistic(
-        "high_frequency_energy_fraction", "float64", "1", "fraction of the modal energy above a multiple of omega_1, over time",
-        _high_share, comment=_SHARE,
-    ),
-    *(Statistic(name, "float64", "J", long_name, _seen(name)) for name, long_name in WORKS.items()),
-    Statistic("energy_harvested", "float64", "J", "energy that ended in the loads of harvesters", _harvested),
-    Statistic(
-        "harvested_power", "float64", "W", "energy in the loads of harvesters over the time of the run", _harvested_power
-    ),
-    Statistic(
-        "harvested_per_cycle", "float64", "J", "energy in the loads of harvesters over the cycles of the run",
-        _harvested_per_cycle,
-    ),
-    Statistic(
-        "harvested_power_last_quarter", "float64", "W", "power in the loads of harvesters, last quarter of the run",
-        _late_harvested_power,
-    ),
-    Statistic(
-        "rms_voltage_last_quarter", "float64", "V", "root mean square voltage across the (first) load, last quarter of the run",
-        _late_voltage,
-    ),
-    Statistic("peak_voltage", "float64", "V", "maximum voltage across the (first) load", _peak_voltage,
-        comment=_PEAK_VOLTAGE,
-    ),
-)  # fmt: skip
+        "or provably stays in that well; with one well, to the mirror image of its rest"),
+    "final_well_proven": ("bool", "1", lambda r: r.final, "whether the run provably ends in its last well"),
+    "min_displacement":
+        ("float64", "1", _low_high("displacement", False), "minimum beam displacement at the striker, over b"),
+    "max_displacement":
+        ("float64", "1", _low_high("displacement", True), "maximum beam displacement at the striker, over b"),
+    "min_midspan_displacement": ("float64", "1", _low_high("center", False), "minimum mid-span displacement, over b"),
+    "max_midspan_displacement": ("float64", "1", _low_high("center", True), "maximum mid-span displacement, over b"),
+    "peak_force": ("float64", "N", lambda reading: reading.peak_force, "peak contact force"),
+    "impacts": ("int32", "1", _column("impacts"), "impacts"),
+    "contact_time_fraction": ("float64", "1", lambda reading: _over(reading.seen("contact_time"), reading.duration),
+        "fraction of time in contact"),
+    "early_stop_time": ("float64", "s", _column("early_stop_time"), "time at which the class became certain"),
+    "peak_displacement":
+        ("float64", "1", _peak("displacement"), "maximum distance of the contact point from the straight beam, over b"),
+    "peak_midspan_displacement":
+        ("float64", "1", _peak("center"), "maximum distance of mid-span from the straight beam, over b"),
+    "peak_velocity": ("float64", "1", _speed("peak_velocity"),
+        "maximum speed of the contact point, over b omega_1", _PEAK_VELOCITY),
+    "peak_midspan_velocity": ("float64", "1", _speed("peak_midspan_velocity"),
+        "maximum speed of mid-span, over b omega_1", _PEAK_VELOCITY),
+    "rms_displacement": ("float64", "1", _rms("displacement"),
+        "root mean square displacement of the contact point, over b", _RMS_DISPLACEMENT),
+    "rms_midspan_displacement": ("float64", "1", _rms("center"),
+        "root mean square displacement of the centre, over b", _RMS_DISPLACEMENT),
+    "rms_velocity": ("float64", "1", _rms("velocity"),
+        "root mean square velocity of the contact point, over b omega_1", _RMS_VELOCITY),
+    "rms_midspan_velocity": ("float64", "1", _rms("midspan_velocity"),
+        "root mean square velocity of the centre, over b omega_1", _RMS_VELOCITY),
+    "impulse": ("float64", "N s", _seen("total_impulse"), "impulse on the beam, all impacts"),
+    "striker_work": ("float64", "J", _seen("work"), "work done by the striker"),
+    "gross_work": ("float64", "J", _seen("gross_work"),
+        "work done by strikers, base, axial load and external forces, taken as positive"),
+    "mean_power": ("float64", "W", lambda reading: _over(reading.seen("work"), reading.duration),
+        "work done by the striker over the time of the run"),
+    "energy_dissipated": ("float64", "J", _dissipated, "energy dissipated: all work less what the beam gained"),
+    "energy_lost_contact": ("float64", "J", _seen("lost"), "energy lost in contact"),
+    "high_frequency_energy_fraction": ("float64", "1", _high_share,
+        "fraction of the modal energy above a multiple of omega_1, over time", _SHARE),
+    **{name: ("float64", "J", _seen(name), long_name) for name, long_name in WORKS.items()},
+    "energy_harvested": ("float64", "J", _harvested, "energy that ended in the loads of harvesters"),
+    "harvested_power": ("float64", "W", lambda reading: _over(_harvested(reading), reading.duration),
+        "energy in the loads of harvesters over the time of the run"),
+    "harvested_per_cycle": ("float64", "J", _harvested_per_cycle,
+        "energy in the loads of harvesters over the cycles of the run"),
+    "harvested_power_last_quarter":
+        ("float64", "W", lambda reading: _harvested(reading, CIRCUIT_LATE_LOSS) / _late_duration(reading),
+        "power in the loads of harvesters, last quarter of the run"),
+    "rms_voltage_last_quarter": ("float64", "V", _late_voltage,
+        "root mean square voltage across the (first) load, last quarter of the run"),
+    "peak_voltage": ("float64", "V", _peak_voltage, "maximum voltage across the (first) load", _PEAK_VOLTAGE),
+}  # fmt: skip
+"""Data type, unit, value, long name and comment of each statistic of the package."""
+_ROWS = tuple(
+    Statistic(name, dtype, unit, long_name, value, comment="".join(comment))
+    for name, (dtype, unit, value, long_name, *comment) in _TABLE.items()
+)
 
 
-def _of_one_striker(name: str) -> Statistic | None:
-
-    return of_one_named(name)
-
-
-STATISTICS: dict[str, Statistic] = NamedTable(_of_one_striker, ((row.name, row) for row in _ROWS))
+STATISTICS: dict[str, Statistic] = NamedTable(lambda name: of_one_named(name), ((row.name, row) for row in _ROWS))
 """Variables of a map and attributes of an outcome, by name; ``peak_force_contact_2`` is found too, not listed."""
 
 
@@ -474,16 +380,12 @@ def unregister_statistic(name: str) -> None:
     del STATISTICS[name]
 
 
-CIRCUIT_LOSS, CIRCUIT_LATE_LOSS, CIRCUIT_PEAK = range(3)
-"""Columns of each circuit: energy lost, J, with load; that in the last quarter; maximum of its coordinate."""
-
-
-def accumulators_dtype(others: int = 0, circuits: int = 0) -> np.dtype[Any]:
-    """One record of what engines keep of a run, with *others* strikers beside the first and so many circuits."""
-    fields: list[Any] = [("others", np.float64, (others, OTHER_WORK + 1))] if others else []
-    fields += [("circuits", np.float64, (circuits, CIRCUIT_PEAK + 1))] if circuits else []
+def accumulators_dtype(contacts: int = 0, circuits: int = 0) -> np.dtype[Any]:
+    """One record of what engines keep of a run, with so many contacts and circuits."""
+    parts = (("contacts", contacts, len(OF_CONTACT)), ("circuits", circuits, CIRCUIT_PEAK + 1))
+    fields: list[Any] = [(name, np.float64, (count, columns)) for name, count, columns in parts if count]
     fields += [(f"own_{row.name}", np.float64) for row in updated()]
-    fields += [(name, kind) for name, kind, _ in _KEPT]
+    fields += [(name, np.int64 if name in _COUNTED else np.float64) for name in _KEPT]
     return np.dtype(fields, align=True)
 
 
@@ -491,13 +393,11 @@ ACCUMULATORS = accumulators_dtype()
 """Data type of the accumulators of the package's own statistics."""
 
 
-def empty_accumulators(runs: int, others: int = 0, circuits: int = 0) -> Any:
-    """Accumulators of runs that have not begun, with *others* strikers beside the first and so many circuits."""
-    accumulators_of_runs = np.zeros(runs, dtype=accumulators_dtype(others, circuits))
-    for name, _, start in _KEPT:
+def empty_accumulators(runs: int, contacts: int = 0, circuits: int = 0) -> Any:
+    """Accumulators of runs that have not begun, with so many contacts and circuits."""
+    accumulators_of_runs = np.zeros(runs, dtype=accumulators_dtype(contacts, circuits))
+    for name, start in (_AT_START | {f"own_{row.name}": row.start for row in updated()}).items():
         accumulators_of_runs[name] = start
-    for row in updated():
-        accumulators_of_runs[f"own_{row.name}"] = row.start
     return accumulators_of_runs
 
 
@@ -518,12 +418,12 @@ def lost_in_circuits(accumulators_of_runs: Any) -> NDArray[np.float64]:
 
 
 _EACH = {
-    "impacts": (OTHER_IMPACTS, "impacts"),
-    "peak_force": (OTHER_PEAK, "peak contact force"),
-    "impulse": (OTHER_IMPULSE, "impulse on the beam, all impacts"),
-    "striker_work": (OTHER_WORK, "work done"),
+    "impacts": ("impacts", "impacts"),
+    "peak_force": ("peak_force", "peak contact force"),
+    "impulse": ("impulse", "impulse on the beam, all impacts"),
+    "striker_work": ("work", "work done"),
 }
-"""Statistics of each of several strikers: column of the further strikers, and long name."""
+"""Statistics of each of several strikers: one of :data:`OF_CONTACT`, and long name."""
 
 
 def name_in(held: Container[Any], name: str) -> str:
@@ -580,11 +480,6 @@ class Reading:
         """Speed that normalises velocities, m/s."""
         return self.ensemble.scale.length * self.ensemble.scale.omega
 
-    @property
-    def first_side(self) -> NDArray[np.int64]:
-        """Side of the centre that each run begins on."""
-        return self.ensemble.first_side
-
     @cached_property
     def status(self) -> NDArray[np.int64]:
         """Status of each run; ENERGY_ERROR if a run gained more energy than the work done on it.
@@ -614,34 +509,17 @@ class Reading:
         """A column, NaN where the run failed."""
         return np.where(self.good, self.accumulators[column], np.nan)
 
-    @property
-    def others(self) -> NDArray[np.float64]:
-        """Statistics of each striker after the first, shape (runs, strikers, kinds)."""
-        if self.ensemble.others is None:
-            return np.zeros((self.accumulators.size, 0, 4))
-        return np.asarray(self.accumulators["others"])
-
-    def one(self, column: int, number: int) -> NDArray[np.float64]:
-        """A column of one of several strikers, the first being 1: its own is what the others leave of the whole."""
-        others = self.others[:, :, column]
-        if number > 1:
-            found = others[:, number - 2]
-        elif column == OTHER_PEAK:
-            found = self.accumulators["peak_force"]
-        else:
-            whole = {OTHER_IMPACTS: "impacts", OTHER_IMPULSE: "total_impulse", OTHER_WORK: "work"}[column]
-            found = self.accumulators[whole] - others.sum(axis=1)
-        return np.asarray(found if column == OTHER_IMPACTS else np.where(self.good, found, np.nan))
+    def one(self, column: str, number: int) -> NDArray[np.float64]:
+        """A column of one of several strikers, the first being 1."""
+        found = self.accumulators["contacts"][:, number - 1, OF_CONTACT.index(column)]
+        return np.asarray(found if column == "impacts" else np.where(self.good, found, np.nan))
 
     @property
     def peak_force(self) -> NDArray[np.float64]:
         """Peak force of any striker; NaN if impacts have zero duration."""
         force = self.seen("peak_force")
-        if self.ensemble.others is not None:
-            return np.maximum(force, self.others[:, :, OTHER_PEAK].max(axis=1))
-        if self.ensemble.law.impulsive:
-            return np.where((force == 0.0) & (self.accumulators["impacts"] > 0), np.nan, force)
-        return force
+        without = self.ensemble.impulsive & (force == 0.0) & (self.accumulators["impacts"] > 0)
+        return np.where(without, np.nan, force)
 
     @cached_property
     def other_well_reached(self) -> NDArray[np.bool_]:
@@ -661,8 +539,8 @@ class Reading:
             return np.zeros(kept.size, dtype=bool)
         upper, lower = 0.5 * (max(first, second) - level), 0.5 * (min(first, second) - level)
         over, under = kept["max_center"] - level > upper, kept["min_center"] - level < lower
-        stays = self.final & (kept["side"] == -self.first_side)
-        return np.asarray(self.good & (np.where(self.first_side < 0, over, under) | stays))
+        stays = self.final & (kept["side"] == -self.ensemble.first_side)
+        return np.asarray(self.good & (np.where(self.ensemble.first_side < 0, over, under) | stays))
 
     @cached_property
     def final(self) -> NDArray[np.bool_]:
@@ -679,10 +557,7 @@ class Reading:
         settled = self.good & (accumulators["energy"] < crossing_energy(model) - model.well_energy)
         if not (ensemble.highest > -np.inf).any():
             return np.asarray(settled)
-        reach = np.maximum(ensemble.highest, 0.0)
-        if not ensemble.structure.wells_are_mirror_images:
-            reach = passed_heights(model, ensemble.location, ensemble.highest)
-        away = settled & (accumulators["side"] > 0) & (accumulators["displacement"] > reach)
+        away = settled & (accumulators["side"] > 0) & (accumulators["displacement"] > ensemble.reach)
         away &= accumulators["center"] > ensemble.structure.dividing_height
         which = np.flatnonzero(away)
         if which.size:
@@ -695,8 +570,7 @@ def statistics_of(ensemble: Ensemble, accumulators_of_runs: Records) -> dict[str
     """Statistics of runs in the units and signs of a map, arrays of shape (runs,) by name."""
     reading = Reading(ensemble, accumulators_of_runs)
     found = {}
-    strikers = 1 if ensemble.others is None else 1 + len(ensemble.others.laws)
-    for name, row in rows_for(strikers).items():
+    for name, row in rows_for(ensemble.contacts).items():
         values = row.value(reading) if row.update is None else row.value(reading, accumulators_of_runs[f"own_{name}"])
         found[name] = np.asarray(values).astype(row.dtype)
     return found
@@ -718,17 +592,6 @@ class OutputStates(NamedTuple):
     """Ticks since the present contact of each striker began, -1: apart, shape (runs, output states, strikers)."""
 
 
-class Last(NamedTuple):
-    """Final state of a recorded run."""
-
-    q: _Array
-    """Linear modes about the current well, shape (N,)."""
-    p: _Array
-    well_sign: int
-    contact_ticks: NDArray[np.int64]
-    """Contact ticks of each striker, shape (strikers,)."""
-
-
 class Recorded(NamedTuple):
     """A piece of a recorded run."""
 
@@ -745,7 +608,8 @@ class Recorded(NamedTuple):
     """Onset, duration, peak force and impulse of each impact that ended, shape (impacts, 4)."""
     accumulators_of_runs: Records
     """The run's record of accumulators as it is at the end of the piece, shape (1,)."""
-    last: Last
+    last: tuple[Any, ...]
+    """State at its end: what :class:`OutputStates` holds of one run and one time."""
 
     def at(self, which: Any) -> Recorded:
         """Some of the samples."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import OrderedDict
 from functools import cached_property
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -162,11 +163,8 @@ def _with_coupled_damping(structure: Structure, order: int, step: float, limit: 
 
     The error is the norm of the difference from the exact flow of the linear modes, in the coordinates omega q and p.
     """
-    coefficients, rows, composition = (
-        structure.damping_coefficients,
-        structure.damping_rows,
-        _core.COMPOSITIONS[composition_of(order, True)],
-    )
+    coefficients, rows = structure.damping_coefficients, structure.damping_rows
+    composition = _core.COMPOSITIONS[composition_of(order, True)]
     if not coefficients.size:
         return step
     n, sigma = structure.omega.size, structure.damping_ratio * structure.omega
@@ -182,14 +180,14 @@ def _with_coupled_damping(structure: Structure, order: int, step: float, limit: 
     def error(h: float) -> float:
         steps, found = math.ceil(period / h), np.eye(2 * n)
         flows = {weight: expm(weight * h * alone) for weight in set(composition[0])}
-        for i, weight in enumerate(composition[1]):
+        for weight, between in zip_longest(composition[1], composition[0]):
             decay = float(np.abs(weight * h * coefficients).sum())
             parts = min(max(round(decay * per_decay + 0.5), fewest), 256)
             x = -weight * h * coefficients / parts  # by Runge and Kutta, as the core kicks
             gain = (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0)))) ** parts - 1.0
             found[n:] += (rows.T * gain) @ (rows @ found[n:])
-            if i < len(composition[0]):
-                flow = flows[composition[0][i]][..., None]
+            if between is not None:
+                flow = flows[between][..., None]
                 q, p = found[:n], found[n:]
                 found = np.concatenate([flow[:, k, 0] * q + flow[:, k, 1] * p for k in (0, 1)])
         exact = expm(h * matrix)
@@ -220,18 +218,17 @@ def growth(structure: Structure, order: int, step: float) -> float:
     state = np.tile(np.eye(2 * n), (_TENSIONS.size, 1, 1))
     q, p = state[:, :n], state[:, n:]
     pull = -stretch * (coupling / omega) * _TENSIONS[:, None, None]
-    for i, kick in enumerate(composition[1]):
+    for kick, flow in zip_longest(composition[1], composition[0]):
         p = p + kick * step * (pull @ q)
-        if i < len(composition[0]):
-            time = composition[0][i] * step
+        if flow is not None:
+            time = flow * step
             sine, cosine, decay = ((np.sin(root * time) / root).real, np.cos(root * time).real, np.exp(-damping * time))
-            a = [
+            ahead, turned, behind = (
                 decay * (cosine + damping * sine),
                 decay * sine * omega,
-                -decay * sine * omega,
                 decay * (cosine - damping * sine),
-            ]
-            q, p = (a[0][:, None] * q + a[1][:, None] * p, a[2][:, None] * q + a[3][:, None] * p)
+            )
+            q, p = ahead[:, None] * q + turned[:, None] * p, -turned[:, None] * q + behind[:, None] * p
     power, logarithm = np.concatenate((q, p), axis=1), np.zeros(_TENSIONS.size)
     for _ in range(_SQUARINGS):
         power = power @ power
@@ -255,50 +252,36 @@ class _Bench:
     """The structure, let go."""
 
     def __init__(self, structure: Structure, order: int, impact: float, far: bool = False) -> None:
-        model = structure.model
-        self.structure = structure
-        self.order = order
+        model, n = structure.model, min(structure.omega.size, _MOST_MODES)
+        self.structure, self.order = structure, order
         self.period = 1.0 / _first_frequency(model)
-        length = model.length_scale or 1.0
-        shapes = [model.shape_at(x) for x in _PLACES] if model.beam is not None else [model.midspan_shape]
-        if model.contact_shape is not None:
-            shapes.append(model.contact_shape)
-        lowest = slice(0, _MOST_MODES)
-        self.omega, self.damping = (structure.omega[lowest], (structure.damping_ratio * structure.omega)[lowest])
-        self.coupling = structure.coupling[lowest, lowest]
-        self.well = structure.well[lowest]
-        self.rest = self.force = np.zeros(self.omega.size)
-        if far:
-            self.well, self.rest, self.force = (each[lowest] for each in structure.about_second_well())
-        self.rows = (np.array(shapes) @ model.linear_modes)[:, lowest] / length
-        if model.beam is not None:
-            tip = model.shape_at(_STRUCK)
-        else:
-            tip = model.midspan_shape if model.contact_shape is None else model.contact_shape
-        impulse_shape = (tip @ model.linear_modes)[lowest]
+        own = [] if model.contact_shape is None else [model.contact_shape]
+        shapes = [model.midspan_shape, *own] if model.beam is None else [*map(model.shape_at, _PLACES), *own]
+        rows = (np.array(shapes) @ model.linear_modes)[:, :n] / (model.length_scale or 1.0)
+        tip = shapes[-1] if model.beam is None else model.shape_at(_STRUCK)
+        impulse_shape = (tip @ model.linear_modes)[:n]
         if not impulse_shape.any():
-            impulse_shape = np.ones(self.omega.size)
-        barrier = barrier_of(structure) or 0.5 * (2.0 * math.pi / self.period / np.abs(self.rows[:, 0]).max()) ** 2
+            impulse_shape = np.ones(n)
+        barrier = barrier_of(structure) or 0.5 * (2.0 * math.pi / self.period / np.abs(rows[:, 0]).max()) ** 2
+        # modes that the tension couples follow each other
+        placed, self.blocks = coupled_blocks(structure.coupling[:n, :n] != 0.0)
+        self.omega, self.damping = structure.omega[placed], (structure.damping_ratio * structure.omega)[placed]
+        self.coupling, self.rows = np.ascontiguousarray(structure.coupling[np.ix_(placed, placed)]), rows[:, placed]
+        about = structure.about_second_well() if far else (structure.well, np.zeros(n), np.zeros(n))
+        self.well, self.rest, self.force = (each[placed] for each in about)
         self.starts = []
         for energy, duration, *_ in _STARTS:
             # the spectrum of a pulse falls off beyond the inverse of what it lasts
             lasting = min(duration, impact) * self.period
-            velocity = impulse_shape / (1.0 + (self.omega * lasting / math.pi) ** 2)
-            self.starts.append(velocity * math.sqrt(2.0 * energy * barrier / (velocity @ velocity)))
-        # modes that the tension couples follow each other
-        placed, self.blocks = coupled_blocks(self.coupling != 0.0)
-        self.coupling = np.ascontiguousarray(self.coupling[np.ix_(placed, placed)])
-        self.omega, self.damping, self.well = self.omega[placed], self.damping[placed], self.well[placed]
-        self.rest, self.force, self.rows = self.rest[placed], self.force[placed], self.rows[:, placed]
-        self.starts = [start[placed] for start in self.starts]
+            velocity = impulse_shape / (1.0 + (structure.omega[:n] * lasting / math.pi) ** 2)
+            self.starts.append((velocity * math.sqrt(2.0 * energy * barrier / (velocity @ velocity)))[placed])
 
     def ends(self, velocity: _Array, counts: _Array, order: int) -> _Array:
         """Displacements at the end, with each number of steps, over the length that normalises.
 
         Shape (counts, places).
         """
-        steps = _PERIODS * self.period / counts
-        batch = _free_runs(self.rest, velocity, steps, counts)
+        batch = _free_runs(self.rest, velocity, _PERIODS * self.period / counts, counts)
         problem = self._problem | {"composition": composition_of(order)}
         _core.integrate(problem, batch, "runs", "", usable_cores(), None)
         found: _Array = batch["states"][:, 0, : self.omega.size]
@@ -437,16 +420,10 @@ _FEWEST_CLOCK = 4.0
 """Flight steps, at least, in a cycle of excitation and in a period of the first mode, of a step that was asked for."""
 
 
-class Clocked(NamedTuple):
-    """Duration of runs and time grid."""
-
-    cycles: float
-
-
 def clocked(
     table: Records, system: System, integration: Integration, cycle: _Array, plans: list[Plan], periods: float | None
-) -> Clocked:
-    """Enter the ticks of every run in the table of runs.
+) -> float:
+    """Enter the ticks of every run in the table of runs, and return the cycles of each.
 
     *cycle* holds the seconds of one cycle of excitation of each run.
 
@@ -456,17 +433,12 @@ def clocked(
         If a run has more steps than can be counted in ticks, or a record ends before it.
     """
     require_resolved(system, integration, cycle)
-    lengths = np.array([plan.step for plan in plans])
-    drive = system.primary_excitation[1] if system.primary_excitation is not None else None
+    drive = None if system.primary_excitation is None else system.primary_excitation[1]
     alone = len(system.moving) < 2
     repeats = drive is None or (drive.is_periodic and alone)
-    table["step"] = SUBDIVISION
-    table["contact_step"] = [
-        min(plan.contact, plan.step * 0.5**plan.min_contact_halvings if plan.contact == math.inf else math.inf)
-        for plan in plans
-    ]
-    table["min_contact_halvings"] = [plan.min_contact_halvings for plan in plans]
-    table["max_halvings"] = [plan.max_halvings for plan in plans]
+    _, lengths, least, most, contact = np.array(plans).T
+    table["step"], table["min_contact_halvings"], table["max_halvings"] = SUBDIVISION, least, most
+    table["contact_step"] = np.where(contact == math.inf, lengths * 0.5**least, contact)
     if isinstance(drive, RecordedMotion):
         # the argument makes one turn over a record alone, and over HORIZON cycles of several motions
         left = 1.0 - table["phase"] / (2.0 * math.pi) * (1.0 if alone else HORIZON * cycle / drive.duration)
@@ -474,10 +446,8 @@ def clocked(
     else:
         cycles_asked = float(integration.cycles_or_default if periods is None else periods)
     if isinstance(drive, RecordedMotion) and alone:
-        turn = np.full(table.size, drive.duration)
-        steps = _whole_steps(turn, lengths, 1.0)
-        table["period"] = steps * SUBDIVISION
-        table["tick"] = turn / table["period"]
+        table["period"] = _whole_steps(np.full(table.size, drive.duration), lengths, 1.0) * SUBDIVISION
+        table["tick"] = drive.duration / table["period"]
         held = drive.duration * drive.frequency
         table["output_interval"] = np.rint(table["period"] / held)
         share = cycles_asked / drive.frequency / drive.duration
@@ -486,8 +456,7 @@ def clocked(
         cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
     else:
         cycles = cycles_asked
-        steps = _whole_steps(cycle, lengths, cycles)
-        table["period"] = steps * SUBDIVISION
+        table["period"] = _whole_steps(cycle, lengths, cycles) * SUBDIVISION
         table["tick"] = cycle / table["period"]
         table["end"] = table["period"] * int(cycles)
         if not cycles.is_integer():
@@ -506,7 +475,7 @@ def clocked(
     if periods is None:
         table["output_interval"] = table["end"]
     table["last_quarter"] = table["end"] // 4 * 3
-    return Clocked(cycles)
+    return cycles
 
 
 def _asked_cycles(drive: RecordedMotion, integration: Integration, periods: float | None, left: float) -> float:

@@ -141,7 +141,7 @@ class Structure:
 
         *sign* is +1 if it pushes as the first one does.
         """
-        row: _Array = sign * self.sign * (self.model.linear_modes.T @ shape)
+        row = np.asarray(sign * self.sign * (self.model.linear_modes.T @ shape))
         own = [-1.0 / math.sqrt(each.mass) if each.contact == contact else 0.0 for each in self.bodies]
         return np.concatenate((row, own, np.zeros(self.omega.size - row.size - len(own))))
 
@@ -181,10 +181,9 @@ class Structure:
 
         Shape (...), or (..., strikers) of several strikers.
         """
-        found = np.full((*values.shape[:-1], max(1, self.strikers)), np.nan)
-        for mode, each in enumerate(self.bodies, self.equilibrium.size):
-            found[..., each.contact] = each.sign * values[..., mode] / math.sqrt(each.mass)
-        return found if self.strikers > 1 else found[..., 0]
+        bodies = enumerate(self.bodies, self.equilibrium.size)
+        own = {each.contact: each.sign * values[..., mode] / math.sqrt(each.mass) for mode, each in bodies}
+        return _by_part(own, self.strikers, values)
 
     def mode_of_indentation(self, contact: int) -> int | None:
         """Place of the mode that holds the residual indentation of a contact, from 0; None without one."""
@@ -197,21 +196,16 @@ class Structure:
 
         Shape (...), or (..., strikers) of several strikers.
         """
-        found = np.full((*q.shape[:-1], max(1, self.strikers)), np.nan)
-        for contact in self.indentations:
-            found[..., contact] = q[..., self.mode_of_indentation(contact)]
-        return found if self.strikers > 1 else found[..., 0]
+        return _by_part({each: q[..., self.mode_of_indentation(each)] for each in self.indentations}, self.strikers, q)
 
     def circuits_of(self, q: _Array) -> _Array:
         """The coordinates y = Q - t.q of the circuits in q of shape (..., N); NaN of those without inertia.
 
         Shape (...), or (..., circuits) of several circuits.
         """
-        found = np.full((*q.shape[:-1], max(1, len(self.circuits))), np.nan)
-        for i, each in enumerate(self.circuits):
-            if each.mode is not None:
-                found[..., i] = q[..., each.mode] - q @ each.row
-        return found if len(self.circuits) > 1 else found[..., 0]
+        circuits = enumerate(self.circuits)
+        own = {i: q[..., each.mode] - q @ each.row for i, each in circuits if each.mode is not None}
+        return _by_part(own, len(self.circuits), q)
 
     def to_modal(
         self,
@@ -230,56 +224,56 @@ class Structure:
         q, p = back @ (alpha - self.equilibrium), back @ velocity
         for each in self.bodies:
             scale = each.sign * math.sqrt(each.mass)
-            own = [np.broadcast_to(value, max(1, self.strikers))[each.contact] for value in (shift, rate)]
-            own = [0.0 if np.isnan(value) else scale * float(value) for value in own]
+            own = [scale * _number(value, self.strikers, each.contact) + 0.0 for value in (shift, rate)]
             q, p = np.append(q, own[0]), np.append(p, own[1])
         for contact in self.indentations:
-            held = float(np.broadcast_to(indentation, max(1, self.strikers))[contact])
-            q, p = np.append(q, 0.0 if np.isnan(held) else held), np.append(p, 0.0)
+            q, p = np.append(q, _number(indentation, self.strikers, contact)), np.append(p, 0.0)
         for i, row in enumerate(self.circuits):
             if row.mode is not None:
-                y = float(np.broadcast_to(circuit, len(self.circuits))[i])
-                charge = (0.0 if np.isnan(y) else y) + row.row[: q.size] @ q
+                charge = _number(circuit, len(self.circuits), i) + row.row[: q.size] @ q
                 q, p = np.append(q, charge), np.append(p, 0.0)
         return q, p
 
     def amplitudes(self, q: _Array) -> _Array:
         """alpha of q of shape (..., N) about the well."""
-        alpha: _Array = self.equilibrium + q[..., : self.equilibrium.size] @ self.model.linear_modes.T
-        return alpha
+        return np.asarray(self.equilibrium + q[..., : self.equilibrium.size] @ self.model.linear_modes.T)
 
     def velocities(self, p: _Array) -> _Array:
         """Velocities of alpha, of p of shape (..., N)."""
-        velocity: _Array = p[..., : self.equilibrium.size] @ self.model.linear_modes.T
-        return velocity
+        return np.asarray(p[..., : self.equilibrium.size] @ self.model.linear_modes.T)
 
     @cached_property
     def hash(self) -> str:
         """SHA-256 of its numbers, which linear algebra may round otherwise on another type of processor."""
-        digest = hashlib.sha256()
-        for part in (self.omega, self.damping_ratio, self.coupling, self.well, self.center, self.equilibrium):
-            digest.update(np.ascontiguousarray(part).tobytes())
-        digest.update(np.array([self.nonlinear_stiffness, self.sign]).tobytes())
+        wells, digest = self.unequal_wells, hashlib.sha256()
+        parts: list[Any] = [self.omega, self.damping_ratio, self.coupling, self.well, self.center, self.equilibrium]
+        parts.append([self.nonlinear_stiffness, self.sign])
         if self.damping_coefficients.size:
-            digest.update(np.column_stack((self.damping_coefficients, self.damping_rows)).tobytes())
-        if self.unequal_wells is not None:
-            digest.update(np.ascontiguousarray(self.unequal_wells.force).tobytes())
-        for circuit in self.circuits:
-            digest.update(np.ascontiguousarray(circuit.row).tobytes())
-        if self.base_load is not None:
-            digest.update(np.ascontiguousarray(self.base_load).tobytes())
-        for row in self.force_rows:
-            digest.update(np.ascontiguousarray(row).tobytes())
-        if self.bodies:
-            digest.update(np.array([value for each in self.bodies for value in each.of_hash]).tobytes())
-        if self.indentations:
-            digest.update(np.array(self.indentations).tobytes())
+            parts.append(np.column_stack((self.damping_coefficients, self.damping_rows)))
+        parts += [] if wells is None else [wells.force]
+        parts += [each.row for each in self.circuits]
+        parts += [] if self.base_load is None else [self.base_load]
+        parts += [*self.force_rows, [value for each in self.bodies for value in each.of_hash]]
+        parts.append(np.array(self.indentations, dtype=np.int64))
         for force in self.local_forces:
             kind = type(force.law).owner
-            digest.update(f"{kind.__module__}.{kind.__qualname__}".encode())
-            digest.update(np.ascontiguousarray(force.row).tobytes())
-            digest.update(np.array([*force.law]).tobytes())
+            parts += [f"{kind.__module__}.{kind.__qualname__}".encode(), force.row, [*force.law]]
+        for part in parts:
+            digest.update(part if isinstance(part, bytes) else np.ascontiguousarray(part).tobytes())
         return digest.hexdigest()
+
+
+def _number(value: float | _Array, parts: int, part: int) -> float:
+    """The number of one of several parts, 0 if it is not given."""
+    return float(np.nan_to_num(np.broadcast_to(value, max(1, parts))[part]))
+
+
+def _by_part(own: dict[int, _Array], parts: int, values: _Array) -> _Array:
+    """Numbers of parts as a column each, NaN of those that have none; of one part without an axis of its own."""
+    found = np.full((*values.shape[:-1], max(1, parts)), np.nan)
+    for part, value in own.items():
+        found[..., part] = value
+    return found if parts > 1 else found[..., 0]
 
 
 def structure_of(
@@ -305,6 +299,7 @@ def structure_of(
     equilibrium = sign * model.well_amplitude
     modes = model.linear_modes
     structure = Structure(
+        strikers=len(strikers),
         omega=model.omega,
         damping_ratio=model.modal_damping.ratio,
         damping_rows=model.modal_damping.rows,
@@ -322,24 +317,20 @@ def structure_of(
         unequal_wells=_uneven(model, sign, dividing_height),
         base_load=None if base is None else -(modes.T @ rigid_mass(model)),
         force_rows=tuple(np.asarray(modes.T @ each.row(model)) for each in forces),
-        local_forces=tuple(_local_force(model, equilibrium, each) for each in local_forces),
+        local_forces=tuple(
+            LocalForceRow(modes.T @ shape, float(shape @ equilibrium), each.numbers)
+            for each in local_forces
+            for shape in [each.row(model)]
+        ),
     )
-    structure = dataclasses.replace(structure, strikers=len(strikers))
     for contact, striker in enumerate(strikers):
         if striker.mass is not None:
-            structure = _with_body(
-                structure, striker, contact, carried_by_base=base is not None and base.striker_on_base
-            )
+            structure = _with_body(structure, striker, contact, base is not None and base.striker_on_base)
     for contact in indentations:
         structure = dataclasses.replace(_with_mode(structure), indentations=(*structure.indentations, contact))
     for harvester in harvesters:
         structure = _with_circuit(structure, harvester)
     return structure
-
-
-def _local_force(model: ReducedModel, equilibrium: _Array, local_force: LocalForce) -> LocalForceRow:
-    shape = local_force.row(model)
-    return LocalForceRow(model.linear_modes.T @ shape, float(shape @ equilibrium), local_force.numbers)
 
 
 def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> UnequalWells | None:
@@ -382,19 +373,17 @@ def _with_mode(
         well=np.append(structure.well, 0.0),
         center=np.append(structure.center, 0.0),
         shift=np.append(structure.shift, shift),
-        unequal_wells=None
-        if wells is None
-        else dataclasses.replace(wells, force=np.append(wells.force, 0.0), second=np.append(wells.second, 0.0)),
+        unequal_wells=None if wells is None else _longer(wells, "force", "second"),
         base_load=None if structure.base_load is None else np.append(structure.base_load, base_load),
         force_rows=tuple(np.append(each, 0.0) for each in structure.force_rows),
-        local_forces=_longer(structure.local_forces),
-        circuits=_longer(structure.circuits),
+        local_forces=tuple(_longer(each, "row") for each in structure.local_forces),
+        circuits=tuple(_longer(each, "row") for each in structure.circuits),
     )
 
 
-def _longer(parts: Any) -> Any:
-    """Parts whose rows have one more mode."""
-    return tuple(dataclasses.replace(each, row=np.append(each.row, 0.0)) for each in parts)
+def _longer(part: Any, *rows: str) -> Any:
+    """A part whose rows have one more mode."""
+    return dataclasses.replace(part, **{name: np.append(getattr(part, name), 0.0) for name in rows})
 
 
 def _with_body(structure: Structure, striker: Striker, contact: int, carried_by_base: bool) -> Structure:

@@ -85,7 +85,7 @@ def _compile(function: Any, doubles: int, compiled: Any, called: Any) -> tuple[s
 @functools.cache  # an address stays valid
 def _function(function: Callable[..., float], numbers: Any, arguments: int) -> Function:
     """A function of a law's numbers, and perhaps of x and y."""
-    count = len(numbers._fields)
+    count, taken = len(numbers._fields), arguments + 1
 
     def compiled(numba: Any, physics: Any, called: Any) -> Any:
         from numba.np.unsafe.ndarray import to_fixed_tuple
@@ -94,33 +94,18 @@ def _function(function: Callable[..., float], numbers: Any, arguments: int) -> F
         def law(given):
             return numbers(*to_fixed_tuple(numba.carray(given, count), count))
 
-        def of_none(x, y, given):
+        def of_numbers(x, y, given):
             try:
-                return float(physics(law(given)))
+                return float(physics(*(law(given), x, y)[:taken]))
             except Exception:
                 return called(x, y, given)
 
-        def of_x(x, y, given):
-            try:
-                return float(physics(law(given), x))
-            except Exception:
-                return called(x, y, given)
-
-        def of_both(x, y, given):
-            try:
-                return float(physics(law(given), x, y))
-            except Exception:
-                return called(x, y, given)
-
-        return (of_none, of_x, of_both)[arguments]
+        return of_numbers
 
     return Function(
-        f"{numbers.owner.__name__}.{function.__name__}",
-        function,
-        2,
-        lambda x, y, given: (numbers(*given[:count]), x, y)[: arguments + 1],
-        compiled,
-    )
+        f"{numbers.owner.__name__}.{function.__name__}", function, 2,
+        lambda x, y, given: (numbers(*given[:count]), x, y)[:taken], compiled,
+    )  # fmt: skip
 
 
 def _step_of(a: Any) -> CompletedStep:
@@ -150,14 +135,9 @@ def _update(function: Callable[..., float]) -> Function:
 def updates_of(statistics: Sequence[Statistic]) -> list[Function]:
     """The functions that the core calls after every step, of statistics with ``update``."""
     found = [_update(each.update) for each in statistics if each.update is not None]
-    tell(
-        Diagnostic(
-            "statistic.slow",
-            f"statistic {row.name!r}: the solver calls Python after every step, which is slow: {each.why_slow}",
-        )
-        for row, each in zip(statistics, found, strict=True)
-        if each.why_slow
-    )
+    words = "statistic {!r}: the solver calls Python after every step, which is slow: {}"
+    pairs = ((row.name, each.why_slow) for row, each in zip(statistics, found, strict=True) if each.why_slow)
+    tell(Diagnostic("statistic.slow", words.format(*pair)) for pair in pairs)
     return found
 
 
@@ -207,14 +187,9 @@ def local_force(force: LocalForce, largest: float, fastest: float) -> UserLaw:
     core, span = ("lossy force" if kind.dissipative else "force"), 1e-4 * largest
     limits = force.displacement_range(force.numbers)
     return _law_of(
-        kind,
-        core,
-        [*elastic, None, *lossy, None, None],
-        limits,
-        span if force.is_conservative else 0.0,
-        min(force.reversal_speed(largest, fastest), _FAR),
-        kind.is_limited(),
-    )
+        kind, core, [*elastic, None, *lossy, None, None], limits, span if force.is_conservative else 0.0,
+        min(force.reversal_speed(largest, fastest), _FAR), kind.is_limited(),
+    )  # fmt: skip
 
 
 def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float, reversal: float, limited: bool = False) -> UserLaw:  # fmt: skip
