@@ -19,6 +19,7 @@ from snapbeam.solver.statistics import OF_CONTACT, OF_CORE, SAMPLED, OutputState
 from snapbeam.solver.step_size import CALM, PARTS, barrier_of, composition_of
 from snapbeam.solver.user_laws import Function, updates_of
 from snapbeam.util.cores import instruction_set, usable_cores
+from snapbeam.util.interrupts import raise_held
 from snapbeam.util.status_codes import RunStatus
 
 _Array = NDArray[np.float64]
@@ -483,7 +484,8 @@ def record(
     arrays.hand_out_end()
     # one step may hold many instants
     span, most = 2.0 * float(ensemble.step_times[0]), 0
-    for begin in range(0, times.size, _SAMPLES):  # a signal is heard between the parts
+    for begin in range(0, times.size, _SAMPLES):
+        raise_held()
         part = times[begin : begin + _SAMPLES]
         found = np.searchsorted(times, part + span, side="right") - np.arange(begin, begin + part.size)
         most = max(most, int(found.max()))
