@@ -21,7 +21,7 @@ from snapbeam.simulation.dataset import joined
 from snapbeam.simulation.request import cycle_of
 from snapbeam.simulation.simulate import prepared
 from snapbeam.solver.assemble import make_ensemble, run_columns
-from snapbeam.solver.native import Recording, integrate_with_output_states
+from snapbeam.solver.native import integrate_with_output_states, pieces, recorder_of
 
 PACKAGE = "snapbeam"
 _MANY: dict[tuple[Any, ...], Any] = {}
@@ -165,10 +165,10 @@ def _prepared(case: Case, setting: dict[str, Any]) -> Any:
 def prepare(case: Case, setting: dict[str, Any]) -> Callable[[], Result]:
     """A solve of the case."""
     run, origin = _prepared(case, setting)
-    recording = Recording(run.ensemble, run.times, False)
+    prepared_run = recorder_of(run.ensemble, run.times, False)
 
     def solve() -> Result:
-        found = joined(list(recording.pieces()))
+        found = joined(list(pieces(*prepared_run)))
         status = int(found.accumulators_of_runs["status"][0])
         if status:
             raise CannotRun(f"status {status}")

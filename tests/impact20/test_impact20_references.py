@@ -129,6 +129,19 @@ def test_scipy_runner_reproduces_the_references(problem):
             assert result.impacts == stored["impacts"]
 
 
+@pytest.mark.parametrize("problem", sorted({*names()} - {"finite_elements_200", "threshold", "replicas"}))
+def test_snapbeam_runner_reproduces_the_references(problem):
+    module = runner("snapbeam")
+    for case in load(problem).cases:
+        stored, solve = load(problem).references[case.name], module.prepare(case, {"method": "reference", "step": 1.0})
+        for result in (solve(), solve()):
+            # conditioning: largest change of an output per relative change of the data
+            allowed = max(1e-6, 1e-9 * stored["conditioning"]) * case.scale
+            assert np.max(np.abs(result.values - np.array(stored["values"]))) < allowed
+            if case.count_impacts:
+                assert result.impacts == stored["impacts"]
+
+
 def test_events_are_needed_for_restitution():
     with pytest.raises(CannotRun):
         runner("SciPy").prepare(load("two_stops").cases[0], {"method": "RK45", "tolerance": 1e-6, "events": False})()

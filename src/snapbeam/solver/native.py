@@ -183,6 +183,7 @@ class _Arrays:
         """Outputs as they are before a run."""
         self.batch["statistics"].fill(np.nan)
         self.batch["statistics"][:, 0] = -1.0
+        self.batch["states"].fill(np.nan)
         self.batch["of_channels"].fill(0.0)
         self.batch["held"][:] = [float(row.start) for row in self.updated]
 
@@ -477,7 +478,12 @@ def changed_accumulators(
 def record(
     ensemble: Ensemble, times: _Array, in_contact: bool, progress: Callable[[float], object] | None = None
 ) -> Iterator[Recorded]:
-    """Integrate the one run of an ensemble once, and return its records, one part after the other."""
+    """Integrate the one run of an ensemble, and return its records, one part after the other."""
+    return pieces(*recorder_of(ensemble, times, in_contact), progress)
+
+
+def recorder_of(ensemble: Ensemble, times: _Array, in_contact: bool) -> tuple[_Arrays, dict[str, Any]]:
+    """The one run of an ensemble and room for its records, for :func:`pieces`."""
     arrays = _Arrays(ensemble)
     n, channels = arrays.order.size, arrays.channels
     arrays.batch["account"], count = 1, channels.laws.size
@@ -492,13 +498,20 @@ def record(
     width = OF_SAMPLE + CHANNEL_SAMPLE * count
     samples = max(min(_SAMPLES if in_contact else times.size + 8, _SAMPLES, _NUMBERS // (2 * n + width)), most + 8)
     saved = (3 * (n + 64) + count * (12 + len(OF_CHANNEL)) + len(OF_CORE) + 6 * channels.kinds.size + 32) * 8
-    marks = np.zeros(5, dtype=np.dtype("l"))
-    recorder: dict[str, Any] = {
+    return arrays, {
         "times": np.ascontiguousarray(times, dtype=float), "in_contact": int(in_contact), "rows": np.empty((samples, 2 * n)),
-        "values": np.empty((samples, width)), "impacts": np.empty((_IMPACTS + count, 5)), "marks": marks,
+        "values": np.empty((samples, width)), "impacts": np.empty((_IMPACTS + count, 5)), "marks": np.zeros(5, np.dtype("l")),
         "saved": np.zeros(saved), "budget": _BUDGET,
     }  # fmt: skip
-    layout = os.environ.get("SNAPBEAM_LAYOUT") or ("modes" if n > FEW_MODES else "thread")
+
+
+def pieces(
+    arrays: _Arrays, recorder: dict[str, Any], progress: Callable[[float], object] | None = None
+) -> Iterator[Recorded]:
+    """Integrate a run from its beginning, and return its records, one part after the other."""
+    layout = os.environ.get("SNAPBEAM_LAYOUT") or ("modes" if arrays.order.size > FEW_MODES else "thread")
+    arrays.begin()
+    recorder["marks"][:] = 0
     running = True
     while running:
         _core.record(arrays.problem, arrays.batch, recorder, layout, instruction_set())
@@ -507,8 +520,8 @@ def record(
         running = piece.accumulators_of_runs["status"][0] == RunStatus.INTERRUPTED
         yield piece
         if progress is not None:
-            progress(float(piece.accumulators_of_runs["time"][0]) / float(ensemble.runs["end"][0]))
-        marks[1] = marks[2] = 0
+            progress(float(piece.accumulators_of_runs["time"][0]) / float(arrays.ensemble.runs["end"][0]))
+        recorder["marks"][1:3] = 0
 
 
 def _recorded(arrays: _Arrays, recorder: Any) -> Recorded:
