@@ -41,7 +41,7 @@ _LOWEST = 4.0  # least amplitude of a usable cycle, in standard deviations of it
 _CERTAIN = 30.0  # chi-square by which a second law must better the fit
 _MOST = 0.45  # of the viscous rate that laws which are not told may put in doubt; more is no damping
 _ODDS = 8.0  # chi-square at which an explanation is as likely as none: its parameter, and that it is rare
-_BEYOND = ((2.0, 0.0455), (4.0, 0.002))  # standard errors, and the probability beyond that may be left to no law
+_BEYOND = ((2.0, 0.0455), (5.0, 0.01))  # standard errors, and the probability beyond that may be left to no law
 _FEW = 4  # amplitudes below which a record tells nothing of its law
 _SHARE = 0.9  # of the probability of all forms, that one of the list must have
 _SMOOTH = 8  # degree of the polynomial that a residual of amplitudes is tested with
@@ -411,7 +411,7 @@ def find_law(
     """The law of damping that the amplitude of each cycle shows, its doubt, and what it leaves over the noise.
 
     The doubt is half the reach about the damping ratio at zero amplitude, over that ratio, that holds all forms but 4.55 %
-    of their probability, or a quarter of that which holds all but .2 %: how far a curve may turn below the amplitudes of
+    of their probability, or a fifth of that which holds all but 1 %: how far a curve may turn below the amplitudes of
     the record.  *start* [s] is where the decay begins, *decay_rate* [1/s] a guess
     of the viscous rate, *bend* the change of ln a by softening at the start and its standard deviation.
     """
