@@ -139,6 +139,7 @@ def test_several_numbers_of_modes():
         ("modes", [1, 2], {"frequency_ratio": [0.5, 1.0]}, "parameter = 'modes': must be a real number"),
         ("velocity_amplitude", AMPLITUDE, [1.0], "axes = .*: must map parameters to arrays"),
         ("velocity_amplitude", 0.3, {"frequency_ratio": [0.5, 1.0]}, "at least two values to choose from"),
+        ("velocity_amplitude", np.ndarray, {}, "at least two values to choose from"),
         ("velocity_amplitude", [0.3, 0.1], {"frequency_ratio": [0.5, 1.0]}, "must be strictly increasing"),
     ],
 )

@@ -122,7 +122,7 @@ def threshold(
     axes = {} if axes is None else axes
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map parameters to arrays of values")
-    if (len(values) if isinstance(values, range) else np.size(values)) < 2:
+    if (not isinstance(values, (range, list, tuple)) and np.asarray(values).ndim == 0) or len(values) < 2:  # type: ignore[arg-type]
         raise InputError(f"{parameter}: must be an array of at least two values to choose from")
     asked = Integration() if integration is None else integration
     if not isinstance(asked, Integration):
