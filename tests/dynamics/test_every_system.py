@@ -305,7 +305,8 @@ def test_an_indentation_is_a_coordinate_but_orbits_are_not_isolated() -> None:
 
 REVERSIBLE: dict[str, Any] = {
     "a contact": {},
-    "other ends": {"modes": 3, "damping": 0.2},
+    "three modes, damped": {"modes": 3, "damping": 0.2},
+    "twenty modes, side by side": {"modes": 20, "damping": 1e-3},
     "two tones": {"drive": SINE + sb.Sine(frequency_ratio=2.6, velocity_amplitude=0.03, phase=0.4)},
     "a body": {"striker": {"mass": 0.02, "suspension_stiffness": 700.0}},
     "a power law": {"law": sb.PowerLaw(force_at_1um=0.1, exponent=1.4)},
