@@ -129,17 +129,26 @@ def test_scipy_runner_reproduces_the_references(problem):
             assert result.impacts == stored["impacts"]
 
 
-@pytest.mark.parametrize("problem", sorted({*names()} - {"finite_elements_200", "threshold", "replicas"}))
-def test_snapbeam_runner_reproduces_the_references(problem):
-    module = runner("snapbeam")
+SNAPBEAM = """
+import numpy as np
+from impact20 import load, names
+from impact20.runners import runner
+module = runner("snapbeam")
+for problem in sorted({*names()} - {"finite_elements_200", "threshold", "replicas"}):
     for case in load(problem).cases:
         stored, solve = load(problem).references[case.name], module.prepare(case, {"method": "reference", "step": 1.0})
         for result in (solve(), solve()):
             # conditioning: largest change of an output per relative change of the data
             allowed = max(1e-6, 1e-9 * stored["conditioning"]) * case.scale
-            assert np.max(np.abs(result.values - np.array(stored["values"]))) < allowed
-            if case.count_impacts:
-                assert result.impacts == stored["impacts"]
+            assert np.max(np.abs(result.values - np.array(stored["values"]))) < allowed, case
+            assert not case.count_impacts or result.impacts == stored["impacts"], case
+"""
+
+
+def test_snapbeam_runner_reproduces_the_references():
+    """In a process of its own: the runner defines a force, which every later table of parameters would have."""
+    done = subprocess.run([sys.executable, "-c", SNAPBEAM], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_events_are_needed_for_restitution():
