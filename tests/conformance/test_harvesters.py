@@ -12,8 +12,10 @@ from test_moving_base import ledger, model
 
 import snapbeam as sb
 from snapbeam.model import default_values
+from snapbeam.solver.assemble import make_ensemble
 from snapbeam.util.validation import InputError
 
+DRIVE = sb.Sine(frequency_ratio=0.9, velocity_amplitude=0.3)
 THETA, CAPACITANCE = 4e-3, 60e-9
 PIEZO = sb.PiezoelectricHarvester(
     moment_per_volt=THETA, capacitance=CAPACITANCE, resistance=2e4, patch_start=0.0, patch_end=0.25
@@ -68,6 +70,35 @@ def compare(
         assert run.summary.harvested_power == pytest.approx(given[-1] / times[-1], rel=slack)
         assert run.summary.harvested_per_cycle == pytest.approx(given[-1] / cycles, rel=slack)
         assert ledger(run) < 1e-4
+
+
+def deviation(system: sb.System, finer: float) -> float:
+    """Error of a run at level reference by one with steps *finer* times as long, over b."""
+    coarse = sb.Integration(cycles=2, accuracy="reference")
+    fine = sb.Integration(cycles=2, accuracy="reference", step=finer * flight_step(system))
+    times = np.linspace(0.0, 2.0 * 2.0 * math.pi / (0.9 * system.scale.omega), 121)[1:-1]
+    found = [sb.simulate(system, each, sample_times=times).dataset.modal_amplitude.values for each in (coarse, fine)]
+    return float(np.abs(found[0] - found[1]).max()) / system.scale.length
+
+
+def flight_step(system: sb.System) -> float:
+    return float(make_ensemble(system, sb.Integration(cycles=2, accuracy="reference")).step_times[0])
+
+
+@pytest.mark.parametrize("decay", [9.0, 20.0, 60.0])
+@pytest.mark.parametrize("strikers", [1, 2])
+def test_a_circuit_faster_than_the_step(strikers, decay) -> None:
+    """It follows the beam; with steps in which it is resolved the motion is the same, beside other losses too."""
+    sides = [
+        sb.Contact(sb.HuntCrossley(stiffness=4e8, damping_factor=3.0), sb.Striker(drive=DRIVE)),
+        sb.Contact(
+            sb.KelvinVoigt(linear_stiffness=1e6, linear_damping=2.0), sb.Striker(drive=DRIVE, side="below", gap=1e-4)
+        ),
+    ]
+    parts = {"contacts": sides[:strikers], "forces": [sb.QuadraticDamping(coefficient=0.1, location=0.3)]}
+    step = flight_step(sb.System(model(3), **parts))
+    coil = sb.ElectromagneticHarvester(force_factor=1.5, resistance=40.0, inductance=40.0 * step / decay, location=0.4)
+    assert deviation(sb.System(model(3), harvesters=[coil], **parts), 1.0 / decay) < 3e-8
 
 
 @pytest.mark.slow

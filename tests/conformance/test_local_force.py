@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import sys
+from dataclasses import dataclass
 from importlib import import_module, invalidate_caches
 from pathlib import Path
 
@@ -260,6 +261,55 @@ def test_friction_that_reverses_within_a_fraction_of_a_flight_step(own: bool, se
         run = sb.simulate(system, sb.Integration(cycles=2, accuracy=accuracy), sample_times=times)
         error = np.abs(run.dataset["modal_amplitude"].values - truth).max()
         assert error < most * length, (accuracy, error / length)
+
+
+@pytest.fixture
+def own_drag():
+    """Quadratic damping as a law of one's own."""
+
+    @dataclass(frozen=True, kw_only=True)
+    class OwnDrag(sb.LocalForce):
+        coefficient: float = sb.quantity("kg/m", "drag", low=0.0)
+
+        name = "own_drag"
+        dissipative = True
+
+        @staticmethod
+        def damping_force(law, displacement, velocity):
+            return -law.coefficient * abs(velocity) * velocity
+
+        @staticmethod
+        def damping_coefficient(law, displacement, velocity):
+            return 2.0 * law.coefficient * abs(velocity)
+
+    yield OwnDrag
+    LOCAL_FORCES.pop("own_drag")
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_drag_that_reverses_inside_a_step(own: bool, own_drag) -> None:
+    """The force has a kink at zero velocity: a step ends close to it, so that level reference keeps its order."""
+    mass, frequency, drag, start = 2e-3, 80.0, 2.0, 1e-3
+    omega = 2.0 * math.pi * frequency
+    model = sb.ReducedModel.from_matrices([[mass]], [mass * omega**2], contact_shape=[1.0], length_scale=start)
+    law = (own_drag if own else sb.QuadraticDamping)(coefficient=drag, shape=[1.0])
+    assert law.reversal_speed(start, start * omega) == 0.0
+    system = sb.System(model, forces=[law], initial_state=sb.State(amplitude=[start]))
+    times = np.linspace(0.0, 6.0 / frequency, 61) * (1.0 - 1e-13)
+    run = sb.simulate(system, sb.Integration(cycles=6, accuracy="reference"), sample_times=times)
+
+    def rate(t, z):
+        return [z[1], -(omega**2) * z[0] - drag / mass * abs(z[1]) * z[1]]
+
+    truth = solve_ivp(
+        rate, (0.0, times[-1]), [start, 0.0], "DOP853", t_eval=times, rtol=1e-13, atol=1e-17, max_step=1e-5
+    )
+    np.testing.assert_allclose(run.dataset["modal_amplitude"].values[:, 0], truth.y[0], rtol=0.0, atol=1e-9 * start)
+
+
+def test_speed_over_which_friction_reverses() -> None:
+    friction = sb.CoulombFriction(friction_force=1.0, smoothing_velocity=2e-3)
+    assert friction.reversal_speed(1e-3, 1.0) == pytest.approx(2e-3, rel=0.2)
 
 
 @pytest.mark.filterwarnings("ignore:engine = 'python' is made to be read")

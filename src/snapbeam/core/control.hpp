@@ -18,6 +18,7 @@ namespace SNAPBEAM_SET {
 constexpr double GRADING = 0.5, RELEASE = 0.5, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
 constexpr double CONTACT_TURN[3] = {0.5, 0.35, 0.35};  // of each composition
 constexpr double REVERSAL[3] = {1.0, 0.5, 0.5}, SLIDING = 4.0;  // friction reverses: change of speed in a step, and speed above which it slides, over the scale
+constexpr double ACROSS[3] = {1.0, 0.125, 0.125};  // drag reverses, scale 0: the step across over others
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 template <class L> constexpr int MOST_CORRECTIONS = L::directions > 0 ? 30 : CORRECTIONS;  // of a state the error is of second order, of derivatives of first
 
@@ -439,12 +440,13 @@ template <class L> struct Group {
         const Marks changed = alive & differ(ticks, key);
         if (any(changed)) new_flows(changed, level, again | landing);
     }
-    // Ticks in which the speed along a row changes by a share of the scale over which friction reverses, or falls to where it begins to.
+    // Ticks in which the speed along a row changes by a share of the scale over which a force reverses, or falls to where it begins to.
     SNAPBEAM_SELDOM Real by_reversal(const Channel<L> &c, Real reversal) {
         for (int i = 0; i < z.signals; ++i) z.signal[i].copy(z.signal[i].at, z.signal[i].begun);
         const Number bend = acceleration_along(z, c, z.q, z.p, z.k, -1);
         const Real away = max(abs(value(dot<L>(c.row, z.p, s->size()))) - Real(SLIDING) * reversal, Real(0.0));
-        return fma(Real(REVERSAL[problem->composition]), reversal, away) / (max(abs(value(bend)), Real(1e-300)) * z.tick);
+        const Real want = fma(Real(REVERSAL[problem->composition]), reversal, away) / (max(abs(value(bend)), Real(1e-300)) * z.tick);
+        return select(reversal > Real(0.0), want, max(want, Real(ACROSS[problem->composition]) * step));
     }
     // Steps in which a circuit neither follows the beam nor changes slowly.
     SNAPBEAM_FN Marks half_resolved(Real length) const {

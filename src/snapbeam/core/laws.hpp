@@ -12,7 +12,7 @@
 //   pressing(x, y, P)      of a lossy contact: what has the sign of the force, smooth down to x = 0
 //   low(P), high(P)        displacements between which it is valid (of a force)
 //   loss(x, y, f, P)       power lost by the force f (of a force)
-//   reversal(P)            of friction, speed scale over which it reverses with the sign of y: v_0 of tanh(y/v_0); else infinite (of a force)
+//   reversal(P)            speed scale over which a force reverses with the sign of y: v_0 of tanh(y/v_0), 0 of |y| y; else infinite
 //
 // affine: the force is linear in y;  contact: it acts while the contact is closed;  lossy: the force depends on y;  timed: the force
 // is the channel's signal;  state(P): place among the numbers of a state of the law's own, or -1;  rough: bounds may be largest anywhere.
@@ -181,6 +181,7 @@ struct QuadraticDamping : ForceLaw<1> {  // f = -c |v| v
     static constexpr bool lossy = true;
     template <class T> static SNAPBEAM_FN T force(T, T v, const T *P) { return -(P[0] * abs(v) * v); }
     template <class T> static SNAPBEAM_FN T damping(T, T v, const T *P) { return T(2.0) * P[0] * abs(v); }
+    template <class T> static SNAPBEAM_FN T reversal(const T *) { return T(0.0); }
 };
 struct CoulombFriction : ForceLaw<2> {  // f = -F tanh(v / v_0)
     static constexpr bool lossy = true;

@@ -21,12 +21,13 @@
 //
 // what differs from that dies away by e^(-lam t), so that z after a flow is exact too.  What it loses, lam z^2, kicks add up.
 //
-// Where it is faster than the step it follows the beam: other accelerations k move it away from there by along_p.k/lam, if they
-// change little within 1/lam.  So, with v and a by along_p,
+// Where it is faster than the step it follows the beam: other accelerations k move it away from there by y, y' = along_p.k - lam y,
+// which is along_p.k/lam if they change little within 1/lam.  So, with v and a by along_p,
 //
 //   f = g (x - v),   x = a/lam - along_q.q,   g = 1/(1 - along_p.t/lam).
 //
-// By what z differs from f at the first kick it has died away before the step is over, with the impulse (z - f)/lam.
+// In a step f misses the impulse g (y_0 - y_1)/lam, exactly.  By what z differs from f at the first kick it has died away soon, so
+// that kick gets g (z - f)/lam, and the last one the rest, which q has not seen before.  At the end y lags by y'/lam.
 //
 // Whether a contact is closed, and whether a lossy one presses, is fixed for a whole step (events.hpp finds where that changes).
 #pragma once
@@ -60,6 +61,7 @@ template <class L> struct Channel {
     // at a kick: x and y of the law, force; force of the first kick; penetration and rate at both ends
     Number x, y, f, first_f, v;
     Number z;                    // of a circuit, the state at the kick at hand, at last at the end of the step
+    Number apart, settled;       // of one that follows, at the first kick: f beside what free modes carry along, and z - f
     Number decay[MOST_DISTINCT]; // of it e^(-lam t) - 1 over each flow of the step
     Number early;                // of a lossy channel 2/w^2 times the integral of (w - t) f over a kick of w: f if it is constant
     Number d0, r0, d1, r1;
@@ -99,7 +101,7 @@ template <class L> struct Runs {
     bool direct;                          // nothing acts but the tension: the first flow begins from q, p, k
 };
 
-constexpr int BLOCK_ARRAYS = 13;
+constexpr int BLOCK_ARRAYS = 14;
 constexpr double FOLLOWS = 8.0;  // decay of a circuit in a step, lam h, beyond which it follows the beam
 constexpr double RESOLVED[3] = {3.0, 1.5, 1.5};  // and, of each composition, up to which a step is as long as wanted
 
@@ -286,8 +288,8 @@ SNAPBEAM_FN void affine_kick(const Channel<L> &c, typename L::Number w, typename
 template <class L> SNAPBEAM_FN typename L::Number product_seen(const Channel<L> &c, int j) {
     return c.circuit ? select(c.follows, c.along_M[j], c.M[j]) : c.M[j];
 }
-// A circuit that follows the beam: its x and g, *a* and *v* by along_p; own is its channel.
-template <class L, class Number = typename L::Number> SNAPBEAM_FN void follow(const Runs<L> &z, Channel<L> &c, int own, typename L::Number &a, typename L::Number &v) {
+// A circuit that follows the beam: its x and g, *a* and *v* by along_p; own is its channel.  Returns a/lam.
+template <class L, class Number = typename L::Number> SNAPBEAM_FN Number follow(const Runs<L> &z, Channel<L> &c, int own, typename L::Number &a, typename L::Number &v) {
     const int n = z.s->size();
     Number by_p = dot<L>(c.along_p, z.k1, n);
     for (int j = 0; j < z.channels; ++j) {
@@ -298,6 +300,7 @@ template <class L, class Number = typename L::Number> SNAPBEAM_FN void follow(co
     const Number per = Number(1.0) / max(c.P[0], Number(1e-300));
     assign(c.follows, c.P[1], Number(1.0) / (Number(1.0) - c.along_M[own] * per));
     assign(c.follows, c.x, fma(by_p, per, -dot<L>(c.along_q, z.q1, n)));
+    return per * by_p;
 }
 
 // The part in the force of such a circuit, channel i of the block, of the other forces of the velocity.
@@ -310,13 +313,14 @@ template <class L, class Number = typename L::Number> SNAPBEAM_FN Number pulled_
 }
 
 // Forces that depend on velocities, together; the impulses of a kick of *w* seconds go into p.
-template <class L, class Number = typename L::Number, class Real = typename L::Real> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number w, int count, bool first) {
+template <class L, class Number = typename L::Number, class Real = typename L::Real> SNAPBEAM_FN void velocity_kick(Runs<L> &z, typename L::Number w, int count, bool first, bool last) {
     const Structure<L> &s = *z.s;
     const int n = s.size();
     Number *v = z.block, *a = v + z.channels, *y = a + z.channels, *slope = y + z.channels, *change = slope + z.channels;
     Number *f = change + z.channels, *impulse = f + z.channels, *lost = impulse + z.channels, *elastic = lost + z.channels;
-    Number *tip = elastic + z.channels, *twice = tip + z.channels, *settled = twice + z.channels, *wanted = settled + z.channels;
+    Number *tip = elastic + z.channels, *twice = tip + z.channels, *pushed = twice + z.channels, *wanted = pushed + z.channels;
     int held = 0;
+    bool following = false;
     Real decay = Real(0.0);
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
@@ -326,18 +330,35 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
             if (is_steady(other)) a[i] = fma(c.M[j], steady_force(other), a[i]);
         }
         if (c.circuit) {
-            c.P[1] = Number(0.0);
-            settled[i] = Number(0.0);
-            follow(z, c, z.late[i], a[i], v[i]);
-            if (first) assign(c.follows, settled[i], c.z - force_at(c, c.x, v[i]));
+            c.P[1] = Number(0.0), following = true;
+            pushed[i] = follow(z, c, z.late[i], a[i], v[i]);
         }
-        impulse[i] = lost[i] = twice[i] = f[i] = Number(0.0);
+        impulse[i] = lost[i] = twice[i] = f[i] = slope[i] = Number(0.0);
         if (c.impulsive) ++held, wanted[i] = signal_bend(z, c) - a[i] - linear_acceleration(s, c.row, z.q1, z.p1);
         tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
         elastic[i] = c.contact ? force_at(c, c.x, Number(0.0)) : Number(0.0);
         const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]);
         const Number damping = with_law(c.law, [&](auto law) { return law.damping(c.contact ? max(c.x, Number(0.0)) : c.x, fastest, c.numbers()); });
         decay += value(product_seen(c, z.late[i]) * (c.contact ? select(acting(c), damping, Number(0.0)) : damping));
+    }
+    const auto push = [&](Number after) {  // at the velocities v + after slope
+        for (int i = 0; i < count; ++i) {
+            const Channel<L> &c = z.channel[z.late[i]];
+            const Number own = fma(after, slope[i], v[i]);
+            y[i] = c.contact ? tip[i] - own : own;
+            f[i] = force_at(c, c.x, y[i]);
+            if (c.circuit) f[i] = select(c.follows, f[i], Number(0.0));
+        }
+        for (int i = 0; i < count; ++i) f[i] += pulled_along(z, z.channel[z.late[i]], f, i, count);
+    };
+    // f of a circuit beside what free modes carry along
+    const auto apart = [&](int i) { return f[i] + v[i] - z.channel[z.late[i]].x + pushed[i]; };
+    if (first && following) {
+        push(Number(0.0));
+        for (int i = 0; i < count; ++i) {
+            Channel<L> &c = z.channel[z.late[i]];
+            if (c.circuit) c.apart = apart(i), c.settled = c.z - f[i];
+        }
     }
     // nothing changes, or one that is linear alone
     auto exact = FromBits<typename L::Marks>::of(~0u);
@@ -363,14 +384,7 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
         const Number step = select(within, h, Number(0.0));
         for (int i = 0; i < count; ++i) change[i] = slope[i] = Number(0.0), twice[i] = fma(step, impulse[i], twice[i]);
         for (int stage = 0; stage < 4; ++stage) {
-            for (int i = 0; i < count; ++i) {
-                const Channel<L> &c = z.channel[z.late[i]];
-                const Number own = fma(Number(ahead[stage]) * step, slope[i], v[i]);
-                y[i] = c.contact ? tip[i] - own : own;
-                f[i] = force_at(c, c.x, y[i]);
-                if (c.circuit) f[i] = select(c.follows, f[i], Number(0.0));
-            }
-            for (int i = 0; i < count; ++i) f[i] += pulled_along(z, z.channel[z.late[i]], f, i, count);
+            push(Number(ahead[stage]) * step);
             for (int sweep = 0; sweep < (held > 1 ? 16 : held); ++sweep)  // held together, each by the others
                 for (int i = 0; i < count; ++i) {
                     const Channel<L> &c = z.channel[z.late[i]];
@@ -393,6 +407,9 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
         }
         for (int i = 0; i < count; ++i) v[i] += change[i];
     }
+    for (int i = 0; i < count; ++i)
+        assign(exact, v[i], fma(product_seen(z.channel[z.late[i]], z.late[i]), impulse[i], fma(a[i], w, v[i]))), slope[i] = Number(0.0);
+    if (last && following) push(Number(0.0));
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
         const typename L::Marks here = c.circuit ? c.follows : FromBits<typename L::Marks>::of(~0u);
@@ -400,9 +417,15 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
         assign(here, c.early, select(differ(w, Number(0.0)), Number(2.0) * twice[i] / (w * w), Number(0.0)));
         c.lost += lost[i];
         if (c.circuit) {
-            if (first) impulse[i] += settled[i] / max(c.P[0], Number(1e-300)), c.lost += settled[i] * (Number(2.0) * c.z - Number(1.5) * settled[i]);
-            const Number end = select(exact, fma(product_seen(c, z.late[i]), impulse[i], fma(a[i], w, v[i])), v[i]);
-            assign(c.follows, c.z, force_at(c, c.x, end) + pulled_along(z, c, f, i, count));
+            const Number per = select(c.follows, c.P[1] / max(c.P[0], Number(1e-300)), Number(0.0));
+            if (first) impulse[i] += per * c.settled, c.lost += c.P[1] * c.settled * (Number(2.0) * c.z - Number(1.5) * c.settled);
+            if (last) {
+                const Number change = apart(i) - c.apart, lag = change * per / z.h, missed = per * (lag - change);
+                const Number late = per * (per * (change - c.settled - lag) - Number(0.5) * z.h * change);
+                impulse[i] += missed, c.lost = fma(c.P[0] * missed, select(c.follows, c.z + f[i], Number(0.0)), c.lost);
+                assign(c.follows, c.z, f[i] - lag - c.along_M[z.late[i]] * missed);
+                for (int m = 0; m < n; ++m) z.q1[m] = fma(typename L::Cell(late), c.row[m], z.q1[m]);
+            }
         }
         for (int m = 0; m < n; ++m) z.p1[m] = fma(typename L::Cell(impulse[i]), c.row[m], z.p1[m]);
     }
@@ -539,7 +562,7 @@ template <class L, class Number = typename L::Number, class Cell = typename L::C
             if (c.circuit) c.f = c.early = steady_force(c), c.lost = fma(w * c.P[0] * c.f, c.f, c.lost);
         }
     }
-    if (late) velocity_kick(z, w, late, stage == 0);
+    if (late) velocity_kick(z, w, late, stage == 0, last);
     for (int j = 0; j < z.channels; ++j) {
         Channel<L> &c = z.channel[j];
         if (!c.active) continue;

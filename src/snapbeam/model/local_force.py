@@ -250,13 +250,22 @@ class LocalForce:
         return max(abs(damping(numbers, u, s * v)) for u in places for v in speeds for s in (1.0, -1.0))
 
     def reversal_speed(self, largest: float, fastest: float) -> float:
-        """Speed scale over which friction reverses, m/s: v_0 of F_c tanh(v/v_0).
+        """Speed scale over which the force reverses, m/s: v_0 of F_c tanh(v/v_0), 0 of -c |v| v.
 
-        At this speed the damping coefficient is 1/cosh(1)^2 of that at rest. Infinite where it stays larger up to *fastest*.
+        At v_0 the damping coefficient is 1/cosh(1)^2 of that at rest. Infinite where it stays larger up to *fastest*. Scale 0
+        means that the coefficient has a kink at rest: it grows with |v| there.
         """
         numbers, damping = self.numbers, type(self).damping_coefficient
         place = float(self.displacements(largest, 3)[1])
-        at_rest = abs(damping(numbers, place, 0.0)) / math.cosh(1.0) ** 2
+        at_zero = damping(numbers, place, 0.0)
+
+        def rise(speed: float) -> float:
+            return damping(numbers, place, speed) - at_zero
+
+        small = 1e-3 * fastest
+        if rise(small) * rise(-small) > 0.0 and abs(rise(small) - 2.0 * rise(0.5 * small)) < 0.1 * abs(rise(small)):
+            return 0.0
+        at_rest = abs(at_zero) / math.cosh(1.0) ** 2
         speeds = fastest * 10.0 ** np.linspace(-9.0, 0.0, 181)
         fallen = (float(v) for v in speeds for s in (1.0, -1.0) if abs(damping(numbers, place, s * v)) < at_rest)
         return next(fallen, math.inf)
