@@ -92,8 +92,3 @@ def test_threads_race_for_nothing(tmp_path: Path) -> None:
     # addresses at random are not those that the sanitizer expects
     fixed = (command("setarch"), "-R")
     tried(module, "tests/core/test_core_threads.py", before=fixed, LD_PRELOAD=both, OPENBLAS_NUM_THREADS="1")
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="options of the compilers of Linux and macOS")
-def test_packs_as_arrays(tmp_path: Path) -> None:
-    tried(built(tmp_path, command("c++"), "SNAPBEAM_ARRAYS=ON"))

@@ -408,10 +408,7 @@ template <class L> struct Group {
                 // towards the end of its range, where a force may be infinite, a share of the way
                 const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.numbers()) - c.x, c.x - law.low(c.numbers())); });
                 want = min(want, by_stiffness);
-                const Real reversal = with_law(c.law, [&](auto law) {
-                    if constexpr (law.contact) return Real(INFINITY);
-                    else return value(law.reversal(c.numbers()));
-                });
+                const Real reversal = with_law(c.law, [&](auto law) { return value(law.reversal(c.numbers())); });
                 if (any(reversal < Real(NEVER))) want = min(want, by_reversal(c, reversal));
                 if (any(value(space) < Real(NEVER))) want = min(want, Real(NEARER) * value(space) / (abs(value(dot<L>(c.row, z.p, n))) * z.tick));
                 continue;
@@ -505,7 +502,7 @@ template <class L> struct Group {
             constexpr int W = SNAPBEAM_WIDTH;
             for (int from = 0, f = 0, m = 0; from < all; from += W) {
                 const int count = all - from < W ? all - from : W;
-                Pack<W> time(0.0), omega(1.0), sigma(0.0), a[4];
+                Wide time(0.0), omega(1.0), sigma(0.0), a[4];
                 for (int k = 0; k < count; ++k) {
                     set_lane(time, k, length * s->composition.flow[f]), set_lane(omega, k, lane(s->omega[m], 0)), set_lane(sigma, k, lane(s->sigma[m], 0));
                     if (++m == n) m = 0, ++f;
@@ -540,7 +537,7 @@ template <class L> struct Group {
     }
 
     SNAPBEAM_FN static Number yield_of(const Channel<L> &c) {
-        return with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.yield(c.numbers()); else return Number(0.0); });
+        return with_law(c.law, [&](auto law) { return law.yield(c.numbers()); });
     }
     // Positive while a closed contact goes on as it does: it presses, it yields and deepens, or it is elastic.
     SNAPBEAM_FN static Number going_on(const Channel<L> &c, Number d, Number r, Number f) {
@@ -867,7 +864,7 @@ template <class L> struct Group {
     // A contact begins to yield, or turns back: then it keeps a larger indentation, and what it stored and does not give back is lost.
     SNAPBEAM_SELDOM void turn_back(Channel<L> &c, Marks at) {
         const Marks turns = at & c.pressing;
-        const Number grown = with_law(c.law, [&](auto law) { if constexpr (law.contact) return law.grown(select(turns, c.d1, Number(0.0)), c.numbers()); else return Number(0.0); });
+        const Number grown = with_law(c.law, [&](auto law) { return law.grown(select(turns, c.d1, Number(0.0)), c.numbers()); });
         const Number growth = select(turns, grown - c.P[c.state], Number(0.0)), stored = with_law(c.law, [&](auto law) { return law.potential(c.d1, c.numbers()); });
         c.P[c.state] += growth, c.offset -= growth, c.d0 -= growth, c.d1 -= growth;
         assign(turns, c.deepest, c.d1);

@@ -25,42 +25,40 @@
 
 namespace SNAPBEAM_SET {
 
-enum LawNumber : int {
-    HERTZ, POWER_LAW, LAYERED_HERTZ, HUNT_CROSSLEY, KELVIN_VOIGT,
-    LOCAL_SPRING, ELECTROSTATIC, MAGNETIC, QUADRATIC_DAMPING, COULOMB_FRICTION, LINEAR_DAMPING,
-    EXTERNAL_FORCE, BASE, AXIAL_LOAD, CIRCUIT, USER_CONTACT, USER_LOSSY_CONTACT, USER_FORCE, USER_LOSSY_FORCE, ELASTIC_PLASTIC,
-    RESTITUTION, USER_MEMORY_CONTACT, LAWS
-};
+// The one table of laws, by their numbers.
+#define SNAPBEAM_EACH_LAW(LAW) \
+    LAW(HERTZ, Hertz) LAW(POWER_LAW, PowerLaw) LAW(LAYERED_HERTZ, LayeredHertz) LAW(HUNT_CROSSLEY, HuntCrossley) \
+    LAW(KELVIN_VOIGT, KelvinVoigt) LAW(LOCAL_SPRING, LocalSpring) LAW(ELECTROSTATIC, Electrostatic) LAW(MAGNETIC, Magnetic) \
+    LAW(QUADRATIC_DAMPING, QuadraticDamping) LAW(COULOMB_FRICTION, CoulombFriction) LAW(LINEAR_DAMPING, LinearDamping) \
+    LAW(EXTERNAL_FORCE, Timed) LAW(BASE, Timed) LAW(AXIAL_LOAD, Timed) LAW(CIRCUIT, Circuit) LAW(USER_CONTACT, UserContact) \
+    LAW(USER_LOSSY_CONTACT, UserLossyContact) LAW(USER_FORCE, UserForce) LAW(USER_LOSSY_FORCE, UserLossyForce) \
+    LAW(ELASTIC_PLASTIC, ElasticPlastic) LAW(RESTITUTION, Restitution) LAW(USER_MEMORY_CONTACT, UserMemoryContact)
+#define SNAPBEAM_LAW(NUMBER, LAW) NUMBER,
+enum LawNumber : int { SNAPBEAM_EACH_LAW(SNAPBEAM_LAW) LAWS };
+#undef SNAPBEAM_LAW
 constexpr bool of_user(int law) { return (law >= USER_CONTACT && law <= USER_LOSSY_FORCE) || law == USER_MEMORY_CONTACT; }
 // Nodes and weights of Gauss's rule of four points on [0, 1].
 constexpr double GAUSS_NODE[4] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262};
 constexpr double GAUSS_SHARE[4] = {0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692};
 
-template <int NUMBERS> struct ContactLaw {
+template <int NUMBERS, bool CONTACT> struct Law {
     static constexpr int numbers = NUMBERS;
     static int state(const double *) { return -1; }
-    static constexpr bool contact = true, lossy = false, timed = false, affine = true, memory = false, impulsive = false, rough = false;
-    template <class T> static SNAPBEAM_FN T yield(const T *) { return T(INFINITY); }
-    template <class T> static SNAPBEAM_FN T grown(T, const T *) { return T(0.0); }
-    template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
-    template <class T> static SNAPBEAM_FN T pressing(T, T, const T *) { return T(1.0); }
-    template <class T> static SNAPBEAM_FN T low(const T *) { return T(-INFINITY); }
-    template <class T> static SNAPBEAM_FN T high(const T *) { return T(INFINITY); }
-};
-template <int NUMBERS> struct ForceLaw {
-    static constexpr int numbers = NUMBERS;
-    static int state(const double *) { return -1; }
-    static constexpr bool contact = false, lossy = false, timed = false, affine = false, memory = false, impulsive = false, rough = false;
+    static constexpr bool contact = CONTACT, lossy = false, timed = false, affine = CONTACT, memory = false, impulsive = false, rough = false;
     template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
-    template <class T> static SNAPBEAM_FN T loss(T, T y, T f, const T *) { return -(f * y); }
-    template <class T> static SNAPBEAM_FN T reversal(const T *) { return T(INFINITY); }
     template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T pressing(T, T, const T *) { return T(1.0); }
+    template <class T> static SNAPBEAM_FN T yield(const T *) { return T(INFINITY); }
+    template <class T> static SNAPBEAM_FN T grown(T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T loss(T, T y, T f, const T *) { return -(f * y); }
+    template <class T> static SNAPBEAM_FN T reversal(const T *) { return T(INFINITY); }
     template <class T> static SNAPBEAM_FN T low(const T *) { return T(-INFINITY); }
     template <class T> static SNAPBEAM_FN T high(const T *) { return T(INFINITY); }
 };
+template <int NUMBERS> using ContactLaw = Law<NUMBERS, true>;
+template <int NUMBERS> using ForceLaw = Law<NUMBERS, false>;
 
 struct Hertz : ContactLaw<1> {  // f = k d^(3/2)
     template <class T> static SNAPBEAM_FN T force(T d, T, const T *P) { return P[0] * d * sqrt(d); }
@@ -136,8 +134,6 @@ struct ElasticPlastic : ContactLaw<3> {
 // together r.omega^2 r/(r.r)^2, the stiffness that it cancels along the row.
 struct Restitution : ContactLaw<2> {
     static constexpr bool lossy = true, affine = false, impulsive = true;
-    template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
-    template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *P) { return P[1]; }
 };
 
@@ -328,42 +324,20 @@ struct UserLossyForce : UserForce {
 };
 
 // Largest bound of a law for x - reach to x + reach.
-template <class Law, class T, class F> SNAPBEAM_FN T most_within(Law, T x, T reach, F bound) {
+template <class Own, class T, class F> SNAPBEAM_FN T most_within(Own, T x, T reach, F bound) {
     T most = max(bound(x), max(bound(x - reach), bound(x + reach)));
-    if constexpr (Law::rough)
+    if constexpr (Own::rough)
         for (double part = 0.25; part < 1.0; part += 0.25) most = max(most, max(bound(x - T(part) * reach), bound(x + T(part) * reach)));
     return most;
 }
 
-// The one place that knows every law by its number: calls function(law).  A kernel for one structure knows its laws only.
+// Calls function(law) of the law of a number.  A kernel for one structure knows its laws only.
 #if !defined(SNAPBEAM_LAWS)
 #define SNAPBEAM_LAWS ~0u
 #endif
 #define SNAPBEAM_LAW(NUMBER, LAW) case NUMBER: if constexpr ((SNAPBEAM_LAWS) >> NUMBER & 1u) return function(LAW()); break;
 template <class F> constexpr SNAPBEAM_FN auto with_law(int number, F function) {
-    switch (number) {
-    SNAPBEAM_LAW(POWER_LAW, PowerLaw)
-    SNAPBEAM_LAW(LAYERED_HERTZ, LayeredHertz)
-    SNAPBEAM_LAW(HUNT_CROSSLEY, HuntCrossley)
-    SNAPBEAM_LAW(KELVIN_VOIGT, KelvinVoigt)
-    SNAPBEAM_LAW(LOCAL_SPRING, LocalSpring)
-    SNAPBEAM_LAW(ELECTROSTATIC, Electrostatic)
-    SNAPBEAM_LAW(MAGNETIC, Magnetic)
-    SNAPBEAM_LAW(QUADRATIC_DAMPING, QuadraticDamping)
-    SNAPBEAM_LAW(COULOMB_FRICTION, CoulombFriction)
-    SNAPBEAM_LAW(LINEAR_DAMPING, LinearDamping)
-    SNAPBEAM_LAW(ELASTIC_PLASTIC, ElasticPlastic)
-    SNAPBEAM_LAW(RESTITUTION, Restitution)
-    SNAPBEAM_LAW(CIRCUIT, Circuit)
-    SNAPBEAM_LAW(USER_CONTACT, UserContact)
-    SNAPBEAM_LAW(USER_LOSSY_CONTACT, UserLossyContact)
-    SNAPBEAM_LAW(USER_MEMORY_CONTACT, UserMemoryContact)
-    SNAPBEAM_LAW(USER_FORCE, UserForce)
-    SNAPBEAM_LAW(USER_LOSSY_FORCE, UserLossyForce)
-    SNAPBEAM_LAW(EXTERNAL_FORCE, Timed)
-    SNAPBEAM_LAW(BASE, Timed)
-    SNAPBEAM_LAW(AXIAL_LOAD, Timed)
-    }
+    switch (number) { SNAPBEAM_EACH_LAW(SNAPBEAM_LAW) }
     return function(Hertz());
 }
 

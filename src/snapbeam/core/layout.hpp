@@ -47,7 +47,7 @@ template <int W, int FIXED = 0> struct ModeLanes {
     }
     static SNAPBEAM_FN double total(Cell x) { return sum(x); }
     static SNAPBEAM_FN void totals(Cell a, Cell b, double &of_a, double &of_b) {
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+#if defined(__AVX512F__)
         if constexpr (W == 8) {
             const __m512d x = (__m512d)a.v, y = (__m512d)b.v;
             const __m512d pairs = _mm512_add_pd(_mm512_unpacklo_pd(x, y), _mm512_unpackhi_pd(x, y));

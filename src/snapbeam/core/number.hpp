@@ -18,6 +18,7 @@
 
 #ifndef SNAPBEAM_SET
 #define SNAPBEAM_SET plain
+#define SNAPBEAM_WIDTH 1
 #endif
 #if defined(__CUDACC_RTC__)
 #define SNAPBEAM_FN __forceinline__
@@ -38,10 +39,7 @@
 #define SNAPBEAM_CALLED SNAPBEAM_FN
 #define SNAPBEAM_LOOP
 #endif
-#if (defined(__GNUC__) || defined(__clang__)) && !defined(__CUDACC_RTC__) && !defined(SNAPBEAM_ARRAYS)
-#define SNAPBEAM_VECTORS 1  // vector types of GCC and Clang; elsewhere packs are arrays
-#endif
-#if defined(SNAPBEAM_VECTORS) && (defined(__AVX512F__) || defined(__AVX2__))
+#if defined(__AVX512F__) || defined(__AVX2__)
 #include <immintrin.h>
 #endif
 
@@ -57,41 +55,28 @@ SNAPBEAM_FN int count(int *counter) {
 }
 
 // --- packs and masks ----------------------------------------------------------------------------------------------------
-#if defined(SNAPBEAM_VECTORS)
+template <int W> struct Mask;
+template <int W> struct Pack;
+#if defined(__CUDACC_RTC__)  // a thread has one run
+typedef double Wide;
+#else  // vector types of GCC and Clang
+typedef Pack<SNAPBEAM_WIDTH> Wide;
 template <int W> struct Vectors {
     typedef double Reals __attribute__((vector_size(8 * W)));
     typedef long long Marks __attribute__((vector_size(8 * W)));
 };
 #define SNAPBEAM_BINARY(RESULT, NAME, FIELD, OPERATOR) \
     friend SNAPBEAM_FN RESULT NAME(Pack a, Pack b) { RESULT r; r.FIELD = a.v OPERATOR b.v; return r; }
-#else
-template <int W> struct Vectors {
-    typedef double Reals[W];
-    typedef long long Marks[W];
-};
-#define SNAPBEAM_BINARY(RESULT, NAME, FIELD, OPERATOR)                              \
-    friend SNAPBEAM_FN RESULT NAME(Pack a, Pack b) {                                \
-        RESULT r;                                                                   \
-        for (int l = 0; l < W; ++l) r.set(l, a.v[l] OPERATOR b.v[l]);               \
-        return r;                                                                   \
-    }
-#endif
 
 template <int W> struct Mask {
     typename Vectors<W>::Marks m;
     SNAPBEAM_FN void set(int l, bool on) { m[l] = on ? -1 : 0; }
-#if defined(SNAPBEAM_VECTORS)
     friend SNAPBEAM_FN Mask operator&(Mask a, Mask b) { return {a.m & b.m}; }
     friend SNAPBEAM_FN Mask operator|(Mask a, Mask b) { return {a.m | b.m}; }
     friend SNAPBEAM_FN Mask operator!(Mask a) { return {~a.m}; }
-#else
-    friend SNAPBEAM_FN Mask operator&(Mask a, Mask b) { for (int l = 0; l < W; ++l) a.m[l] &= b.m[l]; return a; }
-    friend SNAPBEAM_FN Mask operator|(Mask a, Mask b) { for (int l = 0; l < W; ++l) a.m[l] |= b.m[l]; return a; }
-    friend SNAPBEAM_FN Mask operator!(Mask a) { for (int l = 0; l < W; ++l) a.m[l] = ~a.m[l]; return a; }
-#endif
 };
 
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+#if defined(__AVX512F__)
 template <> struct Mask<8> {  // in a mask register
     __mmask8 m;
     SNAPBEAM_FN void set(int l, bool on) { m = __mmask8((m & ~(1u << l)) | unsigned(on) << l); }
@@ -111,13 +96,8 @@ template <> struct Mask<8> {  // in a mask register
 template <int W> struct Pack {
     typename Vectors<W>::Reals v;
     SNAPBEAM_FN Pack() = default;
-#if defined(SNAPBEAM_VECTORS)
     SNAPBEAM_FN Pack(double x) : v(x - typename Vectors<W>::Reals{}) {}
     friend SNAPBEAM_FN Pack operator-(Pack a) { a.v = -a.v; return a; }
-#else
-    SNAPBEAM_FN Pack(double x) { for (int l = 0; l < W; ++l) v[l] = x; }
-    friend SNAPBEAM_FN Pack operator-(Pack a) { for (int l = 0; l < W; ++l) a.v[l] = -a.v[l]; return a; }
-#endif
     SNAPBEAM_FN void set(int l, double x) { v[l] = x; }
     SNAPBEAM_BINARY(Pack, operator+, v, +)
     SNAPBEAM_BINARY(Pack, operator-, v, -)
@@ -134,6 +114,7 @@ template <int W> struct Pack {
 };
 #undef SNAPBEAM_BINARY
 #undef SNAPBEAM_COMPARE
+#endif
 
 SNAPBEAM_FN bool differ(double a, double b) { return a != b; }
 
@@ -141,14 +122,11 @@ SNAPBEAM_FN bool differ(double a, double b) { return a != b; }
 SNAPBEAM_FN double select(bool m, double a, double b) { return m ? a : b; }
 template <int W> SNAPBEAM_FN Pack<W> select(Mask<W> m, Pack<W> a, Pack<W> b) {
     Pack<W> r;
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+#if defined(__AVX512F__)
     if constexpr (W == 8) r.v = (typename Vectors<W>::Reals)_mm512_mask_blend_pd(m.m, (__m512d)b.v, (__m512d)a.v);
-    else r.v = m.m ? a.v : b.v;
-#elif defined(SNAPBEAM_VECTORS)
-    r.v = m.m ? a.v : b.v;
-#else
-    for (int l = 0; l < W; ++l) r.v[l] = m.m[l] ? a.v[l] : b.v[l];
+    else
 #endif
+        r.v = m.m ? a.v : b.v;
     return r;
 }
 template <int W> SNAPBEAM_FN Pack<W> select(bool m, Pack<W> a, Pack<W> b) { return m ? a : b; }
@@ -157,14 +135,14 @@ template <class M, class T> SNAPBEAM_FN void assign(M m, T &to, T from) { to = s
 // --- masks as bits: which runs of a pack --------------------------------------------------------------------------------
 SNAPBEAM_FN unsigned bits(bool m) { return m; }
 template <int W> SNAPBEAM_FN unsigned bits(Mask<W> m) {
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX2__)
+#if defined(__AVX2__)
     if constexpr (W == 4) return unsigned(_mm256_movemask_pd((__m256d)m.m));
 #endif
     unsigned b = 0;
     for (int l = 0; l < W; ++l) b |= unsigned(m.m[l] != 0) << l;
     return b;
 }
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+#if defined(__AVX512F__)
 SNAPBEAM_FN unsigned bits(Mask<8> m) { return m.m; }
 #endif
 template <class M> SNAPBEAM_FN bool any(M m) { return bits(m) != 0; }
@@ -204,13 +182,13 @@ SNAPBEAM_FN double fma(double a, double b, double c) {
 }
 template <int W> SNAPBEAM_FN Pack<W> fma(Pack<W> a, Pack<W> b, Pack<W> c) {
     Pack<W> r;
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+#if defined(__AVX512F__)
     if constexpr (W == 8) {
         r.v = (typename Vectors<W>::Reals)_mm512_fmadd_pd((__m512d)a.v, (__m512d)b.v, (__m512d)c.v);
         return r;
     }
 #endif
-#if defined(SNAPBEAM_VECTORS) && defined(__FMA__)
+#if defined(__AVX2__) && defined(__FMA__)
     if constexpr (W == 4) {
         r.v = (typename Vectors<W>::Reals)_mm256_fmadd_pd((__m256d)a.v, (__m256d)b.v, (__m256d)c.v);
         return r;
@@ -241,14 +219,14 @@ SNAPBEAM_FN double sqrt(double x) {
 #endif
 }
 template <int W> SNAPBEAM_FN Pack<W> sqrt(Pack<W> x) {
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX512F__)
+#if defined(__AVX512F__)
     if constexpr (W == 8) {
         Pack<W> r;
         r.v = (typename Vectors<W>::Reals)_mm512_sqrt_pd((__m512d)x.v);
         return r;
     }
 #endif
-#if defined(SNAPBEAM_VECTORS) && defined(__AVX2__)
+#if defined(__AVX2__)
     if constexpr (W == 4) {
         Pack<W> r;
         r.v = (typename Vectors<W>::Reals)_mm256_sqrt_pd((__m256d)x.v);

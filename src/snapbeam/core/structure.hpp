@@ -43,7 +43,9 @@ SNAPBEAM_FN Composition composition_of(int number) {
              1 - 2 * (0.0829844064174052 + 0.396309801498368 - 0.0390563049223486), 0, 0}};
 }
 
-template <class L> using Slopes = Pack<(L::directions > 0 ? L::directions : 1)>;  // derivatives beside a plain number
+template <int K> struct SlopesOf { typedef Pack<K> Type; };
+template <> struct SlopesOf<0> { typedef double Type; };
+template <class L> using Slopes = typename SlopesOf<L::directions>::Type;  // derivatives beside a plain number
 constexpr int FEWEST_PARTS = 8, PARTS_PER_TURN = 12;
 
 // e^(-x) - 1 for any x.
