@@ -105,7 +105,7 @@ coverage: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS) --dist loadfile --cov=snapbeam --cov-report=term --cov-report=xml
 
 test-slow: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -m slow --durations=15 -n $(WORKERS) --dist loadfile
+	$(BIN)/python -m pytest -m slow --durations=15 -n $(WORKERS) --dist worksteal
 
 # The lower bounds that pyproject.toml states, installed and tested.  Python 3.11 is the oldest.
 OLDEST ?= .venv-oldest
