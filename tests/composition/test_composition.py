@@ -300,14 +300,15 @@ def pieces(composition: Composition, cycles: int) -> list[str]:
     assert state is not None
     again = sb.advance(system, periods=2, save_every_period=True)[-1]
     repeats = len(system.moving) == 0 or (len(system.moving) == 1 and system.moving[0][1].is_periodic)
+    exact = repeats and not system.harvesters  # charges hold the coordinates of circuits to rounding
     scale = float(np.abs(system.model.well_amplitude).max())
     for name in ("amplitude", "velocity", "striker_shift", "circuit", "contact_time"):
         one, two, three = (getattr(each, name) for each in (whole, state, again))
         if not np.array_equal(one, three, equal_nan=True):
             found.append(f"every period saved: {name}")
-        if repeats and not np.array_equal(one, two, equal_nan=True):
+        if exact and not np.array_equal(one, two, equal_nan=True):
             found.append(f"advanced in pieces: {name}")
-    if not repeats and not np.abs(whole.amplitude - state.amplitude).max() < PIECES * scale:
+    if not exact and not np.abs(whole.amplitude - state.amplitude).max() < PIECES * scale:
         found.append(f"advanced in pieces: differs by {np.abs(whole.amplitude - state.amplitude).max() / scale:.2e}")
     return found
 
