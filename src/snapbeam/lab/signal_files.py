@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told, agree, read_table, split_unit
+from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, agree, read_table, split_unit
 from snapbeam.lab.signals import check_signal, make_signal, parse_sensitivity, si_unit
 from snapbeam.util.diagnostics import DiagnosticWarning, to_json
 from snapbeam.util.files import atomic_path, check_writable
@@ -67,7 +67,7 @@ def read_channels(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             warnings.simplefilter("default", DiagnosticWarning)
-            channels = reader(source, Told(rate, columns))
+            channels = reader(source, rate, columns)
     except InputError as error:
         raise InputError(error.args[0] if str(source) in str(error) else f"{source}: {error}") from error
     except ImportError as error:

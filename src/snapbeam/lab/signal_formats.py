@@ -99,13 +99,6 @@ SPECTRA = {
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
-class Told(NamedTuple):
-    """User-given properties of a file: sampling frequency [Hz], and columns of a table without a header."""
-
-    rate: float | None = None
-    columns: str | None = None
-
-
 def _key(name: str) -> str:
     """Small letters and digits of a name."""
     return re.sub(r"[^a-z0-9]", "", name.lower())
@@ -188,7 +181,7 @@ def numbered(channels: list[Channel]) -> list[Channel]:
     return channels
 
 
-def read_numpy(path: Path, _told: Told) -> list[Channel]:
+def read_numpy(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of a NumPy file, ``.npy`` or ``.npz``."""
     refuse_inflated("path", path, _stated_size(path))
     with open(path, "rb") as file:  # opened here, since NumPy leaves damaged files open
@@ -374,7 +367,7 @@ def _refuse_length_of_hdf5(path: Path) -> None:
     _refuse_length(path, (end, at + end))
 
 
-def read_hdf5(path: Path, _told: Told) -> list[Channel]:
+def read_hdf5(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of an HDF5 or NetCDF file; packed numbers by the CF conventions."""
     with open(path, "rb") as opened:
         start = opened.read(4)
@@ -454,23 +447,6 @@ def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
 # semicolons, tabs, commas or blanks; with all but commas a comma may be the decimal sign, and points between
 # groups of three digits before it are left out.  Nothing is dropped: after the first row of numbers every line
 # must be one.
-
-
-@dataclass(frozen=True)
-class TextBlock:
-    """A text file taken apart.
-
-    ``header`` are the lines before the table and all comments; ``names`` and ``units`` the cells of the rows
-    that head the columns, None where there is no such row; ``rows`` the cells, on the ``lines`` of the file.
-    """
-
-    path: Path
-    header: tuple[str, ...]
-    names: tuple[str, ...] | None
-    units: tuple[str, ...] | None
-    rows: list[list[str]]
-    lines: list[int]
-    decimal_comma: bool
 
 
 def to_number(cell: str, decimal_comma: bool = False) -> float:
@@ -564,104 +540,24 @@ def _is_short(cells: list[list[str]]) -> bool:
     return len(digits) == 1 and len(column) >= _ABOVE and (last is None or len(last[1]) < digits.pop())
 
 
-def read_block(path: Path, columns: int = 0) -> TextBlock:
-    """Take a text file apart; *columns* is the number of columns, if the user gives it."""
-    text = decoded(path.read_bytes(), str(path))
-    numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
-    marked = [(i, line.strip().lstrip("#%/!").strip()) for i, line in numbered if line.startswith(_COMMENT)]
-    numbered = [(i, line) for i, line in numbered if not line.startswith(_COMMENT)]
-    lines = [line for _, line in numbered]
-    if not lines:
-        raise InputError(f"{path}: holds no header and no row")
-    dialects = _dialects(lines)
-    if not dialects:
-        if len(lines) == 1:
-            raise InputError(f"{path}: holds a header and no row")
-        stamp = _STAMP.search(lines[:_LOOK][-1][:_LONGEST_LINE])
-        if stamp:
-            raise InputError(
-                f"{path}: its times are dates or clock times, such as {stamp[0]!r}, which are not read: write them in "
-                "seconds, or leave them out and give sampling_frequency (--sampling-freq)"
-            )
-        raise InputError(
-            f"{path}: no row of numbers in its first {min(len(lines), _LOOK)} lines; its columns may not be separated "
-            "by semicolons, tabs, commas or blanks"
-        )
-    places = [0, *(i for i, _ in numbered)]
-    above = {
-        one.first: [text for i, text in marked if places[one.first] < i < places[one.first + 1]] for one in dialects
-    }
-    dialect, names, units, taken = _best(path, lines, dialects, columns, above)
-    first = _earlier(lines, dialect)
-    try:
-        cells = _cells(lines[first:], dialect.separator)
-    except csv.Error as error:
-        raise InputError(f"{path}: is no table ({error})") from error
-    if len(cells) != len(lines) - first:
-        raise InputError(f"{path}: a quoted value runs over the end of a line")
-    if not text.endswith("\n") and _is_short(cells):
-        last = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
-        tell([KINDS_SIGNAL["cut_in_number"].found(told=last)])
-    beyond = " ".join(cell for cell in cells[0][max(dialect.used) + 1 :] if cell)  # settings behind the first row
-    return TextBlock(
-        path=path,
-        header=(
-            beyond,
-            *(text for _, text in marked),
-            *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken),
-        ),
-        names=names,
-        units=units,
-        rows=[_kept(row, dialect, numbered[first + k][0], path, names, k == 0) for k, row in enumerate(cells)],
-        lines=[i for i, _ in numbered[first:]],
-        decimal_comma=dialect.decimal_comma,
-    )
-
-
-def _kept(
-    cells: list[str], dialect: _Dialect, line: int, path: Path, names: tuple[str, ...] | None, first: bool
-) -> list[str]:
-    """The cells of a row that belong to the table's columns."""
-    last = max(dialect.used)
-    whole = len(cells) > last
-    extra = dialect.separator is None and len(cells) != len(dialect.used)
-    stray = any(cells[last + 1 :]) and not first
-    if not whole or extra or stray:
-        count = len([cell for cell in cells if cell]) if stray or extra else len(cells)
-        told = "the header names" if names else "the first has"
-        raise InputError(f"{path}: line {line} has {count} value(s), {told} {len(dialect.used)} column(s)")
-    return dialect.row_of(cells)
-
-
-def _earlier(lines: list[str], dialect: _Dialect) -> int:
-    """The first row of numbers, beside cells of the header too, as oscilloscopes write them."""
-    if not dialect.used or dialect.used[0] == 0:
-        return dialect.first
-    first = dialect.first
-    cells = _cells(lines[: dialect.first], dialect.separator)
-    while first > 0 and _is_row(cells[first - 1], dialect.used, dialect.decimal_comma):
-        first -= 1
-    return first
-
-
 def _best(
     path: Path, lines: list[str], dialects: list[_Dialect], columns: int, above: Mapping[int, list[str]]
-) -> tuple[_Dialect, tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
-    """The dialect whose header fits its columns, its names and units, and the lines these stand on.
+) -> tuple[_Dialect, tuple[str, ...] | None, set[int]]:
+    """The dialect whose header fits its columns, the names of these, and the lines that they stand on.
 
     *above* are the comments before the first row of each; the last may name the columns.
     """
     seen = []
     for one in dialects:
-        names, units, taken = _heads(lines, one)
+        names, taken = _heads(lines, one)
         comments = above[one.first]
         if names is None and comments:
             following = lines[one.first : one.first + 3]
-            names, units, _ = _heads([*comments, *following], replace(one, first=len(comments)))
+            names, _ = _heads([*comments, *following], replace(one, first=len(comments)))
             parts = [split_unit(name) for name in names or ()]
             stated = any(is_time(word) or (unit and _like_unit(unit)) for word, unit in parts)
             names = names if stated and not re.search("[=:]", "".join(names or ())) else None
-        seen.append((one, names, units if names else None, taken))
+        seen.append((one, names, taken))
     if columns:
         seen = [entry for entry in seen if len(entry[0].used) == columns] or seen
     named = [entry for entry in seen if entry[1] is not None]
@@ -679,8 +575,8 @@ def _best(
     return best
 
 
-def _heads(lines: list[str], dialect: _Dialect) -> tuple[tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
-    """Names and units of the columns from the one or two lines before the table."""
+def _heads(lines: list[str], dialect: _Dialect) -> tuple[tuple[str, ...] | None, set[int]]:
+    """Names of the columns from the one or two lines before the table, units of the second in brackets."""
     above: list[tuple[int, list[str]]] = []
     count = len(dialect.used)
     for k in range(dialect.first - 1, max(dialect.first - 3, -1), -1):
@@ -693,12 +589,14 @@ def _heads(lines: list[str], dialect: _Dialect) -> tuple[tuple[str, ...] | None,
         if not text or (dialect.separator is None and len(cells) > count):
             break
         above.append((k, row))
-    if not above:
-        return None, None, set()
-    at, last = above[0]
-    if len(above) == 2 and all(_like_unit(cell) for cell in last):
-        return tuple(above[1][1]), tuple(last), {at, above[1][0]}
-    return tuple(last), None, {at}
+    if len(above) < 2 or not all(_like_unit(cell) for cell in above[0][1]):
+        return (tuple(above[0][1]), {above[0][0]}) if above else (None, set())
+    joined = []
+    for name, unit in zip(above[1][1], above[0][1], strict=True):
+        word = unit.strip("[]() ")
+        known = not name or split_unit(name)[1] is not None or word in ("", "-")
+        joined.append(name if known else f"{name} [{word}]")
+    return tuple(joined), {at for at, _ in above}
 
 
 def _cells_of_names(line: str, dialect: _Dialect) -> list[str]:
@@ -737,7 +635,7 @@ def _like_unit(cell: str) -> bool:
     return True
 
 
-def read_lvm(path: Path, _told: Told) -> list[Channel]:
+def read_lvm(path: Path, *_told: Any) -> list[Channel]:
     """Channels of the first segment of an .lvm file.
 
     A file whose number of samples is not that of its header is read with a diagnostic.  Channels that the header
@@ -822,7 +720,7 @@ def _header(lines: list[str], at: int, separator: str | None) -> tuple[dict[str,
     raise InputError("the header has no end (***End_of_Header***)")
 
 
-def read_matlab(path: Path, _told: Told) -> list[Channel]:
+def read_matlab(path: Path, *_told: Any) -> list[Channel]:
     """Channels of a .mat file: vectors, columns of matrices, and those in structures.
 
     A scalar named like ``fs`` is the sampling rate, a vector named like ``time`` the time axis, a text
@@ -935,83 +833,123 @@ def _quantity(text: str, decimal_comma: bool = False) -> tuple[tuple[float, ...]
 
 
 class Table(NamedTuple):
-    """A text table: its ``columns`` of cells by name, and the ``block`` of the file that they are of."""
+    """A text table: ``columns`` of cells by name, on the ``lines`` of the file; ``header`` are all others, and comments."""
 
-    block: TextBlock
+    path: Path
     columns: dict[str, tuple[str, ...]]
+    lines: list[int]
+    header: list[str]
+    decimal_comma: bool
 
     def numbers(self, name: str) -> NDArray[np.float64]:
         """Return a column as floats; refuse a cell that is no finite number, naming its line."""
-        cells, block = self.columns[name], self.block
+        cells = self.columns[name]
         try:
-            if block.decimal_comma:
+            if self.decimal_comma:
                 raise ValueError
             numbers = np.array(cells, dtype=np.float64)
         except ValueError:
-            numbers = np.array([to_number(cell, block.decimal_comma) for cell in cells])
+            numbers = np.array([to_number(cell, self.decimal_comma) for cell in cells])
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
-            where = f"{block.path}: line {block.lines[bad[0]]}, column {name!r}"
+            where = f"{self.path}: line {self.lines[bad[0]]}, column {name!r}"
             raise InputError(f"{where}: {cells[bad[0]]!r} is not a finite number")
         return numbers
 
 
 def read_table(path: Path, columns: str | None = None) -> Table:
     """Read a text table; *columns* are names and units, separated by commas, instead of those in the file."""
-    given = [name.strip() for name in columns.split(",")] if columns else []
-    block = read_block(path, len(given))
-    width = len(block.rows[0])
-    names = tuple(given) or _names(block)
-    if names is None:
+    given = tuple(name.strip() for name in columns.split(",")) if columns else ()
+    text = decoded(path.read_bytes(), str(path))
+    numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
+    marked = [(i, line.strip().lstrip("#%/!").strip()) for i, line in numbered if line.startswith(_COMMENT)]
+    numbered = [(i, line) for i, line in numbered if not line.startswith(_COMMENT)]
+    lines = [line for _, line in numbered]
+    if not lines:
+        raise InputError(f"{path}: holds no header and no row")
+    dialects = _dialects(lines)
+    if not dialects:
+        if len(lines) == 1:
+            raise InputError(f"{path}: holds a header and no row")
+        stamp = _STAMP.search(lines[:_LOOK][-1][:_LONGEST_LINE])
+        if stamp:
+            raise InputError(
+                f"{path}: its times are dates or clock times, such as {stamp[0]!r}, which are not read: write them in "
+                "seconds, or leave them out and give sampling_frequency (--sampling-freq)"
+            )
         raise InputError(
-            f"{path}: its first row, line {block.lines[0]}, has no header above it that names its {width} column(s); "
-            "give columns (--columns), such as 'time [s],velocity [mm/s]'"
+            f"{path}: no row of numbers in its first {min(len(lines), _LOOK)} lines; its columns may not be separated "
+            "by semicolons, tabs, commas or blanks"
         )
-    if len(names) != width:
-        raise InputError(f"{path}: columns (--columns) = {columns!r} names {len(names)}, the rows have {width}")
-    columns_of = list(zip(*block.rows, strict=True))
+    places = [0, *(i for i, _ in numbered)]
+    above = {
+        one.first: [note for i, note in marked if places[one.first] < i < places[one.first + 1]] for one in dialects
+    }
+    dialect, names, taken = _best(path, lines, dialects, len(given), above)
+    used, comma, first = dialect.used, dialect.decimal_comma, dialect.first
+    if used[0] > 0:  # rows beside cells of the header too, as oscilloscopes write them
+        cells = _cells(lines[:first], dialect.separator)
+        while first > 0 and _is_row(cells[first - 1], used, comma):
+            first -= 1
+    try:
+        cells = _cells(lines[first:], dialect.separator)
+    except csv.Error as error:
+        raise InputError(f"{path}: is no table ({error})") from error
+    if len(cells) != len(lines) - first:
+        raise InputError(f"{path}: a quoted value runs over the end of a line")
+    if not text.endswith("\n") and _is_short(cells):
+        last = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
+        tell([KINDS_SIGNAL["cut_in_number"].found(told=last)])
+    beyond = " ".join(cell for cell in cells[0][used[-1] + 1 :] if cell)  # settings behind the first row
+    heads = [line for k, line in enumerate(lines[: dialect.first]) if k not in taken]
+    header = [beyond, *(note for _, note in marked), *heads]
+    for k, row in enumerate(cells):
+        stray = (k > 0 and any(row[used[-1] + 1 :])) or (dialect.separator is None and len(row) != len(used))
+        if stray or len(row) <= used[-1]:
+            count, told = (
+                len([cell for cell in row if cell or not stray]),
+                "the header names" if names else "the first has",
+            )
+            raise InputError(
+                f"{path}: line {numbered[first + k][0]} has {count} value(s), {told} {len(used)} column(s)"
+            )
+    if not given and names is None:
+        values = header_values(header)
+        across, up = header_unit(values, "horizontalunits"), header_unit(values, "verticalunits")
+        if len(used) != 2 or not across or not up:
+            raise InputError(
+                f"{path}: its first row, line {numbered[first][0]}, has no header above it that names its {len(used)} "
+                "column(s); give columns (--columns), such as 'time [s],velocity [mm/s]'"
+            )
+        names = f"time [{across}]", f"{values.get('source', 'channel 1')} [{up}]"  # an oscilloscope's table
+    names = given or names or ()
+    if len(names) != len(used):
+        raise InputError(f"{path}: columns (--columns) = {columns!r} names {len(names)}, the rows have {len(used)}")
+    columns_of = list(zip(*(dialect.row_of(row) for row in cells), strict=True))
     if not names[0] and len(names) > 1 and (np.diff([to_number(cell) for cell in columns_of[0]]) == 1.0).all():
         names, columns_of = names[1:], columns_of[1:]  # the index of a data frame
     if "" in names or len(set(names)) < len(names):
         raise InputError(f"{path}: columns {list(names)}: each must have a name of its own")
-    return Table(block, dict(zip(names, columns_of, strict=True)))
+    return Table(path, dict(zip(names, columns_of, strict=True)), [i for i, _ in numbered[first:]], header, comma)
 
 
-def _names(block: TextBlock) -> tuple[str, ...] | None:
-    """Names of the columns with their units in brackets; None if there are none."""
-    if block.names is None:
-        values = header_values(block.header)
-        across, up = header_unit(values, "horizontalunits"), header_unit(values, "verticalunits")
-        if len(block.rows[0]) == 2 and across and up:  # an oscilloscope's table
-            return f"time [{across}]", f"{values.get('source', 'channel 1')} [{up}]"
-        return None
-    if block.units is None:
-        return block.names
-    joined = []
-    for name, unit in zip(block.names, block.units, strict=True):
-        word = unit.strip().strip("[]()").strip()
-        known = not name or split_unit(name)[1] is not None or word in ("", "-")
-        joined.append(name if known else f"{name} [{word}]")
-    return tuple(joined)
-
-
-def read_csv(path: Path, told: Told) -> list[Channel]:
+def read_csv(path: Path, rate: float | None, names: str | None) -> list[Channel]:
     """Return the channels of a text table; see :func:`snapbeam.lab.signal_files.read_channels`."""
-    table = read_table(path, told.columns)
+    table = read_table(path, names)
     columns = {name: split_unit(name) for name in table.columns}
     times = [name for name, (word, unit) in columns.items() if _is_time(word, unit)]
     if not times:  # a row of units only, as "[ s ]"
         times = [name for name, (_, unit) in columns.items() if unit and unit_factor(name, unit, "s")]
     if len(times) > 1:
         raise InputError(f"{path}: columns {times}: only one may be the time")
-    values = header_values(table.block.header)
+    values = header_values(table.header)
     first, (word, unit) = next(iter(columns.items()))
     if not times and (unit == "Hz" or word.lower().startswith("freq")):
         raise InputError(
             f"{path}: its first column, {first!r}, is a frequency, so that this is a spectrum; export the time signal"
         )
     common: dict[str, Any] = {}
-    known = told.rate
+    known = rate
     if times:
         word, unit = columns[times[0]]
         duration = _DURATION.fullmatch(table.columns[times[0]][0])
@@ -1020,7 +958,7 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
         common["time"] = table.numbers(times[0]) * seconds_in(f"{path}: column {word!r}", unit)
         if known is None and common["time"].size > 2:
             known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
-    commas = table.block.decimal_comma and any("," in cell for row in table.block.rows[:_ABOVE] for cell in row)
+    commas = table.decimal_comma and any("," in cell for cells in table.columns.values() for cell in cells[:_ABOVE])
     stated = _stated_rates([("", values)], commas, known)
     rate = _one_rate(stated, f"{path}: the header") if stated else None
     if times:
@@ -1080,7 +1018,7 @@ def split_unit(column: str) -> tuple[str, str | None]:
     return column, None
 
 
-def read_tdms(path: Path, _told: Told) -> list[Channel]:
+def read_tdms(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of a TDMS file."""
     from nptdms import TdmsFile
 
@@ -1120,7 +1058,7 @@ def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
         writer.write_segment([ChannelObject("snapbeam", str(signal.name), values, properties=properties)])
 
 
-def read_uff(path: Path, _told: Told) -> list[Channel]:
+def read_uff(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of a universal file (dataset 58)."""
     channels: list[Channel] = []
     for name, entry in _records_58(path, (0, 1)):
@@ -1291,7 +1229,7 @@ def _first(text: Any, otherwise: str) -> str:
     return otherwise if word.upper() in ("", "NONE") else word
 
 
-def read_wav(path: Path, _told: Told) -> list[Channel]:
+def read_wav(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of a sound file."""
     from scipy.io import wavfile
 
@@ -1339,7 +1277,7 @@ def write_wav(path: Path, signal: xr.DataArray, full_scale: float | None) -> Non
     wavfile.write(path, round(rate), np.round(values / scale * 2.0**31).astype(np.int32))
 
 
-READERS: dict[str, Callable[[Path, Told], list[Channel]]] = {
+READERS: dict[str, Callable[[Path, float | None, str | None], list[Channel]]] = {
     **dict.fromkeys((".csv", ".txt", ".asc", ".dat", ".tsv"), read_csv), ".lvm": read_lvm, ".wav": read_wav,
     ".uff": read_uff, ".unv": read_uff, ".tdms": read_tdms, ".mat": read_matlab,
     **dict.fromkeys((".h5", ".hdf5", ".nc"), read_hdf5), ".npz": read_numpy, ".npy": read_numpy,
