@@ -10,6 +10,7 @@ import tempfile
 import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,12 +20,12 @@ from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.matlab_file import read_version_5
-from snapbeam.lab.signals import check_signal, even_sampling, si_unit, unit_factor
-from snapbeam.util.diagnostics import Diagnostic, tell
+from snapbeam.lab.signals import SignalSamples, even_sampling, si_unit, unit_factor
+from snapbeam.util.diagnostics import Diagnostic, DiagnosticWarning, tell
 from snapbeam.util.hdf5 import members_of, open_hdf5
 from snapbeam.util.input_files import decoded, refuse_inflated
 from snapbeam.util.netcdf import hdf5_stream
-from snapbeam.util.packages import needing
+from snapbeam.util.packages import needs
 from snapbeam.util.tables import universal_record, write_universal
 from snapbeam.util.validation import InputError, file_path, positive
 
@@ -214,10 +215,12 @@ def _stated_array(file: Any) -> int:
     return math.prod(shape) * max(dtype.itemsize, 8)
 
 
-def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+def write_npz(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal to a NumPy file with its times and its unit."""
-    (values, time, _), name = check_signal(signal), str(signal.name)
-    np.savez(path, **{name: values, "time": time, f"{name}_units": signal.attrs["units"], "time_units": "s"})
+    name = str(signal.name)
+    np.savez(
+        path, **{name: samples.values, "time": samples.time, f"{name}_units": signal.attrs["units"], "time_units": "s"}
+    )
 
 
 # Arrays with names: vectors, and matrices with a channel in each row or column.  Attributes, and arrays of one number or
@@ -247,20 +250,15 @@ def _unpacked(name: str, data: NDArray[Any], attributes: Mapping[str, Any]) -> N
                 f"{name}: attribute {key!r} = {_text(attributes[key])}: must be a finite number, a scale not 0"
             )
         packing[key] = value if filling and value.size > 1 else value.ravel()[0] if size == 1 else value
-    low, high = packing.pop("valid_range", (None, None))
+    low, high = packing.pop("valid_range", (-math.inf, math.inf))
     low, high = packing.pop("valid_min", low), packing.pop("valid_max", high)
     _refuse_scales(name, data, {key: value for key, value in attributes.items() if key not in packing})
-    if "_Unsigned" in attributes:
-        packing["_Unsigned"] = _text(attributes["_Unsigned"])
-    if not packing and low is None and high is None:
-        return data
-    variable = xr.Variable([f"axis{k}" for k in range(data.ndim)], data, packing)
-    values = xr.conventions.decode_cf_variable(name, variable, decode_times=False).values
-    outside = np.zeros(data.shape, dtype=bool)
-    if low is not None:
-        outside |= data < low
-    if high is not None:
-        outside |= data > high
+    outside, values = (data < low) | (data > high), data
+    if packing:
+        if "_Unsigned" in attributes:
+            packing["_Unsigned"] = _text(attributes["_Unsigned"])
+        variable = xr.Variable([f"axis{k}" for k in range(data.ndim)], data, packing)
+        values = xr.conventions.decode_cf_variable(name, variable, decode_times=False).values
     return np.where(outside, np.nan, values) if outside.any() else values
 
 
@@ -314,15 +312,15 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         time = is_time(split_unit(last)[0])
         for _, values in () if time else around[1:]:
             _refuse_scales(name, data, values)
-        rates = _stated_rates(() if time else around)
         rows = np.atleast_2d(_unpacked(name, data, item.attributes))
         rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
         for k, row in enumerate(rows):
             own = name if rows.shape[0] == 1 else f"{name} {k + 1}"
             unit = stated_unit(item.attributes) or _unit(texts, name)
             channel: Channel = {"data": row, "name": own, "unit_str": unit, "axis": item.axis}
-            if rates:
-                channel["fs"] = _one_rate(rates, own)
+            rate = _stated_rate(() if time else around, own)
+            if rate is not None:
+                channel["fs"] = rate
             channels.append(channel)
     return with_time(channels)
 
@@ -433,13 +431,15 @@ def _axis_of(item: Any) -> str | None:
     return scales[0].name.lstrip("/") if len(scales) else None
 
 
-def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+def write_hdf5(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal to an HDF5 file."""
     import h5py
 
-    values, time, _ = check_signal(signal)
     with hdf5_stream(path) as stream, h5py.File(stream, "w") as file:
-        for name, numbers, unit in (("time", time, "s"), (str(signal.name), values, signal.attrs["units"])):
+        for name, numbers, unit in (
+            ("time", samples.time, "s"),
+            (str(signal.name), samples.values, signal.attrs["units"]),
+        ):
             file.create_dataset(name, data=numbers).attrs["units"] = unit
 
 
@@ -768,27 +768,23 @@ def header_values(lines: Iterable[str]) -> dict[str, str]:
     return values
 
 
-def _stated_rates(
-    levels: Iterable[tuple[str, Mapping[str, Any]]], decimal_comma: bool = False, known: float | None = None
-) -> dict[str, float]:
-    """Sampling rates [Hz] that the named values of some places state, by their places and names.
+def _stated_rate(
+    levels: Iterable[tuple[str, Mapping[str, Any]]], where: str, decimal_comma: bool = False, known: float | None = None
+) -> float | None:
+    """The sampling rate [Hz] that the named values of some places state; None if none does.
 
     *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
     """
-    return {
+    found = {
         f"{place}/{key}".lstrip("/"): rate
         for place, values in levels
         for key, value in values.items()
         if (rate := _rate_of(key, value, decimal_comma, known)) is not None
     }
-
-
-def _one_rate(found: Mapping[str, float], where: str) -> float:
-    """The one of several stated sampling rates [Hz]."""
-    if max(found.values()) > 1.001 * min(found.values()):
+    if found and max(found.values()) > 1.001 * min(found.values()):
         told = ", ".join(f"{key} {value:.9g} Hz" for key, value in found.items())
         raise InputError(f"{where} contradicts itself about the sampling rate ({told}): remove the wrong one")
-    return next(iter(found.values()))
+    return next(iter(found.values()), None)
 
 
 def _rate_of(name: str, value: Any, decimal_comma: bool = False, known: float | None = None) -> float | None:
@@ -959,8 +955,7 @@ def read_csv(path: Path, rate: float | None, names: str | None) -> list[Channel]
         if known is None and common["time"].size > 2:
             known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
     commas = table.decimal_comma and any("," in cell for cells in table.columns.values() for cell in cells[:_ABOVE])
-    stated = _stated_rates([("", values)], commas, known)
-    rate = _one_rate(stated, f"{path}: the header") if stated else None
+    rate = _stated_rate([("", values)], f"{path}: the header", commas, known)
     if times:
         if rate is not None:
             way_out = "correct the header, or name the times otherwise in columns (--columns), such as "
@@ -991,13 +986,12 @@ def agree(name: str, time: NDArray[np.float64], rate: float, way_out: str) -> No
         raise InputError(f"{name}: the times are sampled at {found:.9g} Hz, the header says {rate:.9g} Hz; {way_out}")
 
 
-def write_csv(path: Path, signal: xr.DataArray, _full_scale: float | None = None) -> None:
+def write_csv(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal as a table of time and value, 12 digits each."""
-    values, time, rate = check_signal(signal)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"# sampling_frequency: {rate:.12g} Hz\n")
+        file.write(f"# sampling_frequency: {samples.sampling_frequency:.12g} Hz\n")
         file.write(f"time [s],{signal.name} [{signal.attrs['units']}]\n")
-        np.savetxt(file, np.column_stack((time, values)), fmt="%.12g", delimiter=",")
+        np.savetxt(file, np.column_stack((samples.time, samples.values)), fmt="%.12g", delimiter=",")
 
 
 def split_unit(column: str) -> tuple[str, str | None]:
@@ -1039,19 +1033,19 @@ def read_tdms(path: Path, *_told: Any) -> list[Channel]:
             unit = next((str(entry.properties[k]) for k in UNIT_NAMES if entry.properties.get(k)), None)
             channel: Channel = {"data": data, "name": f"{group.name}/{entry.name}", "unit_str": unit}
             levels = (("", entry), (group.name, group), ("file", file))
-            rates = _stated_rates((place, level.properties) for place, level in levels)
-            if rates:
-                channel["fs"] = _one_rate(rates, channel["name"])
+            rate = _stated_rate(((place, level.properties) for place, level in levels), channel["name"])
+            if rate is not None:
+                channel["fs"] = rate
                 channel["time_offset"] = float(entry.properties.get("wf_start_offset", 0.0))
             channels.append(channel)
     return with_time(channels)
 
 
-def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+def write_tdms(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal to a TDMS file."""
     from nptdms import ChannelObject, TdmsWriter
 
-    values, time, rate = check_signal(signal)
+    values, time, rate = samples
     properties = {"wf_increment": 1.0 / rate, "wf_start_offset": float(time[0]), "wf_samples": values.size}
     properties["unit_string"] = signal.attrs["units"]
     with TdmsWriter(str(path)) as writer:
@@ -1119,6 +1113,29 @@ def _records_58(path: Path, functions: tuple[int, ...]) -> Iterator[tuple[str, d
         yield name, entry
 
 
+@contextmanager
+def reading(source: Path) -> Iterator[None]:
+    """Turn whatever a reading library trips over into a refusal that names the file; refuse one that is missing or empty."""
+    if not source.is_file():
+        raise InputError(f"{source}: no such file")
+    if source.stat().st_size == 0:
+        raise InputError(f"{source}: the file is empty")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("default", DiagnosticWarning)
+            yield
+    except InputError as error:
+        raise InputError(error.args[0] if str(source) in str(error) else f"{source}: {error}") from error
+    except ImportError as error:
+        raise InputError(needs(f"{source}: reading {source.suffix} files", error.name, "lab")) from error
+    except MemoryError as error:
+        raise InputError(f"{source}: the header asks for more memory than there is") from error
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError(f"{source}: not a readable {source.suffix} file ({reason})") from error
+
+
 def read_spectra(path: str | os.PathLike[str]) -> list[xr.DataArray]:
     """Read the frequency responses and spectra of a universal file (dataset 58).
 
@@ -1153,12 +1170,8 @@ def read_spectra(path: str | os.PathLike[str]) -> list[xr.DataArray]:
     from snapbeam.util.datasets import xr
 
     file = file_path("path", path)
-    if not file.is_file():
-        raise InputError(f"{file}: no such file")
     found = []
-    with needing(f"{file}: reading it", "lab"):
-        import pyuff  # noqa: F401
-    try:
+    with reading(file):
         for name, entry in _records_58(file, tuple(SPECTRA)):
             over = _first(entry.get("abscissa_axis_units_lab"), "Hz")
             factor, base = si_unit(f"abscissa of {name}", over)
@@ -1173,12 +1186,8 @@ def read_spectra(path: str | os.PathLike[str]) -> list[xr.DataArray]:
             words = SPECTRA[entry["func_type"]]
             attrs = {"units": unit, "long_name": words, "function": words, "source": file.name}
             found.append(xr.DataArray(entry["data"], {"frequency": axis}, ("frequency",), name, attrs))
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from error
-    except Exception as error:  # a damaged file makes pyuff raise many kinds
-        raise InputError(f"{file}: cannot be read as a universal file ({error})") from error
-    if not found:
-        raise InputError(f"{file}: has no spectrum in a dataset 58")
+        if not found:
+            raise InputError("has no spectrum in a dataset 58")
     return found
 
 
@@ -1218,10 +1227,9 @@ def _undo_rounding(step: float) -> float:
     return float(whole) if same else 1.0 / step
 
 
-def write_uff(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+def write_uff(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal to a universal file (dataset 58)."""
-    values, time, _ = check_signal(signal)
-    write_universal(path, [universal_record(str(signal.name), signal.attrs["units"], time, values)])
+    write_universal(path, [universal_record(str(signal.name), signal.attrs["units"], samples.time, samples.values)])
 
 
 def _first(text: Any, otherwise: str) -> str:
@@ -1264,11 +1272,11 @@ def _bytes_of_a_frame(path: Path) -> int:
     return int.from_bytes(head[at : at + 2], "big" if head.startswith(b"RIFX") else "little")
 
 
-def write_wav(path: Path, signal: xr.DataArray, full_scale: float | None) -> None:
+def write_wav(path: Path, signal: xr.DataArray, samples: SignalSamples, full_scale: float | None) -> None:
     """Write a signal to a sound file."""
     from scipy.io import wavfile
 
-    values, _, rate = check_signal(signal)
+    values, _, rate = samples
     scale = positive("full_scale", full_scale, signal.attrs["units"])
     if abs(rate - round(rate)) > 1e-6 * rate:
         raise InputError(f"sampling rate of {rate:.9g} Hz: a WAV file holds whole numbers of hertz only")
@@ -1282,7 +1290,7 @@ READERS: dict[str, Callable[[Path, float | None, str | None], list[Channel]]] = 
     ".uff": read_uff, ".unv": read_uff, ".tdms": read_tdms, ".mat": read_matlab,
     **dict.fromkeys((".h5", ".hdf5", ".nc"), read_hdf5), ".npz": read_numpy, ".npy": read_numpy,
 }  # fmt: skip
-WRITERS: dict[str, Callable[[Path, Any, float | None], None]] = {
+WRITERS: dict[str, Callable[[Path, Any, SignalSamples, float | None], None]] = {
     ".csv": write_csv,
     ".wav": write_wav,
     ".uff": write_uff,
