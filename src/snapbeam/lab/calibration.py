@@ -83,18 +83,18 @@ def sensitivity(frequencies: Callable[[_Array], _Array], logs: _Array, errors: _
     return np.column_stack(columns) / errors[:, None]
 
 
-def search(residual: Callable[[_Array], _Array], begin: _Array, keep: _Array, names: list[str], freedom: int) -> _Array:
+def search(residual: Callable[[_Array], _Array], begin: _Array, keep: _Array, level: _Array, freedom: int) -> _Array:
     """The least squares minimum; other buckling levels are tried where the first start meets the data badly.
 
     Frequencies are told apart by their order only, and at b/r = 6.2 the first two change places: from the
-    wrong side of it the fit can end in a minimum that is none of the data's.
+    wrong side of it the fit can end in a minimum that is none of the data's.  *level* is 1 for the buckling level.
     """
     from scipy.optimize import least_squares
 
     enough = freedom + 3.0 * math.sqrt(2.0 * freedom) + 1e-6
     best, found = math.inf, begin
-    for factor in STARTS if "buckling_level" in names else STARTS[:1]:
-        start = begin + np.array([math.log(factor) if name == "buckling_level" else 0.0 for name in names])
+    for factor in STARTS if level.any() else STARTS[:1]:
+        start = begin + math.log(factor) * level
         result = least_squares(
             lambda z, start=start: residual(start + keep @ z), np.zeros(keep.shape[1]), x_scale=0.1,
             xtol=1e-10, ftol=1e-10, gtol=1e-10,
@@ -106,24 +106,10 @@ def search(residual: Callable[[_Array], _Array], begin: _Array, keep: _Array, na
     return found
 
 
-def open_upwards(residual: Callable[[_Array], _Array], logs: _Array, names: list[str]) -> bool:
-    """Return whether higher buckling levels fit the data as well as the one found.
-
-    So it is where the only frequency about a well is that of the antisymmetric mode, which does not depend on
-    the level; the symmetric one lies above it from b/r = 6.2 on.
-    """
-    if "buckling_level" not in names:
-        return False
-    least = float(np.sum(residual(logs) ** 2))
-    higher = (logs + np.array([math.log(by) * (name == "buckling_level") for name in names]) for by in HIGHER)
-    return all(float(np.sum(residual(one) ** 2)) < least + 4.0 for one in higher)
-
-
 def directions(jacobian: _Array) -> _Array:
     """Orthonormal combinations of parameters that the data respond to, one a column."""
     _, singular, rows = svd(jacobian, full_matrices=False)
-    told = singular > UNDETERMINED * singular[0]
-    return np.asarray(rows[told].T)
+    return np.asarray(rows[singular > UNDETERMINED * singular[0]].T)
 
 
 def shape_diagnostics(beam: Beam, measured: Measurements, modes: int) -> list[Diagnostic]:
@@ -496,9 +482,10 @@ def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> dict[s
     logs, covariance, scatter, freedom = begin, np.zeros((0, 0)), 1.0, len(data)
     undetermined: tuple[str, ...] = ()
     diagnostics: list[Diagnostic] = []
+    level = np.array([float(name == "buckling_level") for name in names])
     if names:
         keep = directions(sensitivity(frequencies, begin, errors))
-        logs = search(residual, begin, keep, names, len(data) - keep.shape[1])
+        logs = search(residual, begin, keep, level, len(data) - keep.shape[1])
         jacobian = sensitivity(frequencies, logs, errors)
         # where the fit ends the data may respond to less than where it began
         keep = min(keep, directions(jacobian), key=lambda one: one.shape[1])
@@ -509,7 +496,9 @@ def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> dict[s
         covariance = keep @ inner @ keep.T * scatter**2
         undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
         diagnostics += links(names, covariance, undetermined)
-        if "buckling_level" not in undetermined and open_upwards(residual, logs, names):
+        higher = [float(np.sum(residual(logs + math.log(by) * level) ** 2)) for by in HIGHER if level.any()]
+        # as where the only frequency about a well is that of the antisymmetric mode, whose level is open upwards
+        if higher and "buckling_level" not in undetermined and max(higher) < chi + 4.0:
             undetermined += ("buckling_level",)
             least = math.exp(logs[names.index("buckling_level")])
             words = (
