@@ -9,6 +9,7 @@ import re
 import tempfile
 import warnings
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -173,10 +174,10 @@ def with_time(channels: list[Channel]) -> list[Channel]:
 
 def numbered(channels: list[Channel]) -> list[Channel]:
     """Channels of which each has a name of its own."""
-    seen: dict[str, int] = {}
+    seen: Counter[str] = Counter()
     for channel in channels:
         name = channel["name"]
-        seen[name] = seen.get(name, 0) + 1
+        seen[name] += 1
         if seen[name] > 1:
             channel["name"] = f"{name} ({seen[name]})"
     return channels
@@ -933,7 +934,12 @@ def read_csv(path: Path, rate: float | None, names: str | None) -> list[Channel]
     """Return the channels of a text table; see :func:`snapbeam.lab.signal_files.read_channels`."""
     table = read_table(path, names)
     columns = {name: split_unit(name) for name in table.columns}
-    times = [name for name, (word, unit) in columns.items() if _is_time(word, unit)]
+    times = [
+        name
+        for name, (word, unit) in columns.items()
+        if is_time(word)
+        and (_key(word) not in ("xaxis", "xvalue") or si_unit(f"column {word!r}", unit or "s")[1] == "s")
+    ]
     if not times:  # a row of units only, as "[ s ]"
         times = [name for name, (_, unit) in columns.items() if unit and unit_factor(name, unit, "s")]
     if len(times) > 1:
@@ -968,13 +974,6 @@ def read_csv(path: Path, rate: float | None, names: str | None) -> list[Channel]
         for name, (word, unit) in columns.items()
         if name not in times
     ]
-
-
-def _is_time(word: str, unit: str | None) -> bool:
-    """Return whether a column is the time: by its name, unless an axis name has another unit."""
-    if not is_time(word) or unit is None or _key(word) not in ("xaxis", "xvalue"):
-        return is_time(word)
-    return si_unit(f"column {word!r}", unit)[1] == "s"
 
 
 def agree(name: str, time: NDArray[np.float64], rate: float, way_out: str) -> None:

@@ -21,22 +21,18 @@ if TYPE_CHECKING:
 
 _PREFIX = {"": 1.0, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9}
 _WITH_PREFIX = ("m", "m/s", "m/s^2", "N", "V", "s", "Hz", "Pa")
+_ODD = ("cs", "ks", "cV", "cHz", "cPa", "cN")
 _GRAVITY = 9.80665  # m/s^2, standard acceleration of free fall
 _INCH = 0.0254  # m
 _TO_SI: dict[str, tuple[float, str]] = {
-    **{f"{p}{unit}": (s, unit) for unit in _WITH_PREFIX for p, s in _PREFIX.items()},
-    "g": (_GRAVITY, "m/s^2"),
-    "g_n": (_GRAVITY, "m/s^2"),
-    "in": (_INCH, "m"),
-    "in/s": (_INCH, "m/s"),
+    **{f"{p}{u}": (s, u) for u in _WITH_PREFIX for p, s in _PREFIX.items() if f"{p}{u}" not in _ODD},
+    **dict.fromkeys(("g", "g_n"), (_GRAVITY, "m/s^2")),
+    **{f"in{per}": (_INCH, f"m{per}") for per in ("", "/s", "/s^2")},
     "ips": (_INCH, "m/s"),
-    "in/s^2": (_INCH, "m/s^2"),
     "FS": (1.0, "FS"),
     "1": (1.0, "1"),
     "b": (1.0, "b"),
 }
-for _odd in ("cs", "ks", "cV", "cHz", "cPa", "cN"):
-    _TO_SI.pop(_odd)
 _WORDS = {
     "second": "s", "seconds": "s", "millisecond": "ms", "milliseconds": "ms", "microsecond": "us",
     "microseconds": "us", "nanosecond": "ns", "nanoseconds": "ns", "volt": "V", "volts": "V",

@@ -157,16 +157,15 @@ def _pulling(times: _Array, cycles: NDArray[np.complex128]) -> float:
     The phase is averaged over eighths of the record, and the frequencies from one to the next scatter.
     """
     phase = np.unwrap(np.angle(cycles)) / (2.0 * math.pi)
+
+    def off_line(x: _Array, y: _Array) -> _Array:
+        return np.asarray(y - np.polyval(polyfit(x - x.mean(), y, 1), x - x.mean()))
+
     parts = np.array_split(np.arange(phase.size), 8)
-    at = np.array([times[part].mean() for part in parts])
-    mean = np.array([phase[part].mean() for part in parts])
-    own = []
-    for part in parts:
-        left = phase[part] - np.polyval(polyfit(times[part] - times[part].mean(), phase[part], 1),
-                                        times[part] - times[part].mean())  # fmt: skip
-        own.append(float(np.std(left, ddof=2)) / math.sqrt(part.size) if part.size > 2 else math.inf)
-    off = mean - np.polyval(polyfit(at, mean, 1), at)
-    if float(np.sqrt(np.mean(off**2))) < _PULLED * float(np.sqrt(np.mean(np.square(own)))):
+    at, mean = (np.array([values[part].mean() for part in parts]) for values in (times, phase))
+    lefts = [off_line(times[part], phase[part]) for part in parts]
+    own = [float(np.std(left, ddof=2)) / math.sqrt(left.size) if left.size > 2 else math.inf for left in lefts]
+    if float(np.sqrt(np.mean(off_line(at, mean) ** 2))) < _PULLED * float(np.sqrt(np.mean(np.square(own)))):
         return 0.0
     rates = np.diff(mean) / np.diff(at)
     return float(np.std(rates, ddof=1)) / math.sqrt(_counts(rates))
