@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+_PARITY = {"": 0, "symmetric": 1, "antisymmetric": -1}
 _UNITS = {"midspan_amplitude": "m", "point_load": "N", "uniform_load": "N/m"}
 _Array = NDArray[np.float64]
 STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
@@ -544,16 +546,12 @@ def _data(measured: Measurements, modes: int) -> list[_Datum]:
         errors = getattr(measured, f"{state}_frequencies_se") or [ASSUMED * value for value in values]
         if len(values) > modes:
             raise InputError(f"{state}_frequencies: {len(values)} frequencies for a model of {modes} modes")
-        shapes = getattr(measured, f"{state}_shape", ())
-        seen = {1: 0, -1: 0}
-        for i, (value, error) in enumerate(zip(values, errors, strict=True)):
-            if not shapes:
-                data.append(_Datum(f"{word}, mode {i + 1}", state, i, 0, value, error))
-                continue
-            parity = 1 if shapes[i] == "symmetric" else -1
-            name = f"{word}, {shapes[i]} mode {seen[parity] + 1}"
-            data.append(_Datum(name, state, seen[parity], parity, value, error))
-            seen[parity] += 1
+        shapes = getattr(measured, f"{state}_shape", ()) or [""] * len(values)
+        seen: Counter[str] = Counter()
+        for shape, value, error in zip(shapes, values, errors, strict=True):
+            name = f"{word}, {shape} mode" if shape else f"{word}, mode"
+            data.append(_Datum(f"{name} {seen[shape] + 1}", state, seen[shape], _PARITY[shape], value, error))
+            seen[shape] += 1
     return data
 
 
@@ -575,14 +573,12 @@ def _model(beam: Beam, data: list[_Datum], modes: int) -> _Array:
         straight: ReducedModel.from_beam(beam.replace(axial_load=0.0) if straight else beam, modes)
         for straight in {item.state == "straight" for item in data}
     }
-    out = []
-    for item in data:
-        model = models[item.state == "straight"]
-        freq = model.natural_frequencies
-        if item.parity:
-            freq = freq[model.parity == item.parity]
-        out.append(freq[item.mode])
-    return np.array(out)
+
+    def frequency(model: ReducedModel, item: _Datum) -> float:
+        of_kind = model.parity == item.parity if item.parity else slice(None)
+        return float(model.natural_frequencies[of_kind][item.mode])
+
+    return np.array([frequency(models[item.state == "straight"], item) for item in data])
 
 
 def _first_frequency(beam: Beam, modes: int) -> float:
