@@ -29,7 +29,7 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.uncertainty.measurements import HERTZ_TIME, Measurements
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.singular_values import svd
-from snapbeam.util.validation import InputError, InputTypeError, choice, integer, positive, shown
+from snapbeam.util.validation import InputError, choice, instance, integer, positive, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -400,10 +400,8 @@ def calibrate(
     >>> list(found.values)
     ['buckling_level']
     """
-    if not isinstance(measured, Measurements):
-        raise InputTypeError(f"measured: must be Measurements, not {type(measured).__name__}")
-    if not isinstance(beam, Beam):
-        raise InputTypeError(f"beam: must be a Beam, not {type(beam).__name__}")
+    instance("measured", measured, Measurements, "Measurements")
+    instance("beam", beam, Beam, "a Beam")
     count = integer("modes", modes, 1, 256)
     data = _data(measured, count)
     names = _fitted(measured, fit)
@@ -657,8 +655,7 @@ def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> Contac
     from snapbeam.util.datasets import xr
 
     mass = positive("effective_mass", effective_mass, "kg")
-    if not isinstance(impacts, xr.Dataset):
-        raise InputTypeError(f"impacts: must be an xarray.Dataset, not {type(impacts).__name__}")
+    instance("impacts", impacts, xr.Dataset, "an xarray.Dataset")
     needed = ("duration", "duration_stderr", "closing_speed", "frames")
     missing = [name for name in needed if name not in impacts]
     if missing:

@@ -437,10 +437,8 @@ def write_hdf5(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_s
     import h5py
 
     with hdf5_stream(path) as stream, h5py.File(stream, "w") as file:
-        for name, numbers, unit in (
-            ("time", samples.time, "s"),
-            (str(signal.name), samples.values, signal.attrs["units"]),
-        ):
+        columns = {"time": (samples.time, "s"), str(signal.name): (samples.values, signal.attrs["units"])}
+        for name, (numbers, unit) in columns.items():
             file.create_dataset(name, data=numbers).attrs["units"] = unit
 
 

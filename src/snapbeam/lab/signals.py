@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.util.validation import InputError, InputTypeError, finite, finite_array, positive, require_texts, shown
+from snapbeam.util.validation import InputError, finite, finite_array, instance, positive, require_texts, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,17 +58,14 @@ def si_unit(name: str, unit: str) -> tuple[float, str]:
     Known are m, m/s, m/s^2, N, V, s, Hz and Pa with the prefixes k, c, m, u (or µ), n; g, the standard
     acceleration of free fall; in, in/s, in/s^2; and FS, the fraction of full scale of a sound file.
     """
-    if not isinstance(unit, str):
-        where = f"unit of {name}" if isinstance(name, str) else "unit"
-        raise InputTypeError(f"{where} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}")
+    where = f"unit of {name if isinstance(name, str) else 'a signal'}"
+    instance(where, unit, str, "text such as 'mm/s'")
     word = unit.strip().replace("\u03bc", "u").replace("\u00b5", "u").replace(" ", "").replace("*", "")
     word = _WORDS.get(word.lower(), word)
     word = word.replace("sec", "s").replace("²", "^2").replace("/s/s", "/s^2").replace("/s2", "/s^2")
     word = re.sub(r"s\^?-1$", "/s", re.sub(r"s\^?-2$", "/s^2", word)).replace("//", "/")
     if word not in _TO_SI:
-        raise InputError(
-            f"unit of {name if isinstance(name, str) else 'a signal'} = {shown(unit)}: must be {KNOWN_UNITS}"
-        )
+        raise InputError(f"{where} = {shown(unit)}: must be {KNOWN_UNITS}")
     return _TO_SI[word]
 
 
@@ -232,8 +229,7 @@ def check_signal(signal: xr.DataArray, units: str | tuple[str, ...] = (), name: 
     """Return the samples of *signal* if it is one: evenly sampled, finite, long enough and in one of *units*."""
     from snapbeam.util.datasets import xr
 
-    if not isinstance(signal, xr.DataArray):
-        raise InputTypeError(f"{name}: must be an xarray.DataArray (see make_signal), not {type(signal).__name__}")
+    instance(name, signal, xr.DataArray, "an xarray.DataArray (see make_signal)")
     label = f"{name} {str(signal.name)!r}" if signal.name not in (None, name) else name
     if signal.dims != ("time",) or "time" not in signal.coords:
         raise InputError(f"{label} with dimensions {signal.dims}: must have the one dimension time with its times")
