@@ -55,8 +55,7 @@ _LARGEST = 1e30  # of a value in SI units and of a sampling rate: powers and der
 def si_unit(name: str, unit: str) -> tuple[float, str]:
     """Return the factor and the SI unit for *unit*, such as ``(1e-3, "m/s")`` for ``"mm/s"``; *name* is the signal's.
 
-    Known are m, m/s, m/s^2, N, V, s, Hz and Pa with the prefixes k, c, m, u (or µ), n; g, the standard
-    acceleration of free fall; in, in/s, in/s^2; and FS, the fraction of full scale of a sound file.
+    Known are ``KNOWN_UNITS``, with u or µ for micro; g is the standard acceleration of free fall.
     """
     where = f"unit of {name if isinstance(name, str) else 'a signal'}"
     instance(where, unit, str, "text such as 'mm/s'")
