@@ -227,10 +227,6 @@ KINDS_SIGNAL = table(
     },
 )
 
-_BENT = (
-    " (third harmonic {third_percent:.2g} %): the amplitude may be {loss_percent:.2g} % too small, which is in its "
-    "standard error; "
-)
 KINDS_VIBROMETER = table(
     "vibrometer",
     info={
@@ -266,13 +262,15 @@ KINDS_VIBROMETER = table(
         "crosstalk": "{share_percent:.2g} % of the amplitude is there at the drive's frequency before the start "
         "(crosstalk, or a floor that moves): taken out for the start, and in the standard error of the amplitude; "
         "look at cables and supports",
-        "saturated": "the tops are pressed flat as by an amplifier near its limit" + _BENT + "choose a larger range",
-        "slew": "the flanks are straight as of electronics with a limited slew rate"
-        + _BENT
-        + "choose a larger range, or a decoder for faster motion",
-        "crossover": "small values are suppressed as by an amplifier with a dead zone about zero"
-        + _BENT
-        + "look at the power supply of the amplifier, or record without it",
+        "saturated": "the tops are pressed flat as by an amplifier near its limit (third harmonic {third_percent:.2g} "
+        "%): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; choose a larger "
+        "range",
+        "slew": "the flanks are straight as of electronics with a limited slew rate (third harmonic "
+        "{third_percent:.2g} %): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; "
+        "choose a larger range, or a decoder for faster motion",
+        "crossover": "small values are suppressed as by an amplifier with a dead zone about zero (third harmonic "
+        "{third_percent:.2g} %): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; "
+        "look at the power supply of the amplifier, or record without it",
         "high_pass": "the noise falls below {corner:.3g} Hz as behind a high-pass filter (AC coupling): at the "
         "drive's frequency it may take {loss_percent:.2g} % of the amplitude, which is in its standard error; switch "
         "to DC coupling, or to a corner below {limit:.2g} Hz",
@@ -287,9 +285,9 @@ KINDS_VIBROMETER = table(
         "clock_drifts": "the frequency changes by {share_percent:.2g} % over the steady part at a constant amplitude "
         "(the generator, or the clock of the record): half of that is in its standard error; let both warm up, or "
         "record with one clock",
-        "hysteresis": "the signal stays behind at every turning point as with play or hysteresis"
-        + _BENT
-        + "look at the mount of the sensor and its amplifier",
+        "hysteresis": "the signal stays behind at every turning point as with play or hysteresis (third harmonic "
+        "{third_percent:.2g} %): the amplitude may be {loss_percent:.2g} % too small, which is in its standard error; "
+        "look at the mount of the sensor and its amplifier",
         "jitter": "the noise is strongest where the motion is fastest, as with a sampling clock that jitters by "
         "{jitter_us:.3g} us: it takes {loss_percent:.2g} % of the amplitude, which is in its standard error; use the "
         "clock of the converter",
