@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.lab.diagnostics import KINDS_CALIBRATION
+from snapbeam.lab.diagnostics import KINDS_CALIBRATION, holding
 from snapbeam.lab.least_squares import weighted_line
 from snapbeam.model.beam import Beam
 from snapbeam.model.boundary_conditions import BoundaryConditions
@@ -28,12 +29,13 @@ from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.uncertainty.measurements import HERTZ_TIME, Measurements
 from snapbeam.util.diagnostics import Diagnostic
 from snapbeam.util.singular_values import svd
-from snapbeam.util.validation import InputError, InputTypeError, choice, integer, positive, shown
+from snapbeam.util.validation import InputError, choice, instance, integer, positive, shown
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
+_PARITY = {"": 0, "symmetric": 1, "antisymmetric": -1}
 _UNITS = {"midspan_amplitude": "m", "point_load": "N", "uniform_load": "N/m"}
 _Array = NDArray[np.float64]
 STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
@@ -60,23 +62,6 @@ _LEAST_SPAN = 2.0  # factor by which speeds must differ for the power to be told
 _COARSE = 6.0  # frames
 
 
-def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> ReducedModel:
-    """The calibrated beam with the imperfection that gives each well its own first frequency.
-
-    Of the beam, the buckling level alone changes: two numbers from two frequencies, see
-    :func:`snapbeam.model.imperfection_identification.identify_imperfection`.
-    """
-    both = []
-    for well in ("lower", "upper"):
-        own = _symmetric(measured, well)
-        if not own:
-            raise InputError(
-                f"imperfection = {kind!r}: needs the first frequency about both wells; the {well} one's is not given"
-            )
-        both.append(float(own[0]))
-    return identify_imperfection(beam, both[0], both[1], kind, modes)
-
-
 def _symmetric(measured: Measurements, well: str) -> list[float]:
     """Frequencies [Hz] about a well that belong to symmetric modes, or all if their shapes are not given."""
     values, shapes = getattr(measured, f"{well}_well_frequencies"), getattr(measured, f"{well}_well_shape")
@@ -89,12 +74,7 @@ def imperfection_section(imperfection: Imperfection | None) -> dict[str, Any]:
     if imperfection is None:
         return {}
     perfect = vars(Imperfection())
-    changed = {name: value for name, value in vars(imperfection).items() if value is not perfect[name]}
-    return {
-        name: value
-        for name, value in changed.items()
-        if not (isinstance(value, (int, float, str)) and value == perfect[name])
-    }
+    return {name: value for name, value in vars(imperfection).items() if not np.array_equal(value, perfect[name])}
 
 
 def sensitivity(frequencies: Callable[[_Array], _Array], logs: _Array, errors: _Array) -> _Array:
@@ -105,18 +85,18 @@ def sensitivity(frequencies: Callable[[_Array], _Array], logs: _Array, errors: _
     return np.column_stack(columns) / errors[:, None]
 
 
-def search(residual: Callable[[_Array], _Array], begin: _Array, keep: _Array, names: list[str], freedom: int) -> _Array:
+def search(residual: Callable[[_Array], _Array], begin: _Array, keep: _Array, level: _Array, freedom: int) -> _Array:
     """The least squares minimum; other buckling levels are tried where the first start meets the data badly.
 
     Frequencies are told apart by their order only, and at b/r = 6.2 the first two change places: from the
-    wrong side of it the fit can end in a minimum that is none of the data's.
+    wrong side of it the fit can end in a minimum that is none of the data's.  *level* is 1 for the buckling level.
     """
     from scipy.optimize import least_squares
 
     enough = freedom + 3.0 * math.sqrt(2.0 * freedom) + 1e-6
     best, found = math.inf, begin
-    for factor in STARTS if "buckling_level" in names else STARTS[:1]:
-        start = begin + np.array([math.log(factor) if name == "buckling_level" else 0.0 for name in names])
+    for factor in STARTS if level.any() else STARTS[:1]:
+        start = begin + math.log(factor) * level
         result = least_squares(
             lambda z, start=start: residual(start + keep @ z), np.zeros(keep.shape[1]), x_scale=0.1,
             xtol=1e-10, ftol=1e-10, gtol=1e-10,
@@ -128,24 +108,10 @@ def search(residual: Callable[[_Array], _Array], begin: _Array, keep: _Array, na
     return found
 
 
-def open_upwards(residual: Callable[[_Array], _Array], logs: _Array, names: list[str]) -> bool:
-    """Return whether higher buckling levels fit the data as well as the one found.
-
-    So it is where the only frequency about a well is that of the antisymmetric mode, which does not depend on
-    the level; the symmetric one lies above it from b/r = 6.2 on.
-    """
-    if "buckling_level" not in names:
-        return False
-    least = float(np.sum(residual(logs) ** 2))
-    higher = (logs + np.array([math.log(by) * (name == "buckling_level") for name in names]) for by in HIGHER)
-    return all(float(np.sum(residual(one) ** 2)) < least + 4.0 for one in higher)
-
-
 def directions(jacobian: _Array) -> _Array:
     """Orthonormal combinations of parameters that the data respond to, one a column."""
     _, singular, rows = svd(jacobian, full_matrices=False)
-    told = singular > UNDETERMINED * singular[0]
-    return np.asarray(rows[told].T)
+    return np.asarray(rows[singular > UNDETERMINED * singular[0]].T)
 
 
 def shape_diagnostics(beam: Beam, measured: Measurements, modes: int) -> list[Diagnostic]:
@@ -218,20 +184,16 @@ def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, 
             )
         told.append(KINDS_CALIBRATION["undetermined"].found(told=words))
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    for i, name in enumerate(names):
-        if name in hidden:
-            continue
+    for i in (i for i, name in enumerate(names) if name not in hidden):
         if spread[i] > _VAGUE:
-            words = f"{name} is known to {spread[i]:.0%} only"
-            told.append(KINDS_CALIBRATION["vague"].found(told=words, share=spread[i]))
-        for j, other in enumerate(names[:i]):
-            linked = 0.0 if other in hidden else covariance[i, j] / (spread[i] * spread[j])
+            told.append(KINDS_CALIBRATION["vague"].found(told=names[i], share=spread[i]))
+        for j in (j for j, other in enumerate(names[:i]) if other not in hidden):
+            linked = covariance[i, j] / (spread[i] * spread[j])
             if abs(linked) > _LINKED:
-                sense = "rises" if linked > 0.0 else "falls"
                 words = (
-                    f"{other} and {name} can hardly be told apart (correlation {linked:+.3f}): where one "
-                    f"rises the other {sense}"
+                    f"{names[j]} and {names[i]} can hardly be told apart (correlation {linked:+.3f}): where one rises "
                 )
+                words += f"the other {'rises' if linked > 0.0 else 'falls'}"
                 told.append(KINDS_CALIBRATION["linked"].found(told=words, correlation=linked))
     return told
 
@@ -287,21 +249,16 @@ def doubts(result: Calibration, measured: Measurements) -> list[Diagnostic]:
     states = ("straight_frequencies", "lower_well_frequencies", "upper_well_frequencies")
     assumed = [name for name in states if getattr(measured, name) and getattr(measured, f"{name}_se") is None]
     if assumed:
-        words = (
-            f"no standard errors given for {_listed(tuple(assumed))}: {ASSUMED:.1%} assumed, on which the "
-            "uncertainties rest"
-        )
-        told.append(KINDS_CALIBRATION["assumed_errors"].found(told=words))
-    for item in result.residuals:
-        if abs(item.deviation) > 3.0:
-            numbers = {"model": item.model, "measured": item.measured, "apart": abs(item.deviation)}
-            told.append(KINDS_CALIBRATION["outlier"].found(None, item.name, **numbers))
-    if result.scatter > 1.1:
-        told.append(KINDS_CALIBRATION["scatter"].found(scatter=result.scatter))
-    ratios = measured.damping_ratio
-    if len(ratios) > 1 and max(ratios) > 1.3 * min(ratios):
-        told.append(KINDS_CALIBRATION["damping_differs"].found(low=min(ratios), high=max(ratios)))
-    return told
+        told.append(KINDS_CALIBRATION["assumed_errors"].found(told=f"{_listed(tuple(assumed))}: {ASSUMED:.1%}"))
+    for item in (one for one in result.residuals if abs(one.deviation) > 3.0):
+        numbers = {"model": item.model, "measured": item.measured, "apart": abs(item.deviation)}
+        told.append(KINDS_CALIBRATION["outlier"].found(None, item.name, **numbers))
+    low, high = (of(measured.damping_ratio, default=0.0) for of in (min, max))
+    return told + holding(
+        KINDS_CALIBRATION,
+        ("scatter", result.scatter > 1.1, {"scatter": result.scatter}),
+        ("damping_differs", high > 1.3 * low, {"low": low, "high": high}),
+    )
 
 
 @dataclass(frozen=True)
@@ -443,10 +400,8 @@ def calibrate(
     >>> list(found.values)
     ['buckling_level']
     """
-    if not isinstance(measured, Measurements):
-        raise InputTypeError(f"measured: must be Measurements, not {type(measured).__name__}")
-    if not isinstance(beam, Beam):
-        raise InputTypeError(f"beam: must be a Beam, not {type(beam).__name__}")
+    instance("measured", measured, Measurements, "Measurements")
+    instance("beam", beam, Beam, "a Beam")
     count = integer("modes", modes, 1, 256)
     data = _data(measured, count)
     names = _fitted(measured, fit)
@@ -464,29 +419,15 @@ def calibrate(
         raise InputError(
             "lower_well_shape, upper_well_shape: between unequal ends no mode is symmetric; give frequencies by order"
         )
-    fitted_to = _fit(beam, data, names, count)
-    diagnostics = list(fitted_to.diagnostics)
-    result = _changed(beam, names, fitted_to.logs)
-    fitted = _model(result, data, count)
-    pairs = zip(data, fitted, strict=True)
-    residuals = tuple(Residual(one.name, one.measured, one.standard_error, float(f)) for one, f in pairs)
-    values, standard, correlation = fitted_to.values(names)
-    uneven = None if imperfection is None else uneven_beam(result, measured, imperfection, count)
+    fitted = _fit(beam, data, names, count)
+    result, diagnostics = fitted["beam"], fitted.pop("diagnostics")
     damping, damping_se = _mean(measured.damping_ratio, measured.damping_ratio_se, 0.1)
     tests = [test.stiffness() for test in measured.contact]
     contact, contact_se = _mean(tuple(k for k, _ in tests), tuple(se for _, se in tests) or None, 0.1)
     names_by_gauge = ("thickness", "buckling_level")
     gauges = {name: value for name in names_by_gauge if (value := getattr(measured, name)) is not None}
     answer = Calibration(
-        beam=result,
         start=beam,
-        values=values,
-        standard_errors=standard,
-        correlation=correlation,
-        undetermined=fitted_to.undetermined,
-        residuals=residuals,
-        scatter=fitted_to.scatter,
-        degrees_of_freedom=fitted_to.freedom,
         modes=count,
         damping_ratio=damping,
         damping_ratio_se=damping_se,
@@ -498,11 +439,20 @@ def calibrate(
         either_well=either_well(result, measured, count),
         remarks=(),
         diagnostics=(),
+        **fitted,
     )
     diagnostics += shape_diagnostics(result, measured, count) if wells else []
     diagnostics += doubts(answer, measured)
     told = remarks(answer, measured)
-    if uneven is not None and imperfection is not None:
+    if imperfection is not None:
+        both = [_symmetric(measured, well)[:1] for well in ("lower", "upper")]
+        if not all(both):
+            raise InputError(
+                f"imperfection = {imperfection!r}: needs the first frequency about both wells; the "
+                f"{'upper' if both[0] else 'lower'} one's is not given"
+            )
+        # of the beam, the buckling level alone changes: two numbers from two frequencies
+        uneven = identify_imperfection(result, float(both[0][0]), float(both[1][0]), imperfection, count)
         assert uneven.beam is not None
         value, level = getattr(uneven.imperfection, imperfection), uneven.beam.buckling_level * 1e3
         told.append(
@@ -513,68 +463,69 @@ def calibrate(
     return dataclasses.replace(answer, remarks=tuple(told), diagnostics=tuple(diagnostics))
 
 
-class _Fitted(NamedTuple):
-    """Estimates of the fitted parameters from the measured frequencies."""
-
-    logs: _Array
-    covariance: _Array
-    undetermined: tuple[str, ...]
-    scatter: float
-    freedom: int
-    diagnostics: tuple[Diagnostic, ...]
-
-    def values(self, names: list[str]) -> tuple[dict[str, float], dict[str, float], _Array]:
-        """Values and standard errors by name, and the correlations."""
-        values = {name: math.exp(log) for name, log in zip(names, self.logs, strict=True)}
-        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        standard = {name: values[name] * float(s) for name, s in zip(names, spread, strict=True)}
-        standard = {name: error for name, error in standard.items() if name not in self.undetermined}
-        if names and (spread > 0.0).all():
-            return values, standard, self.covariance / np.outer(spread, spread)
-        return values, standard, np.eye(len(names))
-
-
-def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> _Fitted:
-    """Least squares in the logarithms of the parameters, along what the data respond to."""
+def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> dict[str, Any]:
+    """Least squares in the logarithms of the parameters, along what the data respond to: fields of the result."""
     begin = np.array([math.log(getattr(beam, name)) for name in names])
     target = np.array([item.measured for item in data])
     errors = np.array([item.standard_error for item in data])
 
-    if not names:
-        return _Fitted(begin, np.zeros((0, 0)), (), 1.0, len(data), ())
+    def changed(logs: _Array) -> Beam:
+        changes = {name: math.exp(log) for name, log in zip(names, logs, strict=True)}
+        return beam.replace(**changes) if changes else beam
 
     def frequencies(logs: _Array) -> _Array:
-        return _model(_changed(beam, names, logs), data, modes)
+        return _model(changed(logs), data, modes)
 
     def residual(logs: _Array) -> _Array:
         return (frequencies(logs) - target) / errors
 
-    keep = directions(sensitivity(frequencies, begin, errors))
-    freedom = len(data) - keep.shape[1]
-    logs = search(residual, begin, keep, names, freedom)
-    jacobian = sensitivity(frequencies, logs, errors)
-    # where the fit ends the data may respond to less than where it began
-    here = directions(jacobian)
-    if here.shape[1] < keep.shape[1]:
-        keep, freedom = here, len(data) - here.shape[1]
-    chi = float(np.sum(residual(logs) ** 2))
-    scatter = max(1.0, math.sqrt(chi / freedom)) if freedom > 0 else 1.0
-    inner = np.linalg.inv((jacobian @ keep).T @ (jacobian @ keep))
-    covariance = keep @ inner @ keep.T * scatter**2
-    undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
-    diagnostics = list(links(names, covariance, undetermined))
-    if "buckling_level" not in undetermined and open_upwards(residual, logs, names):
-        undetermined += ("buckling_level",)
-        least = math.exp(logs[names.index("buckling_level")])
-        words = (
-            f"any buckling_level above {least * 1e3:.4g} mm meets the measured frequencies as well: the first one "
-            "about a well may be that of the antisymmetric mode, which does not depend on the level; measure the "
-            "symmetric one"
-        )
-        diagnostics.append(KINDS_CALIBRATION["undetermined"].found(told=words, least=least))
-    if freedom <= 0:
-        diagnostics.append(KINDS_CALIBRATION["no_check"].found())
-    return _Fitted(logs, covariance, undetermined, scatter, freedom, tuple(diagnostics))
+    logs, covariance, scatter, freedom = begin, np.zeros((0, 0)), 1.0, len(data)
+    undetermined: tuple[str, ...] = ()
+    diagnostics: list[Diagnostic] = []
+    level = np.array([float(name == "buckling_level") for name in names])
+    if names:
+        keep = directions(sensitivity(frequencies, begin, errors))
+        logs = search(residual, begin, keep, level, len(data) - keep.shape[1])
+        jacobian = sensitivity(frequencies, logs, errors)
+        # where the fit ends the data may respond to less than where it began
+        keep = min(keep, directions(jacobian), key=lambda one: one.shape[1])
+        freedom = len(data) - keep.shape[1]
+        chi = float(np.sum(residual(logs) ** 2))
+        scatter = max(1.0, math.sqrt(chi / freedom)) if freedom > 0 else 1.0
+        inner = np.linalg.inv((jacobian @ keep).T @ (jacobian @ keep))
+        covariance = keep @ inner @ keep.T * scatter**2
+        undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
+        diagnostics += links(names, covariance, undetermined)
+        higher = [float(np.sum(residual(logs + math.log(by) * level) ** 2)) for by in HIGHER if level.any()]
+        # as where the only frequency about a well is that of the antisymmetric mode, whose level is open upwards
+        if higher and "buckling_level" not in undetermined and max(higher) < chi + 4.0:
+            undetermined += ("buckling_level",)
+            least = math.exp(logs[names.index("buckling_level")])
+            words = (
+                f"any buckling_level above {least * 1e3:.4g} mm meets the measured frequencies as well: the first one "
+                "about a well may be that of the antisymmetric mode, which does not depend on the level; measure the "
+                "symmetric one"
+            )
+            diagnostics.append(KINDS_CALIBRATION["undetermined"].found(told=words, least=least))
+        if freedom <= 0:
+            diagnostics.append(KINDS_CALIBRATION["no_check"].found())
+    values = {name: math.exp(log) for name, log in zip(names, logs, strict=True)}
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    known = names and (spread > 0.0).all()
+    pairs = zip(data, frequencies(logs).tolist(), strict=True)
+    return {
+        "beam": changed(logs),
+        "values": values,
+        "standard_errors": {
+            name: values[name] * float(s) for name, s in zip(names, spread, strict=True) if name not in undetermined
+        },
+        "correlation": covariance / np.outer(spread, spread) if known else np.eye(len(names)),
+        "undetermined": undetermined,
+        "residuals": tuple(Residual(one.name, one.measured, one.standard_error, model) for one, model in pairs),
+        "scatter": scatter,
+        "degrees_of_freedom": freedom,
+        "diagnostics": diagnostics,
+    }
 
 
 class _Datum(NamedTuple):
@@ -593,16 +544,12 @@ def _data(measured: Measurements, modes: int) -> list[_Datum]:
         errors = getattr(measured, f"{state}_frequencies_se") or [ASSUMED * value for value in values]
         if len(values) > modes:
             raise InputError(f"{state}_frequencies: {len(values)} frequencies for a model of {modes} modes")
-        shapes = getattr(measured, f"{state}_shape", ())
-        seen = {1: 0, -1: 0}
-        for i, (value, error) in enumerate(zip(values, errors, strict=True)):
-            if not shapes:
-                data.append(_Datum(f"{word}, mode {i + 1}", state, i, 0, value, error))
-                continue
-            parity = 1 if shapes[i] == "symmetric" else -1
-            name = f"{word}, {shapes[i]} mode {seen[parity] + 1}"
-            data.append(_Datum(name, state, seen[parity], parity, value, error))
-            seen[parity] += 1
+        shapes = getattr(measured, f"{state}_shape", ()) or [""] * len(values)
+        seen: Counter[str] = Counter()
+        for shape, value, error in zip(shapes, values, errors, strict=True):
+            name = f"{word}, {shape} mode" if shape else f"{word}, mode"
+            data.append(_Datum(f"{name} {seen[shape] + 1}", state, seen[shape], _PARITY[shape], value, error))
+            seen[shape] += 1
     return data
 
 
@@ -619,24 +566,17 @@ def _fitted(measured: Measurements, fit: tuple[str, ...] | None) -> list[str]:
     return list(fit)
 
 
-def _changed(beam: Beam, names: list[str], logs: _Array) -> Beam:
-    changes = {name: math.exp(log) for name, log in zip(names, logs, strict=True)}
-    return beam.replace(**changes) if changes else beam
-
-
 def _model(beam: Beam, data: list[_Datum], modes: int) -> _Array:
     models = {
         straight: ReducedModel.from_beam(beam.replace(axial_load=0.0) if straight else beam, modes)
         for straight in {item.state == "straight" for item in data}
     }
-    out = []
-    for item in data:
-        model = models[item.state == "straight"]
-        freq = model.natural_frequencies
-        if item.parity:
-            freq = freq[model.parity == item.parity]
-        out.append(freq[item.mode])
-    return np.array(out)
+
+    def frequency(model: ReducedModel, item: _Datum) -> float:
+        of_kind = model.parity == item.parity if item.parity else slice(None)
+        return float(model.natural_frequencies[of_kind][item.mode])
+
+    return np.array([frequency(models[item.state == "straight"], item) for item in data])
 
 
 def _first_frequency(beam: Beam, modes: int) -> float:
@@ -647,7 +587,7 @@ def _mean(
     values: tuple[float, ...] | Any, errors: tuple[float, ...] | Any, assumed: float
 ) -> tuple[float | None, float | None]:
     """Weighted mean and its standard error, raised by the scatter of the values where that is larger."""
-    if not values:
+    if not len(values):
         return None, None
     x = np.asarray(values, dtype=np.float64)
     s = np.asarray(errors, dtype=np.float64) if errors is not None else assumed * x
@@ -715,8 +655,7 @@ def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> Contac
     from snapbeam.util.datasets import xr
 
     mass = positive("effective_mass", effective_mass, "kg")
-    if not isinstance(impacts, xr.Dataset):
-        raise InputTypeError(f"impacts: must be an xarray.Dataset, not {type(impacts).__name__}")
+    instance("impacts", impacts, xr.Dataset, "an xarray.Dataset")
     needed = ("duration", "duration_stderr", "closing_speed", "frames")
     missing = [name for name in needed if name not in impacts]
     if missing:
@@ -733,19 +672,16 @@ def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> Contac
     scatter = max(1.0, float(np.sqrt((weight * rest**2).sum() / max(good.sum() - 2, 1))))
     exponent_se = scatter / math.sqrt(lever) if lever > 0.0 else math.inf
     # the constant of the law, with its power held
-    constant = float((weight * (log_t - _HERTZ_POWER * log_v)).sum() / weight.sum())
-    held = log_t - _HERTZ_POWER * log_v - constant
-    raised = max(1.0, float(np.sqrt((weight * held**2).sum() / max(good.sum() - 1, 1))))
-    constant_se = math.sqrt(1.0 / weight.sum()) * raised
+    constant, constant_se = _mean(log_t - _HERTZ_POWER * log_v, spread, 1.0)
+    assert constant is not None and constant_se is not None
     stiffness = 1.25 * mass * (HERTZ_TIME / math.exp(constant)) ** 2.5
-    told = []
-    span = float(np.exp(np.ptp(log_v)))
-    if abs(exponent - _HERTZ_POWER) > max(4.0 * exponent_se, 0.1):
-        told.append(KINDS_CALIBRATION["exponent"].found(exponent=exponent, error=exponent_se))
-    elif span < _LEAST_SPAN or good.sum() < 5:
-        told.append(KINDS_CALIBRATION["few"].found(count=int(good.sum()), span=span))
-    frames = float(np.median(impacts["frames"].values[good]))
-    if frames < _COARSE:
-        told.append(KINDS_CALIBRATION["coarse"].found(frames=frames))
+    span, frames = float(np.exp(np.ptp(log_v))), float(np.median(impacts["frames"].values[good]))
+    off = abs(exponent - _HERTZ_POWER) > max(4.0 * exponent_se, 0.1)
+    told = holding(
+        KINDS_CALIBRATION,
+        ("exponent", off, {"exponent": exponent, "error": exponent_se}),
+        ("few", not off and (span < _LEAST_SPAN or good.sum() < 5), {"count": int(good.sum()), "span": span}),
+        ("coarse", frames < _COARSE, {"frames": frames}),
+    )
     error = 2.5 * constant_se * stiffness
     return ContactStiffness(stiffness, error, exponent, exponent_se, int(good.sum()), tuple(told))

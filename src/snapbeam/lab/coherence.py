@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.lab.diagnostics import KINDS_RESPONSE
+from snapbeam.lab.diagnostics import KINDS_RESPONSE, holding
 from snapbeam.lab.signals import SignalSamples, check_signal, stretches
 from snapbeam.util.diagnostics import Diagnostic, to_json
 from snapbeam.util.singular_values import pinv
@@ -130,11 +130,7 @@ def frequency_response(
             "response_units": above,
         },
     )  # fmt: skip
-    mode = _peak_mode(found, ratio)
-    bias = np.zeros(frequency.size)
-    if mode is not None:
-        found.attrs |= mode.attributes
-        bias[mode.lines] = mode.bias
+    bias = _peak_bias(found, ratio)
     words = {"units": "1", "long_name": "relative bias of the magnitude by the window"}
     found["window_bias"] = "frequency", bias, words
     found["magnitude_se"] = found["magnitude_se"].copy(data=np.abs(ratio) * np.hypot(error, bias / (1.0 + bias)))
@@ -162,23 +158,19 @@ def windowed_pole(turn: NDArray[np.complex128]) -> NDArray[np.complex128]:
     )  # fmt: skip
 
 
-class _Mode(NamedTuple):
-    """The mode at a peak: its numbers with standard errors, and the relative bias at the lines of the fit."""
+def _peak_bias(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Array:
+    """Relative bias of each line by the mode at the highest coherent peak, fitted to the lines about it.
 
-    lines: slice
-    bias: _Array
-    attributes: dict[str, float]
-
-
-def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None:
-    """The mode at the highest coherent peak, fitted to the lines about it; None where they are too few."""
+    Its numbers become attributes of *found*.  Where the lines are too few the bias is 0.
+    """
     from scipy.optimize import least_squares
 
+    bias = np.zeros(ratio.size)
     coherent, _ = coherent_lines(found)
     size = np.where(coherent, np.abs(ratio), 0.0)
     top = int(np.argmax(size))
     if not size[top] > 0.0:
-        return None
+        return bias
     high, seen = (
         next(each for each in stretches(part) if each[0] <= top < each[1])
         for part in (size > 0.5 * size[top], coherent)
@@ -187,7 +179,7 @@ def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None
     lines = slice(max(top - reach, seen[0]), min(top + reach + 1, seen[1]))
     falls = seen[0] < high[0] and high[1] < seen[1]  # to half its height on either side
     if not falls or lines.stop - lines.start < _LEAST_LINES:
-        return None
+        return bias
     frequency, spacing = found["frequency"].values, float(found.attrs["resolution"])
     k = (frequency[lines] - frequency[top]) / spacing
     values = ratio[lines]
@@ -215,7 +207,7 @@ def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None
     freedom = 2 * k.size - p.size
     stray = max(2.0 * answer.cost / max(freedom, 1), 1.0) * _CORRELATED
     if not answer.success or not abs(p[1]) < 2.0 or not -5.0 < p[0] < math.log(math.pi * k.size):
-        return None
+        return bias
     covariance = pinv(answer.jac.T @ answer.jac) * stray
 
     def numbers(p: _Array) -> _Array:
@@ -225,7 +217,7 @@ def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None
         return np.array([middle, height, math.exp(p[0]) * spacing / (2.0 * math.pi * middle)])
 
     if not (np.isfinite(covariance).all() and np.diag(covariance).min() > 0.0):
-        return None
+        return bias
     value = numbers(p)
     steps = 1e-4 * np.sqrt(np.diag(covariance))
     slope = np.column_stack([(numbers(p + step) - numbers(p - step)) / 2e-4 for step in np.diag(steps)])
@@ -234,8 +226,9 @@ def _peak_mode(found: xr.Dataset, ratio: NDArray[np.complex128]) -> _Mode | None
     other = p[4] + 1j * p[5]
     through, true = ((p[2] + 1j * p[3]) * pole + other for pole in poles(p[0], p[1]))
     names = [f"peak_{name}{more}" for more in ("", "_se") for name in ("frequency", "magnitude", "damping_ratio")]
-    told = dict(zip(names, [*value.tolist(), *errors.tolist()], strict=True))
-    return _Mode(lines, np.abs(through) / np.abs(true) - 1.0, told)
+    found.attrs |= dict(zip(names, [*value.tolist(), *errors.tolist()], strict=True))
+    bias[lines] = np.abs(through) / np.abs(true) - 1.0
+    return bias
 
 
 def _common(x: SignalSamples, y: SignalSamples) -> tuple[SignalSamples, SignalSamples]:
@@ -283,8 +276,6 @@ def _diagnostics(found: xr.Dataset) -> list[Diagnostic]:
         if first == 0 or last == size.size or last - first >= _WIDE:
             return []
         return [KINDS_RESPONSE["no_mode"].found(frequency=float(found["frequency"].values[top]))]
-    if abs(bias) > _BIAS:
-        frequency, magnitude = (float(found.attrs[f"peak_{name}"]) for name in ("frequency", "magnitude"))
-        told = KINDS_RESPONSE["coarse"].found(bias_percent=100.0 * bias, frequency=frequency, magnitude=magnitude)
-        return [told]
-    return []
+    frequency, magnitude = (float(found.attrs[f"peak_{name}"]) for name in ("frequency", "magnitude"))
+    numbers = {"bias_percent": 100.0 * bias, "frequency": frequency, "magnitude": magnitude}
+    return holding(KINDS_RESPONSE, ("coarse", abs(bias) > _BIAS, numbers))

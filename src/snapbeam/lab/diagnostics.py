@@ -58,7 +58,7 @@ KINDS_CALIBRATION = table(
     info={
         "no_check": "as many parameters as measured values: nothing is left to check the model with",
         "unequal_wells": "{told}",
-        "assumed_errors": "{told}",
+        "assumed_errors": "no standard errors given for {told} assumed, on which the uncertainties rest",
         "damping_differs": "damping ratios from {low:.4g} to {high:.4g}: the model takes one for every mode",
     },
     warning={
@@ -71,7 +71,7 @@ KINDS_CALIBRATION = table(
         "symmetric, lower_well_shape (--lower-well 159a,165s)",
         "undetermined": "{told}",
         "linked": "{told}",
-        "vague": "{told}",
+        "vague": "{told} is known to {share:.0%} only",
         "outlier": "{told}: model {model:.4g} Hz, measured {measured:.4g} Hz, {apart:.1f} standard errors apart",
         "scatter": "the data scatter {scatter:.2f} times as much as their standard errors allow; the uncertainties "
         "are raised by it",

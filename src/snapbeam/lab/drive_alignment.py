@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.lab.diagnostics import KINDS_ALIGNMENT, KINDS_VIBROMETER
+from snapbeam.lab.diagnostics import KINDS_ALIGNMENT, KINDS_VIBROMETER, holding
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.lab.sine_fit import SineFit, fit_sine
 from snapbeam.lab.vibrometer import DriveMeasurement, displacement_from_velocity, measure_drive
@@ -115,12 +115,10 @@ def align(
     seen = measure_drive(camera, frequency)
     check_signal(vibrometer, ("m/s", "m"), "vibrometer")
     moved, felt = vibrometer, measure_drive(vibrometer, frequency)
+    one, two = seen.steady, felt.steady
     if vibrometer.attrs["units"] == "m/s":
         moved = displacement_from_velocity(vibrometer, felt)
-        felt_fit = fit_sine(_window(moved, felt.steady.start, felt.steady.stop), felt.steady.frequency)
-    else:
-        felt_fit = felt.steady
-    one, two = seen.steady, felt_fit
+        two = fit_sine(_window(moved, two.start, two.stop), two.frequency)
     difference = one.frequency / two.frequency - 1.0
     difference_se = math.hypot(one.frequency_se, two.frequency_se) / two.frequency
     if abs(difference) > max(1e-3, 6.0 * difference_se):
@@ -129,7 +127,7 @@ def align(
         )
     period = 1.0 / two.frequency
     signs = (1, -1) if polarity is None else (polarity,)
-    candidates = _candidates(camera, moved, seen, felt, felt_fit, signs)
+    candidates = _candidates(camera, moved, seen, felt, two, signs)
     if near is not None:
         goal = finite("near", near)
         half = 0.5 * period
@@ -147,36 +145,32 @@ def align(
     delay, delay_se = _refine(camera, moved, seen, felt, delay, sign)
     gain = one.amplitude / two.amplitude
     gain_se = gain * math.hypot(one.amplitude_se / one.amplitude, two.amplitude_se / two.amplitude)
-    told = []
-    if polarity is None and not turned:
-        told.append(KINDS_ALIGNMENT["polarity_open"].found())
-    elif sign < 0:
-        told.append(KINDS_ALIGNMENT["polarity"].found())
-    if not certain:
-        told.append(KINDS_ALIGNMENT["cycle_open"].found(period_ms=1e3 * period))
-    if abs(gain - 1.0) > max(5.0 * gain_se, _SAME):
-        told.append(KINDS_ALIGNMENT["amplitude"].found(gain=gain, error=gain_se))
-    if abs(difference) > 4.0 * difference_se:
-        told.append(KINDS_ALIGNMENT["clocks"].found(difference=difference))
+    told = holding(
+        KINDS_ALIGNMENT,
+        ("polarity_open", polarity is None and not turned, {}),
+        ("polarity", sign < 0 and (turned or polarity is not None), {}),
+        ("cycle_open", not certain, {"period_ms": 1e3 * period}),
+        ("amplitude", abs(gain - 1.0) > max(5.0 * gain_se, _SAME), {"gain": gain, "error": gain_se}),
+        ("clocks", abs(difference) > 4.0 * difference_se, {"difference": difference}),
+    )
     return Alignment(
-        delay=delay,
-        delay_se=delay_se,
-        polarity=sign,
-        gain=gain,
-        gain_se=gain_se,
-        clock_difference=difference,
-        clock_difference_se=difference_se,
-        certain=certain,
-        margin=margin,
-        period=period,
+        delay,
+        delay_se,
+        sign,
+        gain,
+        gain_se,
+        difference,
+        difference_se,
+        certain,
+        margin,
+        period,
         diagnostics=tuple(told),
     )
 
 
 def _window(signal: xr.DataArray, start: float, stop: float) -> SignalSamples:
     samples = check_signal(signal)
-    inside = (samples.time >= start) & (samples.time < stop)
-    return samples.part(inside)
+    return samples.part((samples.time >= start) & (samples.time < stop))
 
 
 def _candidates(
@@ -184,13 +178,13 @@ def _candidates(
     moved: xr.DataArray,
     seen: DriveMeasurement,
     felt: DriveMeasurement,
-    felt_fit: SineFit,
+    two: SineFit,
     signs: tuple[int, ...],
 ) -> list[tuple[float, int, float]]:
     """Delay, polarity and chi-square about the start, for each whole cycle that is possible."""
     from scipy.interpolate import CubicSpline
 
-    one, two = seen.steady, felt_fit
+    one = seen.steady
     period = 1.0 / two.frequency
     eye, ear = check_signal(camera), check_signal(moved)
     middle = 0.5 * (one.start + one.stop)

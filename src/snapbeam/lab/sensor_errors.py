@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
-from scipy.signal import butter, lfilter
+from scipy.signal import bilinear, butter, lfilter
 from scipy.signal.windows import tukey
 from scipy.special import logsumexp
 from scipy.stats import chi2, norm
@@ -50,7 +50,6 @@ _BELIEVED = 0.25  # of the chi-square of a start, for starts are of more kinds t
 _RARE = 0.02  # probability of a loss, up to which a standard error need not hold it
 _WHITE = 0.2  # probability of white noise
 _UNSEEN = 0.2  # of the standard error, up to which a filter that nothing shows is not thought of
-_BILINEAR = np.array([[1.0, -2.0, 1.0], [1.0, 0.0, -1.0], [1.0, 2.0, 1.0]])
 _CONSTANT = 4  # cycles on either side of a jump
 _FADES = (8.0, 30.0)  # rates of starts that are not over, over the length
 _TAIL = 4.0  # cycles after the start-up whose transient is no noise
@@ -368,11 +367,7 @@ class _Filter(NamedTuple):
 
     def passed(self, waves: _Array, rate: float) -> _Array:
         """All that it makes of columns sampled at a rate [Hz]."""
-        speed = rate / (math.pi * self.centre)
-        above, below = (
-            np.pad(side, (3 - len(side), 0)) * np.array([speed**2, speed, 1.0]) @ _BILINEAR
-            for side in (self.above, self.below)
-        )
+        above, below = bilinear(self.above, self.below, rate / (2.0 * math.pi * self.centre))
         return np.asarray(lfilter(above, below, waves, axis=0))
 
 

@@ -8,18 +8,16 @@ contradict each other are refused too.  Whatever a reading library trips over co
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told, agree, read_table, split_unit
+from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, agree, read_table, reading, split_unit
 from snapbeam.lab.signals import check_signal, make_signal, parse_sensitivity, si_unit
-from snapbeam.util.diagnostics import DiagnosticWarning, to_json
+from snapbeam.util.diagnostics import to_json
 from snapbeam.util.files import atomic_path, check_writable
-from snapbeam.util.packages import needs
 from snapbeam.util.validation import InputError, file_path, positive, shown
 
 if TYPE_CHECKING:
@@ -58,27 +56,11 @@ def read_channels(
     reader = READERS.get(source.suffix.lower())
     if reader is None:
         raise InputError(f"{source}: unknown kind of file; a signal is one of {', '.join(sorted(READERS))}")
-    if not source.is_file():
-        raise InputError(f"{source}: no such file")
-    if source.stat().st_size == 0:
-        raise InputError(f"{source}: the file is empty")
     rate = None if sampling_frequency is None else positive("sampling_frequency", sampling_frequency, "Hz")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            warnings.simplefilter("default", DiagnosticWarning)
-            channels = reader(source, Told(rate, columns))
-    except InputError as error:
-        raise InputError(error.args[0] if str(source) in str(error) else f"{source}: {error}") from error
-    except ImportError as error:
-        raise InputError(needs(f"{source}: reading {source.suffix} files", error.name, "lab")) from error
-    except MemoryError as error:
-        raise InputError(f"{source}: the header asks for more memory than there is") from error
-    except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise InputError(f"{source}: not a readable {source.suffix} file ({reason})") from error
-    if not channels:
-        raise InputError(f"{source}: holds no channel of numbers")
+    with reading(source):
+        channels = reader(source, rate, columns)
+        if not channels:
+            raise InputError("holds no channel of numbers")
     for channel in channels:
         told = channel.get("fs")
         if rate is not None and told is not None and abs(told / rate - 1.0) > 1e-5:
@@ -254,9 +236,9 @@ def write_signal(path: str | os.PathLike[str], signal: xr.DataArray, *, full_sca
     'velocity.wav'
     """
     target = check_writable(path, "path", tuple(WRITERS))
-    check_signal(signal)
+    samples = check_signal(signal)
     if (full_scale is not None) != (target.suffix.lower() == ".wav"):
         raise InputError("full_scale: must be stated for a WAV file, and for no other")
     with atomic_path(target) as temporary:
-        WRITERS[target.suffix.lower()](temporary, signal, full_scale)
+        WRITERS[target.suffix.lower()](temporary, signal, samples, full_scale)
     return target

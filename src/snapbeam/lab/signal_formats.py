@@ -9,7 +9,9 @@ import re
 import tempfile
 import warnings
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,12 +21,12 @@ from numpy.typing import NDArray
 
 from snapbeam.lab.diagnostics import KINDS_SIGNAL
 from snapbeam.lab.matlab_file import read_version_5
-from snapbeam.lab.signals import check_signal, even_sampling, si_unit, unit_factor
-from snapbeam.util.diagnostics import Diagnostic, tell
+from snapbeam.lab.signals import SignalSamples, even_sampling, si_unit, unit_factor
+from snapbeam.util.diagnostics import Diagnostic, DiagnosticWarning, tell
 from snapbeam.util.hdf5 import members_of, open_hdf5
 from snapbeam.util.input_files import decoded, refuse_inflated
 from snapbeam.util.netcdf import hdf5_stream
-from snapbeam.util.packages import needing
+from snapbeam.util.packages import needs
 from snapbeam.util.tables import universal_record, write_universal
 from snapbeam.util.validation import InputError, file_path, positive
 
@@ -97,13 +99,6 @@ SPECTRA = {
 }  # fmt: skip
 """Functions over frequency in a record of dataset 58, by their codes."""
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-
-
-class Told(NamedTuple):
-    """User-given properties of a file: sampling frequency [Hz], and columns of a table without a header."""
-
-    rate: float | None = None
-    columns: str | None = None
 
 
 def _key(name: str) -> str:
@@ -179,16 +174,16 @@ def with_time(channels: list[Channel]) -> list[Channel]:
 
 def numbered(channels: list[Channel]) -> list[Channel]:
     """Channels of which each has a name of its own."""
-    seen: dict[str, int] = {}
+    seen: Counter[str] = Counter()
     for channel in channels:
         name = channel["name"]
-        seen[name] = seen.get(name, 0) + 1
+        seen[name] += 1
         if seen[name] > 1:
             channel["name"] = f"{name} ({seen[name]})"
     return channels
 
 
-def read_numpy(path: Path, _told: Told) -> list[Channel]:
+def read_numpy(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of a NumPy file, ``.npy`` or ``.npz``."""
     refuse_inflated("path", path, _stated_size(path))
     with open(path, "rb") as file:  # opened here, since NumPy leaves damaged files open
@@ -221,10 +216,12 @@ def _stated_array(file: Any) -> int:
     return math.prod(shape) * max(dtype.itemsize, 8)
 
 
-def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+def write_npz(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal to a NumPy file with its times and its unit."""
-    (values, time, _), name = check_signal(signal), str(signal.name)
-    np.savez(path, **{name: values, "time": time, f"{name}_units": signal.attrs["units"], "time_units": "s"})
+    name = str(signal.name)
+    np.savez(
+        path, **{name: samples.values, "time": samples.time, f"{name}_units": signal.attrs["units"], "time_units": "s"}
+    )
 
 
 # Arrays with names: vectors, and matrices with a channel in each row or column.  Attributes, and arrays of one number or
@@ -254,20 +251,15 @@ def _unpacked(name: str, data: NDArray[Any], attributes: Mapping[str, Any]) -> N
                 f"{name}: attribute {key!r} = {_text(attributes[key])}: must be a finite number, a scale not 0"
             )
         packing[key] = value if filling and value.size > 1 else value.ravel()[0] if size == 1 else value
-    low, high = packing.pop("valid_range", (None, None))
+    low, high = packing.pop("valid_range", (-math.inf, math.inf))
     low, high = packing.pop("valid_min", low), packing.pop("valid_max", high)
     _refuse_scales(name, data, {key: value for key, value in attributes.items() if key not in packing})
-    if "_Unsigned" in attributes:
-        packing["_Unsigned"] = _text(attributes["_Unsigned"])
-    if not packing and low is None and high is None:
-        return data
-    variable = xr.Variable([f"axis{k}" for k in range(data.ndim)], data, packing)
-    values = xr.conventions.decode_cf_variable(name, variable, decode_times=False).values
-    outside = np.zeros(data.shape, dtype=bool)
-    if low is not None:
-        outside |= data < low
-    if high is not None:
-        outside |= data > high
+    outside, values = (data < low) | (data > high), data
+    if packing:
+        if "_Unsigned" in attributes:
+            packing["_Unsigned"] = _text(attributes["_Unsigned"])
+        variable = xr.Variable([f"axis{k}" for k in range(data.ndim)], data, packing)
+        values = xr.conventions.decode_cf_variable(name, variable, decode_times=False).values
     return np.where(outside, np.nan, values) if outside.any() else values
 
 
@@ -321,15 +313,15 @@ def _channels(stored: Mapping[str, _Stored], groups: Mapping[str, Mapping[str, A
         time = is_time(split_unit(last)[0])
         for _, values in () if time else around[1:]:
             _refuse_scales(name, data, values)
-        rates = _stated_rates(() if time else around)
         rows = np.atleast_2d(_unpacked(name, data, item.attributes))
         rows = rows if rows.shape[0] <= rows.shape[1] else rows.T
         for k, row in enumerate(rows):
             own = name if rows.shape[0] == 1 else f"{name} {k + 1}"
             unit = stated_unit(item.attributes) or _unit(texts, name)
             channel: Channel = {"data": row, "name": own, "unit_str": unit, "axis": item.axis}
-            if rates:
-                channel["fs"] = _one_rate(rates, own)
+            rate = _stated_rate(() if time else around, own)
+            if rate is not None:
+                channel["fs"] = rate
             channels.append(channel)
     return with_time(channels)
 
@@ -374,7 +366,7 @@ def _refuse_length_of_hdf5(path: Path) -> None:
     _refuse_length(path, (end, at + end))
 
 
-def read_hdf5(path: Path, _told: Told) -> list[Channel]:
+def read_hdf5(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of an HDF5 or NetCDF file; packed numbers by the CF conventions."""
     with open(path, "rb") as opened:
         start = opened.read(4)
@@ -440,13 +432,13 @@ def _axis_of(item: Any) -> str | None:
     return scales[0].name.lstrip("/") if len(scales) else None
 
 
-def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+def write_hdf5(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal to an HDF5 file."""
     import h5py
 
-    values, time, _ = check_signal(signal)
     with hdf5_stream(path) as stream, h5py.File(stream, "w") as file:
-        for name, numbers, unit in (("time", time, "s"), (str(signal.name), values, signal.attrs["units"])):
+        columns = {"time": (samples.time, "s"), str(signal.name): (samples.values, signal.attrs["units"])}
+        for name, (numbers, unit) in columns.items():
             file.create_dataset(name, data=numbers).attrs["units"] = unit
 
 
@@ -454,23 +446,6 @@ def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
 # semicolons, tabs, commas or blanks; with all but commas a comma may be the decimal sign, and points between
 # groups of three digits before it are left out.  Nothing is dropped: after the first row of numbers every line
 # must be one.
-
-
-@dataclass(frozen=True)
-class TextBlock:
-    """A text file taken apart.
-
-    ``header`` are the lines before the table and all comments; ``names`` and ``units`` the cells of the rows
-    that head the columns, None where there is no such row; ``rows`` the cells, on the ``lines`` of the file.
-    """
-
-    path: Path
-    header: tuple[str, ...]
-    names: tuple[str, ...] | None
-    units: tuple[str, ...] | None
-    rows: list[list[str]]
-    lines: list[int]
-    decimal_comma: bool
 
 
 def to_number(cell: str, decimal_comma: bool = False) -> float:
@@ -564,104 +539,24 @@ def _is_short(cells: list[list[str]]) -> bool:
     return len(digits) == 1 and len(column) >= _ABOVE and (last is None or len(last[1]) < digits.pop())
 
 
-def read_block(path: Path, columns: int = 0) -> TextBlock:
-    """Take a text file apart; *columns* is the number of columns, if the user gives it."""
-    text = decoded(path.read_bytes(), str(path))
-    numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
-    marked = [(i, line.strip().lstrip("#%/!").strip()) for i, line in numbered if line.startswith(_COMMENT)]
-    numbered = [(i, line) for i, line in numbered if not line.startswith(_COMMENT)]
-    lines = [line for _, line in numbered]
-    if not lines:
-        raise InputError(f"{path}: holds no header and no row")
-    dialects = _dialects(lines)
-    if not dialects:
-        if len(lines) == 1:
-            raise InputError(f"{path}: holds a header and no row")
-        stamp = _STAMP.search(lines[:_LOOK][-1][:_LONGEST_LINE])
-        if stamp:
-            raise InputError(
-                f"{path}: its times are dates or clock times, such as {stamp[0]!r}, which are not read: write them in "
-                "seconds, or leave them out and give sampling_frequency (--sampling-freq)"
-            )
-        raise InputError(
-            f"{path}: no row of numbers in its first {min(len(lines), _LOOK)} lines; its columns may not be separated "
-            "by semicolons, tabs, commas or blanks"
-        )
-    places = [0, *(i for i, _ in numbered)]
-    above = {
-        one.first: [text for i, text in marked if places[one.first] < i < places[one.first + 1]] for one in dialects
-    }
-    dialect, names, units, taken = _best(path, lines, dialects, columns, above)
-    first = _earlier(lines, dialect)
-    try:
-        cells = _cells(lines[first:], dialect.separator)
-    except csv.Error as error:
-        raise InputError(f"{path}: is no table ({error})") from error
-    if len(cells) != len(lines) - first:
-        raise InputError(f"{path}: a quoted value runs over the end of a line")
-    if not text.endswith("\n") and _is_short(cells):
-        last = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
-        tell([KINDS_SIGNAL["cut_in_number"].found(told=last)])
-    beyond = " ".join(cell for cell in cells[0][max(dialect.used) + 1 :] if cell)  # settings behind the first row
-    return TextBlock(
-        path=path,
-        header=(
-            beyond,
-            *(text for _, text in marked),
-            *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken),
-        ),
-        names=names,
-        units=units,
-        rows=[_kept(row, dialect, numbered[first + k][0], path, names, k == 0) for k, row in enumerate(cells)],
-        lines=[i for i, _ in numbered[first:]],
-        decimal_comma=dialect.decimal_comma,
-    )
-
-
-def _kept(
-    cells: list[str], dialect: _Dialect, line: int, path: Path, names: tuple[str, ...] | None, first: bool
-) -> list[str]:
-    """The cells of a row that belong to the table's columns."""
-    last = max(dialect.used)
-    whole = len(cells) > last
-    extra = dialect.separator is None and len(cells) != len(dialect.used)
-    stray = any(cells[last + 1 :]) and not first
-    if not whole or extra or stray:
-        count = len([cell for cell in cells if cell]) if stray or extra else len(cells)
-        told = "the header names" if names else "the first has"
-        raise InputError(f"{path}: line {line} has {count} value(s), {told} {len(dialect.used)} column(s)")
-    return dialect.row_of(cells)
-
-
-def _earlier(lines: list[str], dialect: _Dialect) -> int:
-    """The first row of numbers, beside cells of the header too, as oscilloscopes write them."""
-    if not dialect.used or dialect.used[0] == 0:
-        return dialect.first
-    first = dialect.first
-    cells = _cells(lines[: dialect.first], dialect.separator)
-    while first > 0 and _is_row(cells[first - 1], dialect.used, dialect.decimal_comma):
-        first -= 1
-    return first
-
-
 def _best(
     path: Path, lines: list[str], dialects: list[_Dialect], columns: int, above: Mapping[int, list[str]]
-) -> tuple[_Dialect, tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
-    """The dialect whose header fits its columns, its names and units, and the lines these stand on.
+) -> tuple[_Dialect, tuple[str, ...] | None, set[int]]:
+    """The dialect whose header fits its columns, the names of these, and the lines that they stand on.
 
     *above* are the comments before the first row of each; the last may name the columns.
     """
     seen = []
     for one in dialects:
-        names, units, taken = _heads(lines, one)
+        names, taken = _heads(lines, one)
         comments = above[one.first]
         if names is None and comments:
             following = lines[one.first : one.first + 3]
-            names, units, _ = _heads([*comments, *following], replace(one, first=len(comments)))
+            names, _ = _heads([*comments, *following], replace(one, first=len(comments)))
             parts = [split_unit(name) for name in names or ()]
             stated = any(is_time(word) or (unit and _like_unit(unit)) for word, unit in parts)
             names = names if stated and not re.search("[=:]", "".join(names or ())) else None
-        seen.append((one, names, units if names else None, taken))
+        seen.append((one, names, taken))
     if columns:
         seen = [entry for entry in seen if len(entry[0].used) == columns] or seen
     named = [entry for entry in seen if entry[1] is not None]
@@ -679,8 +574,8 @@ def _best(
     return best
 
 
-def _heads(lines: list[str], dialect: _Dialect) -> tuple[tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
-    """Names and units of the columns from the one or two lines before the table."""
+def _heads(lines: list[str], dialect: _Dialect) -> tuple[tuple[str, ...] | None, set[int]]:
+    """Names of the columns from the one or two lines before the table, units of the second in brackets."""
     above: list[tuple[int, list[str]]] = []
     count = len(dialect.used)
     for k in range(dialect.first - 1, max(dialect.first - 3, -1), -1):
@@ -693,12 +588,14 @@ def _heads(lines: list[str], dialect: _Dialect) -> tuple[tuple[str, ...] | None,
         if not text or (dialect.separator is None and len(cells) > count):
             break
         above.append((k, row))
-    if not above:
-        return None, None, set()
-    at, last = above[0]
-    if len(above) == 2 and all(_like_unit(cell) for cell in last):
-        return tuple(above[1][1]), tuple(last), {at, above[1][0]}
-    return tuple(last), None, {at}
+    if len(above) < 2 or not all(_like_unit(cell) for cell in above[0][1]):
+        return (tuple(above[0][1]), {above[0][0]}) if above else (None, set())
+    joined = []
+    for name, unit in zip(above[1][1], above[0][1], strict=True):
+        word = unit.strip("[]() ")
+        known = not name or split_unit(name)[1] is not None or word in ("", "-")
+        joined.append(name if known else f"{name} [{word}]")
+    return tuple(joined), {at for at, _ in above}
 
 
 def _cells_of_names(line: str, dialect: _Dialect) -> list[str]:
@@ -737,7 +634,7 @@ def _like_unit(cell: str) -> bool:
     return True
 
 
-def read_lvm(path: Path, _told: Told) -> list[Channel]:
+def read_lvm(path: Path, *_told: Any) -> list[Channel]:
     """Channels of the first segment of an .lvm file.
 
     A file whose number of samples is not that of its header is read with a diagnostic.  Channels that the header
@@ -822,7 +719,7 @@ def _header(lines: list[str], at: int, separator: str | None) -> tuple[dict[str,
     raise InputError("the header has no end (***End_of_Header***)")
 
 
-def read_matlab(path: Path, _told: Told) -> list[Channel]:
+def read_matlab(path: Path, *_told: Any) -> list[Channel]:
     """Channels of a .mat file: vectors, columns of matrices, and those in structures.
 
     A scalar named like ``fs`` is the sampling rate, a vector named like ``time`` the time axis, a text
@@ -870,27 +767,23 @@ def header_values(lines: Iterable[str]) -> dict[str, str]:
     return values
 
 
-def _stated_rates(
-    levels: Iterable[tuple[str, Mapping[str, Any]]], decimal_comma: bool = False, known: float | None = None
-) -> dict[str, float]:
-    """Sampling rates [Hz] that the named values of some places state, by their places and names.
+def _stated_rate(
+    levels: Iterable[tuple[str, Mapping[str, Any]]], where: str, decimal_comma: bool = False, known: float | None = None
+) -> float | None:
+    """The sampling rate [Hz] that the named values of some places state; None if none does.
 
     *known* [Hz] is the rate by other evidence, which decides between two readings of a number.
     """
-    return {
+    found = {
         f"{place}/{key}".lstrip("/"): rate
         for place, values in levels
         for key, value in values.items()
         if (rate := _rate_of(key, value, decimal_comma, known)) is not None
     }
-
-
-def _one_rate(found: Mapping[str, float], where: str) -> float:
-    """The one of several stated sampling rates [Hz]."""
-    if max(found.values()) > 1.001 * min(found.values()):
+    if found and max(found.values()) > 1.001 * min(found.values()):
         told = ", ".join(f"{key} {value:.9g} Hz" for key, value in found.items())
         raise InputError(f"{where} contradicts itself about the sampling rate ({told}): remove the wrong one")
-    return next(iter(found.values()))
+    return next(iter(found.values()), None)
 
 
 def _rate_of(name: str, value: Any, decimal_comma: bool = False, known: float | None = None) -> float | None:
@@ -935,83 +828,128 @@ def _quantity(text: str, decimal_comma: bool = False) -> tuple[tuple[float, ...]
 
 
 class Table(NamedTuple):
-    """A text table: its ``columns`` of cells by name, and the ``block`` of the file that they are of."""
+    """A text table: ``columns`` of cells by name, on the ``lines`` of the file; ``header`` are all others, and comments."""
 
-    block: TextBlock
+    path: Path
     columns: dict[str, tuple[str, ...]]
+    lines: list[int]
+    header: list[str]
+    decimal_comma: bool
 
     def numbers(self, name: str) -> NDArray[np.float64]:
         """Return a column as floats; refuse a cell that is no finite number, naming its line."""
-        cells, block = self.columns[name], self.block
+        cells = self.columns[name]
         try:
-            if block.decimal_comma:
+            if self.decimal_comma:
                 raise ValueError
             numbers = np.array(cells, dtype=np.float64)
         except ValueError:
-            numbers = np.array([to_number(cell, block.decimal_comma) for cell in cells])
+            numbers = np.array([to_number(cell, self.decimal_comma) for cell in cells])
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
-            where = f"{block.path}: line {block.lines[bad[0]]}, column {name!r}"
+            where = f"{self.path}: line {self.lines[bad[0]]}, column {name!r}"
             raise InputError(f"{where}: {cells[bad[0]]!r} is not a finite number")
         return numbers
 
 
 def read_table(path: Path, columns: str | None = None) -> Table:
     """Read a text table; *columns* are names and units, separated by commas, instead of those in the file."""
-    given = [name.strip() for name in columns.split(",")] if columns else []
-    block = read_block(path, len(given))
-    width = len(block.rows[0])
-    names = tuple(given) or _names(block)
-    if names is None:
+    given = tuple(name.strip() for name in columns.split(",")) if columns else ()
+    text = decoded(path.read_bytes(), str(path))
+    numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
+    marked = [(i, line.strip().lstrip("#%/!").strip()) for i, line in numbered if line.startswith(_COMMENT)]
+    numbered = [(i, line) for i, line in numbered if not line.startswith(_COMMENT)]
+    lines = [line for _, line in numbered]
+    if not lines:
+        raise InputError(f"{path}: holds no header and no row")
+    dialects = _dialects(lines)
+    if not dialects:
+        if len(lines) == 1:
+            raise InputError(f"{path}: holds a header and no row")
+        stamp = _STAMP.search(lines[:_LOOK][-1][:_LONGEST_LINE])
+        if stamp:
+            raise InputError(
+                f"{path}: its times are dates or clock times, such as {stamp[0]!r}, which are not read: write them in "
+                "seconds, or leave them out and give sampling_frequency (--sampling-freq)"
+            )
         raise InputError(
-            f"{path}: its first row, line {block.lines[0]}, has no header above it that names its {width} column(s); "
-            "give columns (--columns), such as 'time [s],velocity [mm/s]'"
+            f"{path}: no row of numbers in its first {min(len(lines), _LOOK)} lines; its columns may not be separated "
+            "by semicolons, tabs, commas or blanks"
         )
-    if len(names) != width:
-        raise InputError(f"{path}: columns (--columns) = {columns!r} names {len(names)}, the rows have {width}")
-    columns_of = list(zip(*block.rows, strict=True))
+    places = [0, *(i for i, _ in numbered)]
+    above = {
+        one.first: [note for i, note in marked if places[one.first] < i < places[one.first + 1]] for one in dialects
+    }
+    dialect, names, taken = _best(path, lines, dialects, len(given), above)
+    used, comma, first = dialect.used, dialect.decimal_comma, dialect.first
+    if used[0] > 0:  # rows beside cells of the header too, as oscilloscopes write them
+        cells = _cells(lines[:first], dialect.separator)
+        while first > 0 and _is_row(cells[first - 1], used, comma):
+            first -= 1
+    try:
+        cells = _cells(lines[first:], dialect.separator)
+    except csv.Error as error:
+        raise InputError(f"{path}: is no table ({error})") from error
+    if len(cells) != len(lines) - first:
+        raise InputError(f"{path}: a quoted value runs over the end of a line")
+    if not text.endswith("\n") and _is_short(cells):
+        last = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}"
+        tell([KINDS_SIGNAL["cut_in_number"].found(told=last)])
+    beyond = " ".join(cell for cell in cells[0][used[-1] + 1 :] if cell)  # settings behind the first row
+    heads = [line for k, line in enumerate(lines[: dialect.first]) if k not in taken]
+    header = [beyond, *(note for _, note in marked), *heads]
+    for k, row in enumerate(cells):
+        stray = (k > 0 and any(row[used[-1] + 1 :])) or (dialect.separator is None and len(row) != len(used))
+        if stray or len(row) <= used[-1]:
+            count, told = (
+                len([cell for cell in row if cell or not stray]),
+                "the header names" if names else "the first has",
+            )
+            raise InputError(
+                f"{path}: line {numbered[first + k][0]} has {count} value(s), {told} {len(used)} column(s)"
+            )
+    if not given and names is None:
+        values = header_values(header)
+        across, up = header_unit(values, "horizontalunits"), header_unit(values, "verticalunits")
+        if len(used) != 2 or not across or not up:
+            raise InputError(
+                f"{path}: its first row, line {numbered[first][0]}, has no header above it that names its {len(used)} "
+                "column(s); give columns (--columns), such as 'time [s],velocity [mm/s]'"
+            )
+        names = f"time [{across}]", f"{values.get('source', 'channel 1')} [{up}]"  # an oscilloscope's table
+    names = given or names or ()
+    if len(names) != len(used):
+        raise InputError(f"{path}: columns (--columns) = {columns!r} names {len(names)}, the rows have {len(used)}")
+    columns_of = list(zip(*(dialect.row_of(row) for row in cells), strict=True))
     if not names[0] and len(names) > 1 and (np.diff([to_number(cell) for cell in columns_of[0]]) == 1.0).all():
         names, columns_of = names[1:], columns_of[1:]  # the index of a data frame
     if "" in names or len(set(names)) < len(names):
         raise InputError(f"{path}: columns {list(names)}: each must have a name of its own")
-    return Table(block, dict(zip(names, columns_of, strict=True)))
+    return Table(path, dict(zip(names, columns_of, strict=True)), [i for i, _ in numbered[first:]], header, comma)
 
 
-def _names(block: TextBlock) -> tuple[str, ...] | None:
-    """Names of the columns with their units in brackets; None if there are none."""
-    if block.names is None:
-        values = header_values(block.header)
-        across, up = header_unit(values, "horizontalunits"), header_unit(values, "verticalunits")
-        if len(block.rows[0]) == 2 and across and up:  # an oscilloscope's table
-            return f"time [{across}]", f"{values.get('source', 'channel 1')} [{up}]"
-        return None
-    if block.units is None:
-        return block.names
-    joined = []
-    for name, unit in zip(block.names, block.units, strict=True):
-        word = unit.strip().strip("[]()").strip()
-        known = not name or split_unit(name)[1] is not None or word in ("", "-")
-        joined.append(name if known else f"{name} [{word}]")
-    return tuple(joined)
-
-
-def read_csv(path: Path, told: Told) -> list[Channel]:
+def read_csv(path: Path, rate: float | None, names: str | None) -> list[Channel]:
     """Return the channels of a text table; see :func:`snapbeam.lab.signal_files.read_channels`."""
-    table = read_table(path, told.columns)
+    table = read_table(path, names)
     columns = {name: split_unit(name) for name in table.columns}
-    times = [name for name, (word, unit) in columns.items() if _is_time(word, unit)]
+    times = [
+        name
+        for name, (word, unit) in columns.items()
+        if is_time(word)
+        and (_key(word) not in ("xaxis", "xvalue") or si_unit(f"column {word!r}", unit or "s")[1] == "s")
+    ]
     if not times:  # a row of units only, as "[ s ]"
         times = [name for name, (_, unit) in columns.items() if unit and unit_factor(name, unit, "s")]
     if len(times) > 1:
         raise InputError(f"{path}: columns {times}: only one may be the time")
-    values = header_values(table.block.header)
+    values = header_values(table.header)
     first, (word, unit) = next(iter(columns.items()))
     if not times and (unit == "Hz" or word.lower().startswith("freq")):
         raise InputError(
             f"{path}: its first column, {first!r}, is a frequency, so that this is a spectrum; export the time signal"
         )
     common: dict[str, Any] = {}
-    known = told.rate
+    known = rate
     if times:
         word, unit = columns[times[0]]
         duration = _DURATION.fullmatch(table.columns[times[0]][0])
@@ -1020,9 +958,8 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
         common["time"] = table.numbers(times[0]) * seconds_in(f"{path}: column {word!r}", unit)
         if known is None and common["time"].size > 2:
             known = 1.0 / float(np.median(np.diff(common["time"])) or math.inf)
-    commas = table.block.decimal_comma and any("," in cell for row in table.block.rows[:_ABOVE] for cell in row)
-    stated = _stated_rates([("", values)], commas, known)
-    rate = _one_rate(stated, f"{path}: the header") if stated else None
+    commas = table.decimal_comma and any("," in cell for cells in table.columns.values() for cell in cells[:_ABOVE])
+    rate = _stated_rate([("", values)], f"{path}: the header", commas, known)
     if times:
         if rate is not None:
             way_out = "correct the header, or name the times otherwise in columns (--columns), such as "
@@ -1037,13 +974,6 @@ def read_csv(path: Path, told: Told) -> list[Channel]:
     ]
 
 
-def _is_time(word: str, unit: str | None) -> bool:
-    """Return whether a column is the time: by its name, unless an axis name has another unit."""
-    if not is_time(word) or unit is None or _key(word) not in ("xaxis", "xvalue"):
-        return is_time(word)
-    return si_unit(f"column {word!r}", unit)[1] == "s"
-
-
 def agree(name: str, time: NDArray[np.float64], rate: float, way_out: str) -> None:
     """Refuse times that contradict a stated sampling rate [Hz], or are not even."""
     if time.size < 3:
@@ -1053,13 +983,12 @@ def agree(name: str, time: NDArray[np.float64], rate: float, way_out: str) -> No
         raise InputError(f"{name}: the times are sampled at {found:.9g} Hz, the header says {rate:.9g} Hz; {way_out}")
 
 
-def write_csv(path: Path, signal: xr.DataArray, _full_scale: float | None = None) -> None:
+def write_csv(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal as a table of time and value, 12 digits each."""
-    values, time, rate = check_signal(signal)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"# sampling_frequency: {rate:.12g} Hz\n")
+        file.write(f"# sampling_frequency: {samples.sampling_frequency:.12g} Hz\n")
         file.write(f"time [s],{signal.name} [{signal.attrs['units']}]\n")
-        np.savetxt(file, np.column_stack((time, values)), fmt="%.12g", delimiter=",")
+        np.savetxt(file, np.column_stack((samples.time, samples.values)), fmt="%.12g", delimiter=",")
 
 
 def split_unit(column: str) -> tuple[str, str | None]:
@@ -1080,7 +1009,7 @@ def split_unit(column: str) -> tuple[str, str | None]:
     return column, None
 
 
-def read_tdms(path: Path, _told: Told) -> list[Channel]:
+def read_tdms(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of a TDMS file."""
     from nptdms import TdmsFile
 
@@ -1101,26 +1030,26 @@ def read_tdms(path: Path, _told: Told) -> list[Channel]:
             unit = next((str(entry.properties[k]) for k in UNIT_NAMES if entry.properties.get(k)), None)
             channel: Channel = {"data": data, "name": f"{group.name}/{entry.name}", "unit_str": unit}
             levels = (("", entry), (group.name, group), ("file", file))
-            rates = _stated_rates((place, level.properties) for place, level in levels)
-            if rates:
-                channel["fs"] = _one_rate(rates, channel["name"])
+            rate = _stated_rate(((place, level.properties) for place, level in levels), channel["name"])
+            if rate is not None:
+                channel["fs"] = rate
                 channel["time_offset"] = float(entry.properties.get("wf_start_offset", 0.0))
             channels.append(channel)
     return with_time(channels)
 
 
-def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+def write_tdms(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal to a TDMS file."""
     from nptdms import ChannelObject, TdmsWriter
 
-    values, time, rate = check_signal(signal)
+    values, time, rate = samples
     properties = {"wf_increment": 1.0 / rate, "wf_start_offset": float(time[0]), "wf_samples": values.size}
     properties["unit_string"] = signal.attrs["units"]
     with TdmsWriter(str(path)) as writer:
         writer.write_segment([ChannelObject("snapbeam", str(signal.name), values, properties=properties)])
 
 
-def read_uff(path: Path, _told: Told) -> list[Channel]:
+def read_uff(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of a universal file (dataset 58)."""
     channels: list[Channel] = []
     for name, entry in _records_58(path, (0, 1)):
@@ -1181,6 +1110,29 @@ def _records_58(path: Path, functions: tuple[int, ...]) -> Iterator[tuple[str, d
         yield name, entry
 
 
+@contextmanager
+def reading(source: Path) -> Iterator[None]:
+    """Turn whatever a reading library trips over into a refusal that names the file; refuse one that is missing or empty."""
+    if not source.is_file():
+        raise InputError(f"{source}: no such file")
+    if source.stat().st_size == 0:
+        raise InputError(f"{source}: the file is empty")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("default", DiagnosticWarning)
+            yield
+    except InputError as error:
+        raise InputError(error.args[0] if str(source) in str(error) else f"{source}: {error}") from error
+    except ImportError as error:
+        raise InputError(needs(f"{source}: reading {source.suffix} files", error.name, "lab")) from error
+    except MemoryError as error:
+        raise InputError(f"{source}: the header asks for more memory than there is") from error
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError(f"{source}: not a readable {source.suffix} file ({reason})") from error
+
+
 def read_spectra(path: str | os.PathLike[str]) -> list[xr.DataArray]:
     """Read the frequency responses and spectra of a universal file (dataset 58).
 
@@ -1215,12 +1167,8 @@ def read_spectra(path: str | os.PathLike[str]) -> list[xr.DataArray]:
     from snapbeam.util.datasets import xr
 
     file = file_path("path", path)
-    if not file.is_file():
-        raise InputError(f"{file}: no such file")
     found = []
-    with needing(f"{file}: reading it", "lab"):
-        import pyuff  # noqa: F401
-    try:
+    with reading(file):
         for name, entry in _records_58(file, tuple(SPECTRA)):
             over = _first(entry.get("abscissa_axis_units_lab"), "Hz")
             factor, base = si_unit(f"abscissa of {name}", over)
@@ -1235,12 +1183,8 @@ def read_spectra(path: str | os.PathLike[str]) -> list[xr.DataArray]:
             words = SPECTRA[entry["func_type"]]
             attrs = {"units": unit, "long_name": words, "function": words, "source": file.name}
             found.append(xr.DataArray(entry["data"], {"frequency": axis}, ("frequency",), name, attrs))
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from error
-    except Exception as error:  # a damaged file makes pyuff raise many kinds
-        raise InputError(f"{file}: cannot be read as a universal file ({error})") from error
-    if not found:
-        raise InputError(f"{file}: has no spectrum in a dataset 58")
+        if not found:
+            raise InputError("has no spectrum in a dataset 58")
     return found
 
 
@@ -1280,10 +1224,9 @@ def _undo_rounding(step: float) -> float:
     return float(whole) if same else 1.0 / step
 
 
-def write_uff(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+def write_uff(path: Path, signal: xr.DataArray, samples: SignalSamples, _full_scale: float | None) -> None:
     """Write a signal to a universal file (dataset 58)."""
-    values, time, _ = check_signal(signal)
-    write_universal(path, [universal_record(str(signal.name), signal.attrs["units"], time, values)])
+    write_universal(path, [universal_record(str(signal.name), signal.attrs["units"], samples.time, samples.values)])
 
 
 def _first(text: Any, otherwise: str) -> str:
@@ -1291,7 +1234,7 @@ def _first(text: Any, otherwise: str) -> str:
     return otherwise if word.upper() in ("", "NONE") else word
 
 
-def read_wav(path: Path, _told: Told) -> list[Channel]:
+def read_wav(path: Path, *_told: Any) -> list[Channel]:
     """Return the channels of a sound file."""
     from scipy.io import wavfile
 
@@ -1326,11 +1269,11 @@ def _bytes_of_a_frame(path: Path) -> int:
     return int.from_bytes(head[at : at + 2], "big" if head.startswith(b"RIFX") else "little")
 
 
-def write_wav(path: Path, signal: xr.DataArray, full_scale: float | None) -> None:
+def write_wav(path: Path, signal: xr.DataArray, samples: SignalSamples, full_scale: float | None) -> None:
     """Write a signal to a sound file."""
     from scipy.io import wavfile
 
-    values, _, rate = check_signal(signal)
+    values, _, rate = samples
     scale = positive("full_scale", full_scale, signal.attrs["units"])
     if abs(rate - round(rate)) > 1e-6 * rate:
         raise InputError(f"sampling rate of {rate:.9g} Hz: a WAV file holds whole numbers of hertz only")
@@ -1339,12 +1282,12 @@ def write_wav(path: Path, signal: xr.DataArray, full_scale: float | None) -> Non
     wavfile.write(path, round(rate), np.round(values / scale * 2.0**31).astype(np.int32))
 
 
-READERS: dict[str, Callable[[Path, Told], list[Channel]]] = {
+READERS: dict[str, Callable[[Path, float | None, str | None], list[Channel]]] = {
     **dict.fromkeys((".csv", ".txt", ".asc", ".dat", ".tsv"), read_csv), ".lvm": read_lvm, ".wav": read_wav,
     ".uff": read_uff, ".unv": read_uff, ".tdms": read_tdms, ".mat": read_matlab,
     **dict.fromkeys((".h5", ".hdf5", ".nc"), read_hdf5), ".npz": read_numpy, ".npy": read_numpy,
 }  # fmt: skip
-WRITERS: dict[str, Callable[[Path, Any, float | None], None]] = {
+WRITERS: dict[str, Callable[[Path, Any, SignalSamples, float | None], None]] = {
     ".csv": write_csv,
     ".wav": write_wav,
     ".uff": write_uff,

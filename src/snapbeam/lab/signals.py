@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.util.validation import InputError, InputTypeError, finite, finite_array, positive, require_texts, shown
+from snapbeam.util.validation import InputError, finite, finite_array, instance, positive, require_texts, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,22 +21,18 @@ if TYPE_CHECKING:
 
 _PREFIX = {"": 1.0, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9}
 _WITH_PREFIX = ("m", "m/s", "m/s^2", "N", "V", "s", "Hz", "Pa")
+_ODD = ("cs", "ks", "cV", "cHz", "cPa", "cN")
 _GRAVITY = 9.80665  # m/s^2, standard acceleration of free fall
 _INCH = 0.0254  # m
 _TO_SI: dict[str, tuple[float, str]] = {
-    **{f"{p}{unit}": (s, unit) for unit in _WITH_PREFIX for p, s in _PREFIX.items()},
-    "g": (_GRAVITY, "m/s^2"),
-    "g_n": (_GRAVITY, "m/s^2"),
-    "in": (_INCH, "m"),
-    "in/s": (_INCH, "m/s"),
+    **{f"{p}{u}": (s, u) for u in _WITH_PREFIX for p, s in _PREFIX.items() if f"{p}{u}" not in _ODD},
+    **dict.fromkeys(("g", "g_n"), (_GRAVITY, "m/s^2")),
+    **{f"in{per}": (_INCH, f"m{per}") for per in ("", "/s", "/s^2")},
     "ips": (_INCH, "m/s"),
-    "in/s^2": (_INCH, "m/s^2"),
     "FS": (1.0, "FS"),
     "1": (1.0, "1"),
     "b": (1.0, "b"),
 }
-for _odd in ("cs", "ks", "cV", "cHz", "cPa", "cN"):
-    _TO_SI.pop(_odd)
 _WORDS = {
     "second": "s", "seconds": "s", "millisecond": "ms", "milliseconds": "ms", "microsecond": "us",
     "microseconds": "us", "nanosecond": "ns", "nanoseconds": "ns", "volt": "V", "volts": "V",
@@ -59,20 +55,16 @@ _LARGEST = 1e30  # of a value in SI units and of a sampling rate: powers and der
 def si_unit(name: str, unit: str) -> tuple[float, str]:
     """Return the factor and the SI unit for *unit*, such as ``(1e-3, "m/s")`` for ``"mm/s"``; *name* is the signal's.
 
-    Known are m, m/s, m/s^2, N, V, s, Hz and Pa with the prefixes k, c, m, u (or µ), n; g, the standard
-    acceleration of free fall; in, in/s, in/s^2; and FS, the fraction of full scale of a sound file.
+    Known are ``KNOWN_UNITS``, with u or µ for micro; g is the standard acceleration of free fall.
     """
-    if not isinstance(unit, str):
-        where = f"unit of {name}" if isinstance(name, str) else "unit"
-        raise InputTypeError(f"{where} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}")
+    where = f"unit of {name if isinstance(name, str) else 'a signal'}"
+    instance(where, unit, str, "text such as 'mm/s'")
     word = unit.strip().replace("\u03bc", "u").replace("\u00b5", "u").replace(" ", "").replace("*", "")
     word = _WORDS.get(word.lower(), word)
     word = word.replace("sec", "s").replace("²", "^2").replace("/s/s", "/s^2").replace("/s2", "/s^2")
     word = re.sub(r"s\^?-1$", "/s", re.sub(r"s\^?-2$", "/s^2", word)).replace("//", "/")
     if word not in _TO_SI:
-        raise InputError(
-            f"unit of {name if isinstance(name, str) else 'a signal'} = {shown(unit)}: must be {KNOWN_UNITS}"
-        )
+        raise InputError(f"{where} = {shown(unit)}: must be {KNOWN_UNITS}")
     return _TO_SI[word]
 
 
@@ -236,8 +228,7 @@ def check_signal(signal: xr.DataArray, units: str | tuple[str, ...] = (), name: 
     """Return the samples of *signal* if it is one: evenly sampled, finite, long enough and in one of *units*."""
     from snapbeam.util.datasets import xr
 
-    if not isinstance(signal, xr.DataArray):
-        raise InputTypeError(f"{name}: must be an xarray.DataArray (see make_signal), not {type(signal).__name__}")
+    instance(name, signal, xr.DataArray, "an xarray.DataArray (see make_signal)")
     label = f"{name} {str(signal.name)!r}" if signal.name not in (None, name) else name
     if signal.dims != ("time",) or "time" not in signal.coords:
         raise InputError(f"{label} with dimensions {signal.dims}: must have the one dimension time with its times")

@@ -217,11 +217,18 @@ def fit_sine(
     middle = float(time[0] + (n - 1) / (2 * rate))
     t = time - middle
     where, target = t[used], y[used]
-    omega = 2.0 * math.pi * guess
-    for _ in range(0 if fixed else 30):
-        design = sines(where, omega / (2.0 * math.pi) * np.arange(1, count + 1))
+    omega, multiple = 2.0 * math.pi * guess, np.arange(1, count + 1)
+
+    def fitted(omega: float) -> tuple[_Array, _Array, _Array]:
+        """Design, solution, and derivative of the fitted signal with respect to omega."""
+        design = sines(where, omega / (2.0 * math.pi) * multiple)
         solution = solve(design, target)
-        slope = _slope(where, design, solution)
+        turned = np.zeros_like(solution)
+        turned[1::2], turned[2::2] = multiple * solution[2::2], -multiple * solution[1::2]
+        return design, solution, where * (design @ turned)
+
+    for _ in range(0 if fixed else 30):
+        design, solution, slope = fitted(omega)
         step = solve(np.column_stack((design, slope)), target - design @ solution)[-1]
         limit = math.pi / span
         omega += float(np.clip(step, -limit, limit))
@@ -229,9 +236,7 @@ def fit_sine(
             raise InputError(f"signal: no steady sine near {guess:g} Hz; its frequency or amplitude may change")
         if abs(step) < 1e-11 * omega:
             break
-    design = sines(where, omega / (2.0 * math.pi) * np.arange(1, count + 1))
-    solution = solve(design, target)
-    slope = _slope(where, design, solution)
+    design, solution, slope = fitted(omega)
     residual = np.zeros(n)
     residual[used] = (target - design @ solution) * math.sqrt(n / target.size)
     full = design if fixed else np.column_stack((design, slope * (2.0 * math.pi)))
@@ -250,7 +255,6 @@ def fit_sine(
     p[1:3] = sine[0] / amplitudes[0] ** 2, -cosine[0] / amplitudes[0] ** 2
     if not fixed:
         p[-1] = -2.0 * math.pi * middle
-    multiple = np.arange(1, count + 1)
     phases = np.arctan2(-sine, cosine) - multiple * omega * middle
     return SineFit(
         amplitude=float(amplitudes[0]),
@@ -268,16 +272,6 @@ def fit_sine(
         stop=float(time[0] + n / rate),
         samples=n,
     )
-
-
-def _slope(t: _Array, design: _Array, solution: _Array) -> _Array:
-    """Derivative of the fitted signal with respect to omega."""
-    multiple = np.arange(1, (solution.size - 1) // 2 + 1)
-    turned = np.zeros_like(solution)
-    turned[1::2] = multiple * solution[2::2]
-    turned[2::2] = -multiple * solution[1::2]
-    slope: _Array = t * (design @ turned)
-    return slope
 
 
 def _wrap(angle: float) -> float:
@@ -331,16 +325,10 @@ def find_flaws(samples: SignalSamples, fit: SineFit, measured: NDArray[np.bool_]
         return []
     half = 0.5 * samples.sampling_frequency / fit.frequency
     groups = np.split(at, np.flatnonzero(np.diff(at) > half) + 1)
-    near = np.abs(rest) > 3.0 * sigma
-    found = []
-    for group in groups:
-        first, last = int(group[0]), int(group[-1]) + 1
-        while first > 0 and near[first - 1]:
-            first -= 1
-        while last < rest.size and near[last]:
-            last += 1
-        found.append(Flaw(max(first - 1, 0), min(last + 1, rest.size)))
-    return found
+    quiet = np.flatnonzero(np.abs(rest) <= 3.0 * sigma)
+    before = [int(quiet[quiet < group[0]].max(initial=0)) for group in groups]
+    after = [int(quiet[quiet > group[-1]].min(initial=rest.size - 1)) for group in groups]
+    return [Flaw(first, last + 1) for first, last in zip(before, after, strict=True)]
 
 
 def sound_samples(size: int, flaws: list[Flaw]) -> NDArray[np.bool_]:

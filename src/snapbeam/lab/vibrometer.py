@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.lab.decay.poles import Line, without_lines
-from snapbeam.lab.diagnostics import KINDS_VIBROMETER
+from snapbeam.lab.diagnostics import KINDS_VIBROMETER, holding
 from snapbeam.lab.least_squares import covariance, phasors, sines, solve, widened
 from snapbeam.lab.sensor_errors import (
-    Hypothesis,
     Record,
     beside_acceleration,
     beyond_shakers,
@@ -158,16 +157,15 @@ def _pulling(times: _Array, cycles: NDArray[np.complex128]) -> float:
     The phase is averaged over eighths of the record, and the frequencies from one to the next scatter.
     """
     phase = np.unwrap(np.angle(cycles)) / (2.0 * math.pi)
+
+    def off_line(x: _Array, y: _Array) -> _Array:
+        return np.asarray(y - np.polyval(polyfit(x - x.mean(), y, 1), x - x.mean()))
+
     parts = np.array_split(np.arange(phase.size), 8)
-    at = np.array([times[part].mean() for part in parts])
-    mean = np.array([phase[part].mean() for part in parts])
-    own = []
-    for part in parts:
-        left = phase[part] - np.polyval(polyfit(times[part] - times[part].mean(), phase[part], 1),
-                                        times[part] - times[part].mean())  # fmt: skip
-        own.append(float(np.std(left, ddof=2)) / math.sqrt(part.size) if part.size > 2 else math.inf)
-    off = mean - np.polyval(polyfit(at, mean, 1), at)
-    if float(np.sqrt(np.mean(off**2))) < _PULLED * float(np.sqrt(np.mean(np.square(own)))):
+    at, mean = (np.array([values[part].mean() for part in parts]) for values in (times, phase))
+    lefts = [off_line(times[part], phase[part]) for part in parts]
+    own = [float(np.std(left, ddof=2)) / math.sqrt(left.size) if left.size > 2 else math.inf for left in lefts]
+    if float(np.sqrt(np.mean(off_line(at, mean) ** 2))) < _PULLED * float(np.sqrt(np.mean(np.square(own)))):
         return 0.0
     rates = np.diff(mean) / np.diff(at)
     return float(np.std(rates, ddof=1)) / math.sqrt(_counts(rates))
@@ -598,7 +596,7 @@ def measure_drive(
     samples = check_signal(signal, ("m/s", "m"), "signal")
     limit = finite("snr_limit", snr_limit)
     tol = within("tolerance", tolerance, 0.0, 0.5)
-    stated = None if amplitude is None else positive("amplitude", amplitude)
+    stated = 1.0 if amplitude is None else positive("amplitude", amplitude)
     if np.ptp(samples.values) == 0.0:
         raise InputError(
             f"signal: no oscillation, it is {samples.values[0]:g} everywhere: nothing was recorded; look at the cable, "
@@ -616,10 +614,10 @@ def measure_drive(
         samples = without_lines(samples, lines.hum)
         first, last = moving_part(samples, rough.frequency)
         rough = _late_fit(samples, first, last, rough.frequency)
-    rest_end = _rest_end(samples, first, rough)
+    width = round(samples.sampling_frequency / rough.frequency)
+    rest_end = max(_quiet_end(samples, first, rough, width) - width, 0) if first > width else 0
     crosstalk = find_crosstalk(samples, rest_end, rough)
-    quiet = samples if crosstalk is None else without_lines(samples, [crosstalk])
-    onset, uncertainty = find_onset(quiet, first, rough)
+    onset, uncertainty = find_onset(without_lines(samples, [crosstalk] if crosstalk else []), first, rough)
     start = float(samples.time[0]) if onset is None else onset
     period = 1.0 / rough.frequency
     stop = float(samples.time[last - 1]) + 1.0 / samples.sampling_frequency
@@ -675,30 +673,65 @@ def measure_drive(
         )  # fmt: skip
         if "few_bits" not in kinds:
             broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
-    diagnostics = [
-        *diagnostics_of(signal),
-        *_flaw_diagnostics(samples, everywhere, broken, clipping),
-        *_doubts(steady, limit, wander, stray, frequency, stated),
-        *_found(startup, period, lines, steady, crosstalk, errors, mean_moves),
-        *_not_there(samples, steady, frequency),
-        *beyond_shakers(steady, str(signal.attrs["units"])),
-        *_against(acceleration, steady, str(signal.attrs["units"])),
-    ]
-    if outside > 3.0 * period:
-        diagnostics.append(KINDS_VIBROMETER["interrupted"].found(outside_ms=1e3 * outside))
-    return DriveMeasurement(
-        steady=steady,
-        startup=startup,
-        stop=stop,
-        snr_limit=limit,
-        units=str(signal.attrs["units"]),
-        flaws=(*broken, *everywhere),
-        lines=lines,
-        clipping=clipping,
-        diagnostics=tuple(diagnostics),
-        cycle_time=times,
-        cycle_amplitude=amplitudes,
+    scatter = steady.noise_rms * math.sqrt(2.0 * steady.cycles / steady.samples) / steady.amplitude
+    strongest = guess if frequency is None or steady.sinad > 0.0 else spectral_peak(samples)
+
+    def share(line: Line) -> float:
+        return 100.0 * line.amplitude / steady.amplitude
+
+    def lost(some: list[Flaw]) -> dict[str, float]:
+        total = sum(flaw.last - flaw.first for flaw in some) / samples.sampling_frequency
+        return {"count": len(some), "total_ms": 1e3 * total, "at": float(samples.time[some[0].first])}
+
+    diagnostics = holding(
+        KINDS_VIBROMETER,
+        *((name, True, lost(some)) for name, some in (("dropout", everywhere), ("dropout_in_start", broken)) if some),
+        ("clipped", clipping.found, {"share_percent": 100.0 * clipping.share}),
+        (
+            "unsteady",
+            wander > max(_STEADY, 3.0 * scatter) or stray > 0.05,
+            {"stray_percent": 100.0 * max(wander, stray)},
+        ),
+        (
+            "frequency",
+            frequency is not None and abs(steady.frequency - guess) > max(0.002 * guess, 6.0 * steady.frequency_se),
+            {"found": steady.frequency, "stated": guess},
+        ),
+        (
+            "amplitude",
+            abs(steady.amplitude - stated) > max(0.05 * stated, 6.0 * steady.amplitude_se) and amplitude is not None,
+            {"found": steady.amplitude, "stated": stated, "share_percent": 100.0 * (steady.amplitude / stated - 1.0)},
+        ),
+        (
+            "noisy" if steady.snr <= limit else "distorted",
+            steady.sinad <= limit,
+            {"sinad_db": steady.sinad, "limit_db": limit},
+        ),
+        ("no_rest", startup is None, {}),
+        ("slow_start", onset is not None and uncertainty > 0.05 * period, {"uncertainty_ms": 1e3 * uncertainty}),
+        *(("hum", True, {"frequency": line.frequency, "share_percent": share(line)}) for line in lines.hum),
+        *(("second_line", True, {"frequency": line.frequency, "share_percent": share(line)}) for line in lines.beside),
+        *(("crosstalk", True, {"share_percent": share(line)}) for line in (crosstalk,) if line is not None),
+        *((one.kind, one.matters, one.numbers) for one in errors),
+        ("one_sided", mean_moves > 0.0, {"share": mean_moves}),
+        (
+            "not_there",
+            abs(strongest - guess) >= max(_SAME_LINE * guess, 2.0 / samples.duration),
+            {"stated": guess, "found": strongest},
+        ),
+        ("interrupted", outside > 3.0 * period, {"outside_ms": 1e3 * outside}),
     )
+    units = str(signal.attrs["units"])
+    diagnostics += beyond_shakers(steady, units)
+    if acceleration is not None:
+        other = check_signal(acceleration, "m/s^2", "acceleration")
+        set_at = spectral_peak(other)
+        fit = _late_fit(other, *moving_part(other, set_at), set_at)
+        diagnostics += beside_acceleration(steady, units, fit)
+    return DriveMeasurement(
+        steady, startup, stop, limit, units, (*broken, *everywhere), lines, clipping,
+        (*diagnostics_of(signal), *diagnostics), times, amplitudes,
+    )  # fmt: skip
 
 
 def _broken_start(samples: SignalSamples, onset: float, end: float, steady: SineFit, clipping: Clipping) -> list[Flaw]:
@@ -721,94 +754,6 @@ def _broken_start(samples: SignalSamples, onset: float, end: float, steady: Sine
     if jumps.size:
         found.append(Flaw(int(jumps[0]), int(jumps[-1]) + 2))
     return [Flaw(flaw.first + first, flaw.last + first) for flaw in found]
-
-
-def _flaw_diagnostics(
-    samples: SignalSamples, flaws: list[Flaw], broken: list[Flaw], clipping: Clipping
-) -> list[Diagnostic]:
-    told = []
-    for name, some in (("dropout", flaws), ("dropout_in_start", broken)):
-        if some:
-            total = sum(flaw.last - flaw.first for flaw in some) / samples.sampling_frequency
-            at = float(samples.time[some[0].first])
-            told.append(KINDS_VIBROMETER[name].found(count=len(some), total_ms=1e3 * total, at=at))
-    if clipping.found:
-        told.append(KINDS_VIBROMETER["clipped"].found(share_percent=100.0 * clipping.share))
-    return told
-
-
-def _doubts(
-    steady: SineFit, limit: float, wander: float, stray: float, frequency: float | None, stated: float | None
-) -> list[Diagnostic]:
-    told = []
-    noise = steady.noise_rms * math.sqrt(2.0 * steady.cycles / steady.samples) / steady.amplitude
-    if wander > max(_STEADY, 3.0 * noise) or stray > 0.05:
-        told.append(KINDS_VIBROMETER["unsteady"].found(stray_percent=100.0 * max(wander, stray)))
-    unsure = 6.0 * steady.frequency_se
-    if frequency is not None and abs(steady.frequency - frequency) > max(0.002 * frequency, unsure):
-        told.append(KINDS_VIBROMETER["frequency"].found(found=steady.frequency, stated=frequency))
-    if stated is not None and abs(steady.amplitude - stated) > max(0.05 * stated, 6.0 * steady.amplitude_se):
-        share, found = 100.0 * (steady.amplitude / stated - 1.0), steady.amplitude
-        told.append(KINDS_VIBROMETER["amplitude"].found(found=found, stated=stated, share_percent=share))
-    if steady.sinad <= limit:
-        cause = "noisy" if steady.snr <= limit else "distorted"
-        told.append(KINDS_VIBROMETER[cause].found(sinad_db=steady.sinad, limit_db=limit))
-    return told
-
-
-def _found(
-    startup: StartUp | None,
-    period: float,
-    lines: DriveLines,
-    steady: SineFit,
-    crosstalk: Line | None,
-    errors: list[Hypothesis],
-    mean_moves: float,
-) -> list[Diagnostic]:
-    """Diagnostics of the start, of lines and of the electronics."""
-    told = []
-    if startup is None:
-        told.append(KINDS_VIBROMETER["no_rest"].found())
-    elif startup.onset_uncertainty > 0.05 * period:
-        told.append(KINDS_VIBROMETER["slow_start"].found(uncertainty_ms=1e3 * startup.onset_uncertainty))
-    for name, some in (("hum", lines.hum), ("second_line", lines.beside)):
-        for line in some:
-            share = 100.0 * line.amplitude / steady.amplitude
-            told.append(KINDS_VIBROMETER[name].found(frequency=line.frequency, share_percent=share))
-    if crosstalk is not None:
-        share = 100.0 * crosstalk.amplitude / steady.amplitude
-        told.append(KINDS_VIBROMETER["crosstalk"].found(share_percent=share))
-    told += [KINDS_VIBROMETER[one.kind].found(None, "", **one.numbers) for one in errors if one.matters]
-    if mean_moves > 0.0:
-        told.append(KINDS_VIBROMETER["one_sided"].found(share=mean_moves))
-    return told
-
-
-def _rest_end(samples: SignalSamples, first: int, rough: SineFit) -> int:
-    """Samples of the rest before the motion, a cycle left out before it rises out of the noise."""
-    width = round(samples.sampling_frequency / rough.frequency)
-    return max(_quiet_end(samples, first, rough, width) - width, 0) if first > width else 0
-
-
-def _against(acceleration: xr.DataArray | None, steady: SineFit, units: str) -> list[Diagnostic]:
-    """Diagnostics against the acceleration of the same shaker, if it is given."""
-    if acceleration is None:
-        return []
-    samples = check_signal(acceleration, "m/s^2", "acceleration")
-    guess = spectral_peak(samples)
-    first, last = moving_part(samples, guess)
-    return beside_acceleration(steady, units, _late_fit(samples, first, last, guess))
-
-
-def _not_there(samples: SignalSamples, steady: SineFit, frequency: float | None) -> list[Diagnostic]:
-    """Diagnostic for a motion at another frequency than stated."""
-    if frequency is None or steady.sinad > 0.0:
-        return []
-    found = spectral_peak(samples)
-    length = samples.duration
-    if abs(found - frequency) < max(_SAME_LINE * frequency, 2.0 / length):
-        return []
-    return [KINDS_VIBROMETER["not_there"].found(stated=frequency, found=found)]
 
 
 def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: float) -> tuple[_Array, Any]:
