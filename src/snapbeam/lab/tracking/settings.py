@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.lab.tracking.edges import Floats, edge_noise
+from snapbeam.lab.tracking.edges import EdgeFit, Floats, edge_noise, fit_edges
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -77,6 +77,15 @@ def gather(
     index = np.clip(centre, half, frames.shape[1] - 1 - half)[..., None] + np.arange(-half, half + 1)
     picked = frames[np.arange(frames.shape[0])[:, None, None], index, columns[None, :, None]]
     return picked.astype(np.float64), inside
+
+
+def edges_about(
+    frames: NDArray[np.floating], rows: NDArray, columns: NDArray[np.intp], half: int, width: float, sign: float
+) -> tuple[Floats, NDArray[np.bool_], EdgeFit, Floats]:
+    """Windows about *rows*, which lie inside the frame, the edges fitted in them, and the rows of these."""
+    windows, inside = gather(frames, rows, columns, half)
+    fit = fit_edges(windows, width, sign=sign)
+    return windows, inside, fit, np.rint(rows) + fit.position
 
 
 def spread_columns(low: int, high: int, count: int) -> NDArray[np.intp]:
@@ -294,6 +303,11 @@ class BeamView:
     def sign(self) -> float:
         """+1 for objects brighter than the background, -1 for darker ones."""
         return 1.0 if self.bright else -1.0
+
+    @property
+    def half(self) -> int:
+        """Half height of windows that hold one edge of the beam."""
+        return int(np.clip(self.thickness // 2, 2, HALF))
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ from snapbeam.lab.tracking.settings import (
     Sticker,
     TipOutline,
     TrackingSettings,
+    edges_about,
     gather,
     spread_columns,
 )
@@ -402,12 +403,11 @@ def beam_view(
     width = _edge_width(frames, far, columns, good, half, sign)
     windows, fits, edges, usable = [], [], [], good.copy()
     for rows, rising in ((near, -sign), (far, sign)):
-        window, within = gather(frames, rows, columns, half)
-        fit = fit_edges(window, width, sign=rising)
+        window, within, fit, found = edges_about(frames, rows, columns, half, width, rising)
         windows.append(window)
         fits.append(fit)
-        edges.append(np.rint(rows) + fit.position)
-        usable &= within & np.isfinite(fit.position)
+        edges.append(found)
+        usable &= within & np.isfinite(found)
     contrast, thickness, error = abs(inside - background), bands.thickness, 0.5
     if usable.any():
         contrast = float(np.median(fits[1].contrast[usable]))
@@ -429,8 +429,8 @@ def beam_view(
         window, within = gather(frames, rows, columns, 1)
         clipped = max(clipped, float((window[within & good] >= saturated).mean()) if (within & good).any() else 0.0)
     hot = float((windows[1][good] >= saturated).mean()) if good.any() else 0.0
-    found = {"contrast": contrast, "thickness": thickness, "thickness_error": error, "hot_share": hot}
-    view = BeamView(**known, **found, edge_width=width, width_table=width_calibration(width, 2 * half + 1))
+    known |= {"contrast": contrast, "thickness": thickness, "thickness_error": error, "hot_share": hot}
+    view = BeamView(**known, edge_width=width, width_table=width_calibration(width, 2 * half + 1))
     blur = masked_median(fits[1].width, usable)
     steady = usable
     if np.isfinite(blur).any():  # an edge that speeds up within the exposure is bent whatever the camera's curve
@@ -845,9 +845,8 @@ def rod_sides(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -
     first, last = low + solid.argmax(1) - 0.5, high - solid[:, ::-1].argmax(1) - 0.5
     sides = []
     for guess, rising in ((first, sign), (last, -sign)):
-        windows, inside = gather(mean.T[None], guess[None], rows, HALF)
-        fit = fit_edges(windows[0], blur, sign=rising)
-        sides.append(np.where(inside[0], np.rint(guess) + fit.position, np.nan))
+        _, inside, _, side = edges_about(mean.T[None], guess[None], rows, HALF, blur, rising)
+        sides.append(np.where(inside, side, np.nan)[0])
     found, middle = sides[1] - sides[0], 0.5 * (sides[0] + sides[1])
     known = np.isfinite(found)
     known &= np.abs(found - np.median(found[known])) < 1.0 if known.any() else known

@@ -31,10 +31,11 @@ from snapbeam.lab.tracking.measure import (
     TrackedRows,
     alternation,
     exposure_blur,
+    fastest,
     fields_apart,
     find_rest,
+    measure,
     measure_beam,
-    measure_shaker,
     touching,
 )
 from snapbeam.lab.tracking.settings import FrameFlag, Orientation, Scene, TrackingSettings, VideoFields
@@ -74,7 +75,8 @@ def tracked_dataset(
     """
     motion_blur = ExposureBlur(0.0, 0.0, 0.0)
     opened = None if recording.exposure is None else recording.exposure * recording.frame_rate
-    if not (fields.shift or fields.apart or scene.noise.lag):
+    whole = not (fields.shift or fields.apart or scene.noise.lag)  # frames, each of an instant
+    if whole:
         motion_blur = exposure_blur(rows.row, rows.width, opened)
     rows = _as_filtered(rows, scene, fields, motion_blur.late)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
@@ -97,7 +99,7 @@ def tracked_dataset(
     scale = down * 1e3 / math.hypot(1.0, 0.0 if scene.shaker is None else scene.shaker.turn * down / across)
     beam, shaker = scene.beam, scene.shaker
     order = FrameOrder((), (), ())
-    if not (fields.shift or fields.apart or scene.noise.lag):
+    if whole:
         steady = np.nan if shaker is not None and shaker.loose else 1.0  # a sticker that swings is no clock
         clock = tuple(drive_clock(steady * rows.shaker))
         if all(kind != "scattered" for kind, _ in clock):  # frames at uneven times look like lost ones
@@ -110,7 +112,8 @@ def tracked_dataset(
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
     shaker_mm = settings.rest * 1e3 - turn.sign * scale * (tip - beam.thickness - rest.row)
     closing_mm = turn.sign * (shaker_mm - beam_mm)
-    offset = math.hypot(_offset_error(rows.row, rest), scene.row_errors[1])
+    at_rest = rest.error if rest.found else float(np.nanmax(rows.row) - np.nanmin(rows.row))  # the range of the motion
+    offset = math.hypot(at_rest, scene.row_errors[1])
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
     seen = SeenMotion(
@@ -182,23 +185,12 @@ def _as_filtered(rows: TrackedRows, scene: Scene, fields: VideoFields, late: flo
     lag = noise.lag + fields.lag + late
 
     def widened(row: Floats, error: Floats) -> Floats:
-        step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
-        most = np.nan_to_num(np.fmax(step[1:], step[:-1]))
-        return np.hypot(np.hypot(noise.factor * error, lag * most), math.hypot(fields.shift, scene.row_errors[0]))
+        moved = lag * np.nan_to_num(fastest(row))
+        return np.hypot(np.hypot(noise.factor * error, moved), math.hypot(fields.shift, scene.row_errors[0]))
 
-    if lag == 0.0 and noise.factor == 1.0 and fields.shift == 0.0 and scene.noise.rows == 0.0:
-        return rows
     return dataclasses.replace(
         rows, error=widened(rows.row, rows.error), shaker_error=widened(rows.shaker, rows.shaker_error)
     )
-
-
-def _offset_error(row: Floats, rest: Rest) -> float:
-    """Standard error [px] of the row at rest; the range of the motion where the rest was not recorded."""
-    if rest.found:
-        return rest.error
-    known = row[np.isfinite(row)]
-    return float(np.ptp(known)) if known.size else float("nan")
 
 
 def _attributes(
@@ -315,9 +307,7 @@ def track(
     done = 0
     for batch in recording.batches(size):
         frames = prepare(batch)
-        beam = measure_beam(scene.beam, frames)
-        near = beam.row + scene.beam.thickness
-        tip = None if scene.shaker is None else measure_shaker(scene.beam, scene.shaker, frames, near, beam.slope)
+        beam, tip = measure(scene, frames)
         follower.add(frames, beam, tip, marks(batch))
         background.add(frames, beam.row)
         done += batch.shape[0]
@@ -346,17 +336,14 @@ def edges_in(
 ) -> Callable[[int], tuple[dict[str, Any], dict[str, float]]]:
     """Find beam and shaker; return a function of a frame that gives attributes and variables of it as :func:`track` does."""
     scene, prepare = _find_scene(recording, settings, *_sample(recording))
-    beam, shaker = scene.beam, scene.shaker
 
     def measured(index: int) -> tuple[dict[str, Any], dict[str, float]]:
-        frames = prepare(recording.frame(index)[None])
-        seen = measure_beam(beam, frames)
-        rows = {"beam_row": float(seen.row[0]), "beam_slope": float(seen.slope[0])}
-        if shaker is not None:
-            row = float(measure_shaker(beam, shaker, frames, seen.row + beam.thickness, seen.slope).row[0])
-            rows["tip_row"] = row + shaker.tip_offset
-            if shaker.sticker is not None:
-                rows["marker_row"] = row
+        beam, tip = measure(scene, prepare(recording.frame(index)[None]))
+        rows = {"beam_row": float(beam.row[0]), "beam_slope": float(beam.slope[0])}
+        if tip is not None and scene.shaker is not None:
+            rows["tip_row"] = float(tip.row[0]) + scene.shaker.tip_offset
+            if scene.shaker.sticker is not None:
+                rows["marker_row"] = float(tip.row[0])
         return _of_scene(scene, settings), rows
 
     return measured
