@@ -48,9 +48,8 @@ def edge_profile(offset: Floats, width: float) -> Floats:
 
 
 def _pair(data: Floats, first: NDArray[np.intp], second: NDArray[np.intp]) -> Floats:
-    """Mean of two rows of each window."""
-    both = np.take_along_axis(data, np.stack([first, second], axis=-1), axis=-1)
-    return both.mean(-1)
+    """Mean of two values of each row."""
+    return np.take_along_axis(data, np.stack([first, second], axis=-1), axis=-1).mean(-1)
 
 
 def _terms(position: Floats, rows: int, width: float) -> tuple[Floats, Floats, Floats]:
@@ -141,9 +140,8 @@ def masked_median(values: Floats, kept: NDArray[np.bool_]) -> Floats:
     """Median of the kept values along the last axis, NaN where none is."""
     count = kept.sum(-1)
     ordered = np.sort(np.where(kept, values, np.inf), axis=-1)
-    at = np.stack([np.maximum(count - 1, 0) // 2, np.maximum(count, 1) // 2], axis=-1)
-    middle = np.take_along_axis(ordered, np.minimum(at, values.shape[-1] - 1), axis=-1)
-    return np.where(count > 0, middle.mean(-1), np.nan)
+    middle = _pair(ordered, np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[-1] - 1))
+    return np.where(count > 0, middle, np.nan)
 
 
 def alike_columns(off: Floats, kept: NDArray[np.bool_], fitted: int) -> float:
