@@ -180,7 +180,7 @@ class TiffSource(FrameSource):
 
         self._stack: NDArray[Any] | None = None
         with _reading(f"{path}: cannot be read as a TIFF file"), ExitStack() as opened:
-            self._file = opened.enter_context(tifffile.TiffFile(path))
+            self._file: Any = opened.enter_context(tifffile.TiffFile(path))
             count = len(self._file.pages)
             first = self._file.pages[0] if count else None
             if first is None or first.dtype is None or not _are_pictures(first.shape, first.dtype):
@@ -201,7 +201,7 @@ class TiffSource(FrameSource):
             self.numbers = np.arange(self._lay_out(told, count, first))
             self._imagej(told, first)
             if self._file.is_ome:
-                self._ome(tifffile.xml2dict(self._file.ome_metadata)["OME"]["Image"])
+                self._ome(tifffile.xml2dict(str(self._file.ome_metadata))["OME"]["Image"])
             self.take_type(first.dtype)
             opened.pop_all()
 

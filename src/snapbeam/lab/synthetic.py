@@ -421,9 +421,10 @@ class SyntheticRecording:
             return write_video(path, self, max_value=2**self.camera.bit_depth - 1)
         depth = self.camera.bit_depth
         stored = 8 if depth == 8 else 12 if depth <= 12 and path.suffix.lower() == ".cihx" else 16
-        options = {"frame_rate": self.camera.frame_rate, "pixel_size": self.camera.pixel_size, "bit_depth": stored}
-        told = {"exposure": self.camera.exposure, "comment": f"synthetic, seed {self.seed}"}
-        return write_photron(path, self, **options, **told, effective_bits=depth)
+        camera = self.camera
+        scales: dict[str, Any] = {name: getattr(camera, name) for name in ("frame_rate", "pixel_size", "exposure")}
+        comment = f"synthetic, seed {self.seed}"
+        return write_photron(path, self, **scales, bit_depth=stored, effective_bits=depth, comment=comment)
 
 
 def _means(time: Floats, motion: Floats, opened: Floats, exposure: float) -> Floats:

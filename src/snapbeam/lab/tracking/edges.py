@@ -47,9 +47,9 @@ def edge_profile(offset: Floats, width: float) -> Floats:
     return s * (above - low * ndtr(low) - np.exp(-0.5 * low * low) / _ROOT_2PI)
 
 
-def _pair(data: Floats, first: NDArray[np.intp], second: NDArray[np.intp]) -> Floats:
+def _pair(data: NDArray, first: NDArray[np.intp], second: NDArray[np.intp]) -> Floats:
     """Mean of two values of each row."""
-    return np.take_along_axis(data, np.stack([first, second], axis=-1), axis=-1).mean(-1)
+    return np.asarray(np.take_along_axis(data, np.stack([first, second], axis=-1), axis=-1).mean(-1))
 
 
 def _terms(position: Floats, rows: int, width: float) -> tuple[Floats, Floats, Floats]:
@@ -136,7 +136,7 @@ def edge_noise(width: float, noise: float, contrast: float) -> float:
     return least if math.isfinite(least) else 0.0
 
 
-def masked_median(values: Floats, kept: NDArray[np.bool_]) -> Floats:
+def masked_median(values: NDArray, kept: NDArray[np.bool_]) -> Floats:
     """Median of the kept values along the last axis, NaN where none is."""
     count = kept.sum(-1)
     ordered = np.sort(np.where(kept, values, np.inf), axis=-1)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +98,7 @@ def without_repeats(rows: TrackedRows, order: FrameOrder) -> TrackedRows:
         return rows
     again = np.isin(np.arange(rows.row.size), order.repeated)
     names = ("row", "error", "slope", "shaker", "shaker_error")
-    changed = {name: np.where(again, np.nan, getattr(rows, name)) for name in names}
+    changed: dict[str, Any] = {name: np.where(again, np.nan, getattr(rows, name)) for name in names}
     flags = np.where(again, rows.flags | np.uint16(FrameFlag.DROPPED), rows.flags)
     return dataclasses.replace(rows, flags=flags, confidence=np.where(again, 0.0, rows.confidence), **changed)
 

@@ -101,10 +101,7 @@ def longest_stretch(columns: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def fixed_bars(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
-    """Rows (first, one past the last) of bars that cross the picture and never move, beside a beam that does.
-
-    A bar that stands alone is none: it may be a beam at rest.
-    """
+    """Rows of bars that cross the picture and never move, beside a beam that does: one alone may be a beam at rest."""
     bars: list[tuple[int, int]] = []
     left = mask
     for bar in _still_bands(mask):
@@ -572,7 +569,8 @@ def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
     count = np.maximum(even.sum(1, keepdims=True), 1)
     own = [one - np.where(even, one, 0.0).sum(1, keepdims=True) / count for one in apart]
     alike = (1.0 - power(near) / far, _alike(own, even, 1) / power(own), _alike(apart, even, 0) / far)
-    return NoiseShape(*(min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in alike), rows, fixed)
+    in_time, along, across = (min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in alike)
+    return NoiseShape(in_time, along, across, rows, fixed)
 
 
 def row_noise(frames: NDArray[np.floating], even: NDArray[np.bool_]) -> float:
@@ -648,11 +646,8 @@ def find_sticker(
     if len(same) < SEEN * profiles.shape[0]:
         return None
     margin = int(np.clip(min(smooth.shape[1] - 1 - bottom for _, _, bottom, _ in same), 2, HALF))
-    cut = [
-        profiles[k, top - margin : top + round(size) + margin + 1]
-        for k, top, bottom, _ in same
-        if top + round(size) + margin < smooth.shape[1]
-    ]
+    ends = [(k, top - margin, top + round(size) + margin + 1) for k, top, *_ in same]
+    cut = [profiles[k, first:last] for k, first, last in ends if last <= smooth.shape[1]]
     if not cut:
         return None
     return Sticker(

@@ -690,7 +690,7 @@ def _noise(dataset: xr.Dataset) -> float:
     scale = float(dataset.attrs.get("pixel_size", 0.0)) * 1e3
     names = [name for name in ("beam_row_stderr", "tip_row_stderr") if name in dataset]
     errors = [scale * _median(dataset[name].values) for name in names]
-    return float(np.hypot(*errors)) if len(errors) == 2 and np.isfinite(errors).all() else 0.0
+    return float(np.hypot(errors[0], errors[1])) if len(errors) == 2 and np.isfinite(errors).all() else 0.0
 
 
 def _contacts(gap: np.ndarray, limit: float) -> list[tuple[int, int, bool]]:
