@@ -32,11 +32,11 @@ class Recording:
 
     ``path`` is the file, folder or pattern; ``shape`` the (height, width) of a frame in the region [px]; ``region``
     (first row, last row + 1, first column, last column + 1) in the full frame; ``frames`` in use (first, last + 1);
-    ``numbers`` the number of each frame counted from the first in use, where a hole is a missing frame; ``frame_rate``
-    in Hz; ``pixel_size`` [m] the height of a pixel, for motion along columns, and ``pixel_width`` its width; ``exposure``
-    the shutter time [s] or None; ``max_value`` the grey level at which a pixel is saturated; ``metadata`` and
-    ``diagnostics`` those of the file, and ``edge_error`` the standard error [px] of every edge from the way the file
-    stores pictures.
+    ``numbers`` the number of each frame counted from the first in use, where a hole is a missing frame;
+    ``frame_rate`` in Hz; ``pixel_size`` [m] the height of a pixel, for motion along columns, and ``pixel_width`` its
+    width; ``exposure`` the shutter time [s] or None; ``max_value`` the grey level at which a pixel is saturated;
+    ``metadata`` and ``diagnostics`` those of the file, and ``edge_error`` the standard error [px] of every edge from
+    the way the file stores pictures.
 
     Examples
     --------

@@ -440,7 +440,7 @@ class PhotronSource(FrameSource):
 
 
 def _mosaic(frame: NDArray[Any]) -> tuple[NDArray[np.float64] | None, float]:
-    """Gains (2, 2) that bring the four kinds of pixels to one mean, None if they are alike, and how far apart they are."""
+    """Gains (2, 2) that bring the four kinds of pixels to one mean, None if all are alike, and their spread."""
     height, width = (size - size % 2 for size in frame.shape)
     kinds = frame[:height, :width].astype(np.float64).reshape(height // 2, 2, width // 2, 2).mean((0, 2))
     if not kinds.min() > 0.0:

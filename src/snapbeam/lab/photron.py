@@ -214,11 +214,12 @@ _IMAGES = {"png": ".png", "tiff": ".tif", "tif": ".tif", "bmp": ".bmp", "jpeg": 
 class CameraHeader:
     """Content of a .cih or .cihx header.
 
-    ``record_rate`` [Hz] is the camera's, ``skip`` the step between saved frames; ``frame_rate`` [Hz] that of the saved
-    frames, None where it is missing or the header contradicts itself, which ``question`` then tells.  ``pixel_size`` [m] is
-    None where the header does not hold it, and ``scale_hint`` says what it holds instead.  ``effective_bits`` of the
-    ``stored_bits`` of a pixel carry the image, on the ``effective_side``; ``raw_colors`` says that pixels may lie under a
-    mosaic of colour filters.  ``image_suffix`` is that of numbered images with the pixels, empty for a .mraw file.
+    ``record_rate`` [Hz] is the camera's, ``skip`` the step between saved frames; ``frame_rate`` [Hz] that of the
+    saved frames, None where it is missing or the header contradicts itself, which ``question`` then tells.
+    ``pixel_size`` [m] is None where the header does not hold it, and ``scale_hint`` says what it holds instead.
+    ``effective_bits`` of the ``stored_bits`` of a pixel carry the image, on the ``effective_side``; ``raw_colors``
+    says that pixels may lie under a mosaic of colour filters.  ``image_suffix`` is that of numbered images with the
+    pixels, empty for a .mraw file.
     """
 
     path: Path

@@ -143,9 +143,9 @@ class SyntheticStage:
             raise InputError(f"beam = {self.beam!r}: must differ from background = {self.background!r}")
 
 
-# Every shape covers an exact share of each cell of a grid four times finer than the pixels, averaged over the exposure;
-# the cells are spread by the lens and summed into pixels.  Nothing here knows of error functions, so a tracker that fits
-# them is not tested against itself.
+# Every shape covers an exact share of each cell of a grid four times finer than the pixels, averaged over the
+# exposure; the cells are spread by the lens and summed into pixels.  Nothing here knows of error functions, so a
+# tracker that fits them is not tested against itself.
 
 
 def covered(rows: Floats, height: int) -> Floats:

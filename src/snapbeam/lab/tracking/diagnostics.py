@@ -140,9 +140,9 @@ _RARE = 0.05  # share of frames that may jump or be distorted without more than 
 class SeenMotion:
     """Input of the diagnostics of a tracked recording, in addition to the scene.
 
-    ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale`` [mm/px]; the
-    largest ``drift`` [px] of the camera; ``open_share``, the exposure over the time between frames, 0 if not known;
-    ``moves`` [px] of the background, 0 if it stands still.
+    ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
+    [mm/px]; the largest ``drift`` [px] of the camera; ``open_share``, the exposure over the time between frames, 0 if
+    not known; ``moves`` [px] of the background, 0 if it stands still.
     """
 
     rows: TrackedRows

@@ -27,10 +27,9 @@ _ROOT_2PI = math.sqrt(2.0 * math.pi)
 class EdgeFit(NamedTuple):
     """Edges fitted in windows; every field has the shape of the windows without their last axis.
 
-    ``position`` is the row of the edge, counted from the middle of the window; NaN where no step of the
-    wanted sign was found inside it.  ``contrast`` is the height of the step, positive in the wanted sense.
-    ``residual`` is the standard deviation about the fit.  ``width`` is the blur [px] that would fit best, to
-    first order about the assumed one.
+    ``position`` is the row of the edge, counted from the middle of the window; NaN where no step of the wanted sign
+    was found inside it.  ``contrast`` is the height of the step, ``residual`` the standard deviation about the fit,
+    ``width`` the blur [px] that would fit best, to first order about the assumed one.
     """
 
     position: Floats

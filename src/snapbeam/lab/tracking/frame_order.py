@@ -155,7 +155,7 @@ def _good(half: int, degree: int) -> float:
 
 
 def _designs(half: int, degree: int) -> list[Floats]:
-    """Motions about a place: with an even clock, a frame shown twice, up to three lost, two exchanged, and a jump of the row."""
+    """Motions about a place: with an even clock, a frame shown twice, up to three lost, two exchanged, and a jump."""
     even = np.arange(2.0 * half) - half + 0.5
     twice, turned = even.copy(), even.copy()
     twice[half] = even[half - 1]

@@ -49,10 +49,9 @@ _OFTEN = 3  # stretches as quiet as the start from which the start is nothing sp
 
 
 class Rest(NamedTuple):
-    """Frames at rest: ``indices``; the row there and its standard error; whether it is one.
+    """Frames at rest, the row there and its standard error; whether it is one, or the recording begins in motion.
 
-    ``found`` is False where the recording begins in motion.  ``drift`` is by how much the row moves within the
-    frames, in standard errors of a frame.
+    ``drift`` is by how much the row moves within the frames, in standard errors of a frame.
     """
 
     indices: NDArray[np.intp]
@@ -138,8 +137,7 @@ def jumps(rows: Floats) -> NDArray[np.bool_]:
 def wanderings(rows: Floats, lost: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Frames of a row that strays while something it leans on is *lost*.
 
-    Each run of lost frames is held against a straight line between the frames before and after; it may bend
-    as much as the motion bends elsewhere.
+    Lost frames are held against a line between those before and after, and may bend as the motion bends elsewhere.
     """
     out = np.zeros(rows.shape, dtype=bool)
     good = np.isfinite(rows) & ~lost
@@ -167,9 +165,9 @@ def distortion(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Deviation of the beam thickness from the usual value [px], and the distorted frames.
 
-    A frame is distorted if that exceeds five robust standard deviations, 0.06 px and the noise of rows (*row_error* [px]
-    of one edge), if the mean over 32 frames about it is as far off (faint light that lasts), or if its edges are no
-    steps: fits that leave three times as much as usual without being blurred.
+    A frame is distorted if that exceeds five robust standard deviations, 0.06 px and the noise of rows (*row_error*
+    [px] of one edge), if the mean over 32 frames about it is as far off (faint light that lasts), or if its edges are
+    no steps: fits that leave three times as much as usual without being blurred.
     """
     known = np.isfinite(thickness)
     miss = np.zeros(thickness.shape)
@@ -212,10 +210,7 @@ def _lasting(miss: Floats, least: float) -> Floats:
 
 
 def pooled(error: Floats) -> Floats:
-    """Standard errors of single frames, each from few columns, none less than the usual one.
-
-    A frame whose columns scatter less than usual does so by chance: no frame is better lit or sharper than most.
-    """
+    """Standard errors of single frames, none less than the usual one: few columns scatter less by chance."""
     known = np.isfinite(error)
     if not known.any():
         return error
@@ -280,10 +275,7 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
 
 
 def _beside(values: Floats, used: NDArray[np.intp], noise: float) -> float:
-    """Deviation of the row from few frames at rest to the neighbouring frames, in standard errors.
-
-    A few frames say nothing of motion themselves; at rest those of one side are at the same place.
-    """
+    """Deviation of few frames at rest, which tell no motion, from those of the nearer side, in standard errors."""
     short = _QUIET - used.size
     if short <= 0:
         return 0.0
@@ -327,10 +319,11 @@ def _too_hot(windows: Floats, inside: NDArray[np.bool_], view: BeamView) -> Floa
 class BeamRows(NamedTuple):
     """The far edge at the contact column of each frame, and what was seen on the way.
 
-    ``row`` and ``slope`` are NaN where it was not found.  ``thickness`` [px] is measured across the beam in columns free
-    of the shaker (NaN without such columns), ``hollow`` [px] by how much a parabola through the columns lies off the line
-    at the contact, ``residual`` what the fitted steps leave of their windows, share of the contrast.  ``level_range`` is
-    the range of grey levels along the columns over that, ``touches`` whether an object reached the far border there.
+    ``row`` and ``slope`` are NaN where it was not found.  ``thickness`` [px] is measured across the beam in columns
+    free of the shaker (NaN without such columns), ``hollow`` [px] by how much a parabola through the columns lies off
+    the line at the contact, ``residual`` what the fitted steps leave of their windows, share of the contrast.
+    ``level_range`` is the range of grey levels along the columns over the usual contrast, ``touches`` whether an
+    object reached the far border there.
     """
 
     row: Floats
@@ -419,10 +412,7 @@ def _anchor(guesses: Floats, middles: list[float]) -> tuple[Floats, Floats]:
 
 
 def _first_band(level: Floats, thickness: float, longest: float) -> Floats:
-    """Far edge of the first band of fitting thickness in each profile; NaN where there is none.
-
-    ``level`` is positive inside objects.
-    """
+    """Far edge of the first band of fitting thickness in each profile, positive inside objects; NaN where none is."""
     out = np.full(level.shape[0], np.nan)
     for k, solid in enumerate(level > 0.0):
         bands = (first for first, last in stretches(solid) if 0.6 * thickness <= last - first <= longest and first)
@@ -431,10 +421,7 @@ def _first_band(level: Floats, thickness: float, longest: float) -> Floats:
 
 
 def _thickness(view: BeamView, frames: NDArray[np.floating], row: Floats, slope: Floats, half: int) -> Floats:
-    """Rows from the far edge to the near one, across the beam, in a few columns free of the shaker.
-
-    Light on one of the edges shows here, for the beam's thickness does not change.
-    """
+    """Rows across the beam, in a few columns free of the shaker, where light on one of the edges shows."""
     if view.merged:
         return np.full(row.shape, np.nan)
     columns = np.concatenate(
@@ -471,10 +458,9 @@ class ShakerRows(NamedTuple):
 def sticker_rows(
     view: BeamView, sticker: Sticker, frames: NDArray[np.floating], near: Floats, tip_offset: float | None = None
 ) -> ShakerRows:
-    """Rows of the sticker's middle in turned frames.
+    """Rows of the sticker's middle in turned frames, below the beam's near edge at *near*.
 
-    ``near`` is the row of the beam's near edge, ``tip_offset`` that of the tip from the sticker's middle if
-    it is known already: the tip cannot stand inside the beam.
+    ``tip_offset`` is the tip's row from the middle, if it is known already: the tip cannot stand inside the beam.
     """
     upper, lower, good, strength, saturated = _both_edges(view, sticker, frames, near, tip_offset)
     noise = math.sqrt(0.5) * edge_noise(view.edge_width, view.noise, sticker.contrast)
@@ -522,10 +508,7 @@ def _both_edges(
 
 
 def _locate(sticker: Sticker, profiles: Floats, first: Floats, least: float) -> Floats:
-    """Row of the sticker's upper edge, from *first* on, to about a pixel: by correlation with its profile.
-
-    Views whose range stays below *least* count for nothing.
-    """
+    """Row of the sticker's upper edge, from *first* on, to about a pixel, where the range is not below *least*."""
     template = sticker.template - sticker.template.mean()
     template /= np.sqrt((template * template).sum())
     if profiles.shape[1] <= template.size:
@@ -556,8 +539,8 @@ KEPT = 0.5  # px by which a beam may look distorted and its row still be kept, w
 class TrackedRows:
     """Rows [px, turned picture] of the whole recording, one entry a frame number; NaN and a flag where not measured.
 
-    ``shaker`` is the row of its reference, ``width`` that of the beam's edge; errors are standard errors.  ``hollow`` [px]
-    is that of :class:`BeamRows` over all frames, 0 where it is no more than columns scatter.
+    ``shaker`` is the row of its reference, ``width`` that of the beam's edge; errors are standard errors.  ``hollow``
+    [px] is that of :class:`BeamRows` over all frames, 0 where it is no more than columns scatter.
     """
 
     row: Floats
@@ -803,7 +786,7 @@ _SELDOM = 0.05  # probability of a pulse that an interval of two standard errors
 
 
 class ExposureBlur(NamedTuple):
-    """Share of the frame before that a frame still shows, and frames by which its instant is open, by a lamp that pulses.
+    """Share of the frame before that a frame still shows, and frames by which a pulsing lamp leaves its instant open.
 
     Both are 0 if they are not told.  ``late`` is the standard error [frames] of the instant.
     """
@@ -882,7 +865,7 @@ def tip_edges(
     good: NDArray[np.bool_],
     light: Floats,
 ) -> tuple[Floats, NDArray[np.bool_], Floats]:
-    """Sub-pixel rows of the tip's edge at *columns*, which are sound, and saturated shares, with the beam's light taken out.
+    """Rows of the tip's edge at *columns*, without the beam's light; which are sound; saturated shares.
 
     ``tip`` and ``near`` are the expected row of the tip and the known row of the beam's near edge, (frames,
     columns); ``light`` is the beam's contrast, (columns,).

@@ -339,13 +339,13 @@ class TipOutline:
 class ShakerView:
     """The shaker: the ``rod`` of columns it covers, and what of it is followed.
 
-    The reference row is the middle of the sticker, or without one the tip itself; ``tip_offset`` is the row
-    of the tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in
-    words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker;
-    ``certain`` that the tip is no sticker, by its distance or since its body has no gap down to the border.
-    ``width`` [px] is that of the rod behind the tip, and its standard error; NaN where it is not seen.  ``loose`` [px] is
-    by how much the sticker moves against the tip, standard deviation; ``turn`` the tangent of the angle by which the
-    camera is turned against rod and beam; ``cut`` that a border of the picture cuts the rod, whose middle is not seen.
+    The reference row is the middle of the sticker, or without one the tip itself; ``tip_offset`` is the row of the
+    tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in words where that
+    is known from; ``isolated`` that the sticker was all that could be seen of the shaker; ``certain`` that the tip is
+    no sticker, by its distance or since its body has no gap down to the border. ``width`` [px] is that of the rod
+    behind the tip, and its standard error; NaN where it is not seen.  ``loose`` [px] is by how much the sticker moves
+    against the tip, standard deviation; ``turn`` the tangent of the angle by which the camera is turned against rod
+    and beam; ``cut`` that a border of the picture cuts the rod, whose middle is not seen.
     """
 
     rod: tuple[int, int]
@@ -394,7 +394,7 @@ class EdgeShape:
 
 @dataclass(frozen=True)
 class NoiseShape:
-    """Correlations of the noise of pixels with the next in time, ``along`` the beam and ``across`` it; 0 where not told.
+    """Correlations of noise with the next pixel in time, ``along`` the beam and ``across`` it; 0 where not told.
 
     ``rows`` is the standard deviation of what all pixels of a row along the beam have in common, in grey levels, and
     ``fixed_rows`` of the part of it that is the same in every frame.
@@ -524,12 +524,13 @@ _ADVICE = {
     FrameFlag.BLUR: "the edges are much wider than usual; shorten the exposure or refocus (blur_limit, --blur-limit, "
     "moves the limit)",
     FrameFlag.DROPPED: "the camera lost the frame: it is absent, blank or a repeat of the one before",
-    FrameFlag.GLARE: "light saturates the edge; turn the lamp or choose other columns (contact_column, --contact-column)",
+    FrameFlag.GLARE: "light saturates the edge; turn the lamp or choose other columns (contact_column, "
+    "--contact-column)",
     FrameFlag.MERGED: "beam and shaker touch and the shaker shows no edge of its own; put a sticker on it",
     FrameFlag.LOW_CONTRAST: "the edge is too faint; add light or set objects (--objects) and threshold (--threshold)",
     FrameFlag.OUT_OF_REGION: "the object left the region; make region (--region) taller",
-    FrameFlag.JUMP: "the position leaves its neighbours for a frame or few and comes back: something else was taken for "
-    "the object; look at the frame (--picture, --frame)",
-    FrameFlag.DISTORTED: "the beam looks thicker or thinner than usual, or its edge is no step: light or another object "
-    "lies on it; look at the frame (--picture, --frame)",
+    FrameFlag.JUMP: "the position leaves its neighbours for a frame or few and comes back: something else was taken "
+    "for the object; look at the frame (--picture, --frame)",
+    FrameFlag.DISTORTED: "the beam looks thicker or thinner than usual, or its edge is no step: light or another "
+    "object lies on it; look at the frame (--picture, --frame)",
 }

@@ -463,7 +463,8 @@ def _edge_width(
         usable = inside & good[few] & np.isfinite(fit.position)
         if not usable.any():
             raise InputError(
-                "recording: the far edge of the beam could not be fitted; set threshold (--threshold) or region (--region)"
+                "recording: the far edge of the beam could not be fitted; set threshold (--threshold) or region "
+                "(--region)"
             )
         found = float(np.median(fit.width[usable]))
         width = float(np.clip(found, 0.3, 4.0)) if np.isfinite(found) else width
@@ -700,7 +701,7 @@ def tip_outline(rows: Floats, good: NDArray[np.bool_], reference: Floats) -> tup
 
 
 def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) -> tuple[float, float, float] | None:
-    """Row of an outline's apex, its standard error, and its column from the contact; None if that is not between columns.
+    """Row of an outline's apex, its standard error and column from the contact; None if not known on both sides of it.
 
     The outline is taken as symmetric, y = a + b (x - c)^2 + d (x - c)^4, about a column c near the middle of
     the shaker: a flat tip alone would not tell it.  Columns nearer than three pixels to each other count as
@@ -825,8 +826,8 @@ _NO_SIDES = ((math.nan, math.nan), 0.0)
 def rod_sides(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -> tuple[tuple[float, float], float]:
     """Width [px] across the rod, its standard error, and columns by which a row leans; NaN and 0 where not seen.
 
-    The rod moves along its sides, so that they are sharp in the mean over the sample.  Rows of the lower half count that
-    show as much contrast as most do: neither sticker nor tip.
+    The rod moves along its sides, so that they are sharp in the mean over the sample.  Rows of the lower half count
+    that show as much contrast as most do: neither sticker nor tip.
     """
     mean = frames[:, frames.shape[1] // 2 :].mean(0, dtype=np.float64)
     low, high = rod[0] - HALF, rod[1] + HALF

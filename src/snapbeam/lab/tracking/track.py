@@ -719,9 +719,9 @@ def _crossing(
 ) -> tuple[float, float, float]:
     """Time at which a line through the frames beyond *edge* meets zero, its speed [m/s], the time's error.
 
-    As few frames as the noise allows, two to five, since beam and tip do not move in straight lines.  ``edge`` is the first
-    (``step`` = -1, approach) or last (+1, parting) frame of the contact.  The crossing is sought from the nearest frame
-    outside to the first inside that has closed to within the noise.
+    As few frames as the noise allows, two to five, since beam and tip do not move in straight lines.  ``edge`` is the
+    first (``step`` = -1, approach) or last (+1, parting) frame of the contact.  The crossing is sought from the
+    nearest frame outside to the first inside that has closed to within the noise.
     """
     outside: list[int] = []
     k = edge + step
