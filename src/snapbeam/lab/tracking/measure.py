@@ -347,15 +347,17 @@ def measure_beam(view: BeamView, frames: NDArray[np.floating]) -> BeamRows:
     guesses = np.full((len(view.groups), count), np.nan)
     ranges, touches = np.zeros(count), np.zeros(count, dtype=bool)
     longest = height if view.merged else 1.6 * view.thickness + 3.0
-    for g, group in enumerate(view.groups):
+    for guess, group in zip(guesses, view.groups, strict=True):
         profile = frames[:, :, group].mean(-1, dtype=np.float64)
         profile[:, 1:-1] = (profile[:, 2:] + profile[:, 1:-1] + profile[:, :-2]) / 3.0
         ranges = np.maximum(ranges, np.ptp(profile, axis=1) / view.contrast)
-        level = (profile - view.threshold) * view.sign
+        solid = (profile - view.threshold) * view.sign > 0.0
         for first, last in view.fixtures:
-            level[:, first:last] = -1.0
-        touches |= (level[:, :2] > 0.0).any(1)
-        guesses[g] = _first_band(level, view.thickness, longest)
+            solid[:, first:last] = False
+        touches |= solid[:, :2].any(1)
+        for k, inside in enumerate(solid):  # the far edge of the first band of fitting thickness
+            bands = (one for one, end in stretches(inside) if 0.6 * view.thickness <= end - one <= longest and one)
+            guess[k] = next(bands, np.nan) - 0.5
     about = frames[:, :, view.columns].mean(-1, dtype=np.float64)
     ranges = np.maximum(ranges, np.ptp(about, axis=1) / view.contrast)
     anchor, tilt = _anchor(guesses, [float(group.mean()) for group in view.groups])
@@ -409,15 +411,6 @@ def _anchor(guesses: Floats, middles: list[float]) -> tuple[Floats, Floats]:
     tilt = np.where(np.isfinite(tilt), tilt, usual)
     left = guesses[0] - tilt * middles[0]
     return np.where(np.isfinite(left), left, guesses[1] - tilt * middles[1]), tilt
-
-
-def _first_band(level: Floats, thickness: float, longest: float) -> Floats:
-    """Far edge of the first band of fitting thickness in each profile, positive inside objects; NaN where none is."""
-    out = np.full(level.shape[0], np.nan)
-    for k, solid in enumerate(level > 0.0):
-        bands = (first for first, last in stretches(solid) if 0.6 * thickness <= last - first <= longest and first)
-        out[k] = next(bands, np.nan) - 0.5
-    return out
 
 
 def _thickness(view: BeamView, frames: NDArray[np.floating], row: Floats, slope: Floats, half: int) -> Floats:
@@ -528,7 +521,7 @@ def _locate(sticker: Sticker, profiles: Floats, first: Floats, least: float) -> 
 # Collecting the measurements of all frames, with every frame's trouble on record.
 
 
-_HOLLOW = 0.06  # px
+_HOLLOW = 0.06  # px of curvature in all frames, more than of real surfaces
 _SMEARED = 0.25  # error over what edges are wider than explained
 
 BORDER = 14.0  # rows from the border within which a vanished object is taken to have left the region
@@ -643,6 +636,8 @@ class Follower:
             shaker[astray] = np.nan
             flags[astray] |= np.uint16(FrameFlag.JUMP)
         gone = ~np.isfinite(row) | (~np.isfinite(shaker) if self.scene.shaker is not None else False)
+        curved = found["hollow"][np.isfinite(found["hollow"])]
+        hollow = abs(float(np.median(curved))) if curved.size else 0.0
         return TrackedRows(
             row=row,
             error=np.where(np.isfinite(row), error, np.nan),
@@ -652,7 +647,7 @@ class Follower:
             shaker_error=np.where(np.isfinite(shaker), shaker_error, np.nan),
             confidence=np.where(gone, 0.0, found["confidence"]),
             flags=flags,
-            hollow=_lasting_hollow(found["hollow"]),
+            hollow=hollow if hollow > _HOLLOW else 0.0,
         )
 
     def _repeats(self, strip: NDArray[np.floating]) -> NDArray[np.bool_]:
@@ -672,23 +667,13 @@ class Follower:
         return out
 
 
-def _lasting_hollow(hollow: Floats) -> float:
-    """Curvature of the edge in all frames [px]; 0 if it is below that of real surfaces."""
-    known = hollow[np.isfinite(hollow)]
-    middle = float(np.median(known)) if known.size else 0.0
-    return abs(middle) if abs(middle) > _HOLLOW else 0.0
-
-
 def _assign(
     flags: NDArray[np.uint16], missing: NDArray[np.bool_], reasons: list[tuple[NDArray[np.bool_], FrameFlag]]
 ) -> None:
     """Give every missing frame its reasons, and a plain gap where none applies."""
-    explained = np.zeros(flags.shape, dtype=bool)
-    for where, flag in reasons:
-        here = missing & where
-        flags[here] |= np.uint16(flag)
-        explained |= here
-    flags[missing & ~explained] |= np.uint16(FrameFlag.GAP)
+    unexplained = ~np.any([where for where, _ in reasons], axis=0)
+    for where, flag in (*reasons, (unexplained, FrameFlag.GAP)):
+        flags[missing & where] |= np.uint16(flag)
 
 
 def _with_missing(found: dict[str, NDArray], numbers: NDArray[np.int64]) -> dict[str, NDArray]:

@@ -793,7 +793,10 @@ def shaker_view(
         outline, loose = _outline(view, frames, bands, rod, beam, reference)
         width, lean = rod_sides(frames, rod, view.edge_width)
     column = view.contact_column
-    certain = _reaches_border(bands, middle) if sticker is None else distance is not None
+    certain = distance is not None
+    if sticker is None:  # the object below the beam reaches the border of the picture without a gap
+        after = bands.objects.after_end[:, middle][(bands.alone & bands.objects.follows)[:, middle]]
+        certain = bool(after.size and (after == bands.objects.height).mean() > 0.9)
     turned = abs(lean) > _TURNED and abs(lean + float(np.nanmedian(beam.slope))) < _SQUARE
     turn = -lean if turned else 0.0
     free = settings.contact_column is None
@@ -852,13 +855,6 @@ def rod_sides(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -
     across = 1.0 / math.sqrt(1.0 + lean * lean)
     scatter = float(np.std(found[known])) / math.sqrt(np.count_nonzero(known) / 3.0)
     return (across * float(np.mean(found[known])), math.hypot(scatter, _SIDE)), lean
-
-
-def _reaches_border(bands: BeamBands, middle: NDArray[np.intp]) -> bool:
-    """Return True if the object below the beam reaches the border of the picture without a gap."""
-    objects = bands.objects
-    shown = (bands.alone & objects.follows)[:, middle]
-    return bool(shown.any() and (objects.after_end[:, middle] == objects.height)[shown].mean() > 0.9)
 
 
 def _stands_alone(bands: BeamBands, middle: NDArray[np.intp], near: Floats) -> bool:
