@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import center_of_mass, gaussian_filter1d
 
 from snapbeam.lab.diagnostics import KINDS_RECORDING, holding
 from snapbeam.lab.image_sources import FrameSource, open_source
@@ -30,11 +32,11 @@ class Recording:
 
     ``path`` is the file, folder or pattern; ``shape`` the (height, width) of a frame in the region [px]; ``region``
     (first row, last row + 1, first column, last column + 1) in the full frame; ``frames`` in use (first, last + 1);
-    ``numbers`` the number of each frame counted from the first in use, where a hole is a missing frame; ``frame_rate``
-    in Hz; ``pixel_size`` [m] the height of a pixel, for motion along columns, and ``pixel_width`` its width;
-    ``exposure`` the shutter time [s] or None; ``max_value`` the
-    grey level at which a pixel is saturated; ``metadata`` and ``diagnostics`` those of the file, and ``edge_error`` the
-    standard error [px] of every edge from the way the file stores pictures.
+    ``numbers`` the number of each frame counted from the first in use, where a hole is a missing frame;
+    ``frame_rate`` in Hz; ``pixel_size`` [m] the height of a pixel, for motion along columns, and ``pixel_width`` its
+    width; ``exposure`` the shutter time [s] or None; ``max_value`` the grey level at which a pixel is saturated;
+    ``metadata`` and ``diagnostics`` those of the file, and ``edge_error`` the standard error [px] of every edge from
+    the way the file stores pictures.
 
     Examples
     --------
@@ -58,8 +60,7 @@ class Recording:
         frames: tuple[int, int] | None = None,
     ) -> None:
         instance("source", source, FrameSource, "a source of frames (open_recording opens a file)")
-        if not isinstance(region, (tuple, list)) or len(region) != 4:
-            raise InputError(f"region = {shown(region)}: must be four numbers")
+        _tuple("region", region, 4, "four numbers")
         self.path = path
         self._source = source
         self.frame_rate = frame_rate
@@ -126,30 +127,21 @@ class Recording:
         )
 
 
-def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> tuple[int, int, int, int]:
-    if value is None:
-        return (0, shape[0], 0, shape[1])
-    if not isinstance(value, (tuple, list)) or len(value) != 4:
-        raise InputError(f"region = {shown(value)}: must be (first row, last row + 1, first column, last column + 1)")
-    top = integer("region[0]", value[0], 0, shape[0] - 1)
-    bottom = integer("region[1]", value[1], top + 1, shape[0])
-    left = integer("region[2]", value[2], 0, shape[1] - 1)
-    return (top, bottom, left, integer("region[3]", value[3], left + 1, shape[1]))
+def _tuple(name: str, value: Any, size: int, allowed: str) -> None:
+    if not isinstance(value, (tuple, list)) or len(value) != size:
+        raise InputError(f"{name} = {shown(value)}: must be {allowed}")
+
+
+def _range(name: str, value: Any, at: int, count: int) -> tuple[int, int]:
+    """First of *count* things and one past the last, from two neighbours of a sequence."""
+    first = integer(f"{name}[{at}]", value[at], 0, count - 1)
+    return first, integer(f"{name}[{at + 1}]", value[at + 1], first + 1, count)
 
 
 def _numbers(source: FrameSource, frames: tuple[int, int]) -> NDArray[np.int64]:
     """Numbers of the frames in use, counted from the first of them."""
     numbers = source.numbers[slice(*frames)]
     return numbers - numbers[0] if frames[0] else numbers
-
-
-def _frames(value: tuple[int, int] | None, count: int) -> tuple[int, int]:
-    if value is None:
-        return 0, count
-    if not isinstance(value, (tuple, list)) or len(value) != 2:
-        raise InputError(f"frames (--frames) = {shown(value)}: must be (first frame, last frame + 1)")
-    first = integer("frames[0]", value[0], 0, count - 1)
-    return first, integer("frames[1]", value[1], first + 1, count)
 
 
 def _told_of(source: FrameSource, rate: float, numbers: NDArray[np.int64]) -> tuple[Diagnostic, ...]:
@@ -228,7 +220,12 @@ def open_recording(
                 "in metres, such as 12e-6 for 12 um"
             )
         width = source.pixel_width if pixel_size is None else None
-        part, used = _region(region, source.shape), _frames(frames, source.numbers.size)
+        (height, across), count = source.shape, source.numbers.size
+        part, used = (0, height, 0, across) if region is None else region, (0, count) if frames is None else frames
+        _tuple("region", part, 4, "(first row, last row + 1, first column, last column + 1)")
+        _tuple("frames (--frames)", used, 2, "(first frame, last frame + 1)")
+        part = (*_range("region", part, 0, height), *_range("region", part, 2, across))
+        used = _range("frames", used, 0, count)
         told = _told_of(source, rate, _numbers(source, used))
         return Recording(path, source, rate, size, part, told, width, used)
     except BaseException:
@@ -249,12 +246,8 @@ _RASTER = 0.005  # px, error of a curve drawn between pixels of another phase
 def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
     """Rows by which each profile, (n, rows), lies below the reference, (rows,), and their standard errors.
 
-    The shift, a gain and an offset are fitted by least squares, from the shift of whole rows with the best correlation
-    on.
+    Shift, gain and offset are fitted by least squares, from the shift of whole rows with the best correlation on.
     """
-    from scipy.interpolate import CubicSpline
-    from scipy.ndimage import gaussian_filter1d
-
     rows = reference.size
     reach = min(_FARTHEST, (rows - 8) // 3)
     if reach < 1:
@@ -265,8 +258,8 @@ def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
     profiles = gaussian_filter1d(np.asarray(profiles, dtype=np.float64), _SMOOTH, axis=1)
     reference = gaussian_filter1d(np.asarray(reference, dtype=np.float64), _SMOOTH)
     inner = np.arange(reach, rows - reach, dtype=np.float64)
-    part = profiles[:, reach : rows - reach]
-    part = part - part.mean(1, keepdims=True)
+    full = profiles[:, reach : rows - reach]
+    part = full - full.mean(1, keepdims=True)
     score = []
     for shift in range(-reach, reach + 1):
         there = reference[reach - shift : rows - reach - shift]
@@ -276,7 +269,6 @@ def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
     found = np.argmax(score, axis=0).astype(np.float64) - reach
     spline = CubicSpline(np.arange(rows, dtype=np.float64), reference)
     slope = spline.derivative()
-    full = profiles[:, reach : rows - reach].astype(np.float64)
     for _ in range(6):
         at = inner[None, :] - found[:, None]
         model, grade = spline(at), -slope(at)
@@ -361,8 +353,7 @@ def _centre(picture: _Array, where: tuple[float, float], reach: int, name: str) 
         weight[weight < max(0.3 * weight.max(), 4.0 * spread)] = 0.0
         if not weight.sum() > 0.0:
             raise InputError(f"{name} mark at {where}: nothing stands out of its surroundings there")
-        grid = np.arange(-reach, reach + 1)
-        at = np.array([r + (weight.sum(1) @ grid) / weight.sum(), c + (weight.sum(0) @ grid) / weight.sum()])
+        at = np.array([r - reach, c - reach]) + center_of_mass(weight)
     return at
 
 
@@ -381,16 +372,16 @@ def _checked(
                 f"frames[{number}] of shape {array.shape} and type {array.dtype}: must be a two-dimensional "
                 "array of integers"
             )
-        if shape and array.shape != tuple(shape[1:]):
+        shape[:] = [number + 1, *(shape[1:] or array.shape)]
+        if array.shape != tuple(shape[1:]):
             raise InputError(f"frames[{number}] of shape {array.shape}: must be of shape {tuple(shape[1:])}")
         if even and array.size % 2:
             raise InputError(f"frames of shape {array.shape}: 12-bit frames hold an even number of pixels")
         if array.min() < 0 or array.max() > limit:
             raise InputError(f"frames[{number}] holds {array.min()} to {array.max()}: must lie in [0, {limit}]")
-        if not shape:
-            shape[:] = [0, *array.shape]
-        shape[0] += 1
         yield array
+    if not shape:
+        raise InputError("frames is empty: must hold at least one frame")
 
 
 def write_photron(
@@ -458,22 +449,11 @@ def write_photron(
         with open(mraw, "wb") as file:
             for chunk in frame_bytes(_checked(frames, 2**effective - 1, shape, even=bits == 12), bits):
                 file.write(chunk)
-        if not shape:
-            raise InputError("frames is empty: must hold at least one frame")
-        values = {
-            "width": shape[2],
-            "height": shape[1],
-            "frame_count": shape[0],
-            "start": 0,
-            "skip": skip,
-            "record_rate": f"{rate * skip:.12g}",
-            "exposure": shutter,
-            "stored_bits": bits,
-            "effective_bits": effective,
-            "camera": "snapbeam synthetic camera",
-            "comment": comment,
+        values = dict(zip(("frame_count", "height", "width"), shape, strict=True)) | {
+            "start": 0, "skip": skip, "record_rate": f"{rate * skip:.12g}", "exposure": shutter, "stored_bits": bits,
+            "effective_bits": effective, "camera": "snapbeam synthetic camera", "comment": comment,
             "date": f"{date.today():%Y/%m/%d}",
-        }
+        }  # fmt: skip
         header.write_bytes(header_text(kind, values, size))
     return path
 
@@ -522,7 +502,6 @@ def write_video(
                 image = av.VideoFrame.from_ndarray(grey, format="gray")
                 image.pts, image.time_base = shape[0] - 1, 1 / rate
                 container.mux(stream.encode(image))
-            if stream is None:
-                raise InputError("frames is empty: must hold at least one frame")
+            assert stream is not None  # _checked refuses no frames
             container.mux(stream.encode())
     return path

@@ -100,29 +100,27 @@ def full_field(
     integer("block", block, 4, width)
     integer("rest_frames", rest_frames, 1, len(recording))
     blocks = width // block
-    count = len(recording)
-    turned = (lambda picture: picture) if motion == "rows" else (lambda picture: picture.T)
 
     def frame(k: int) -> _Array:
-        return np.asarray(turned(recording.frame(k)), dtype=np.float64)
+        picture = np.asarray(recording.frame(k), dtype=np.float64)
+        return picture if motion == "rows" else picture.T
 
     at_rest = _Template.of(np.mean([frame(k) for k in range(rest_frames)], axis=0), first, last, block, rest_frames)
     if not at_rest.slope.any():
         raise InputError(f"rows = {first}, {last}: hold no texture and no edge in any block")
     length = int(recording.numbers[-1]) + 1
     found = {name: np.full((length, blocks), np.nan) for name in ("shift", "error", "correlation")}
-    shift = np.zeros(blocks)
-    for k in range(count):
+    shift, at = np.zeros(blocks), np.arange(blocks)
+    for k, number in enumerate(recording.numbers):
         fitted = at_rest.fit_shifts(frame(k), shift)
         for name, values in zip(found, fitted, strict=True):
-            found[name][recording.numbers[k]] = values
+            found[name][number] = values
         # a block that is lost is looked for where its neighbours are
         known = np.isfinite(fitted[0])
         if known.any():
-            at = np.arange(blocks)
             shift = np.interp(at, at[known], fitted[0][known])
         if progress is not None:
-            progress(k + 1, count)
+            progress(k + 1, len(recording))
     pixel, across = recording.pixel_size, recording.pixel_width
     if motion == "columns":
         pixel, across = across, pixel
@@ -150,9 +148,8 @@ def full_field(
 
 def _taps(t: _Array) -> _Array:
     """Weights of four neighbouring coefficients of a cubic spline at fraction *t* between the inner two, shape (4, ...)."""
-    return (
-        np.stack([(1.0 - t) ** 3, 3.0 * t**3 - 6.0 * t**2 + 4.0, -3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0, t**3]) / 6.0
-    )
+    inner = (3.0 * t**3 - 6.0 * t**2 + 4.0, -3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0)
+    return np.stack([(1.0 - t) ** 3, *inner, t**3]) / 6.0
 
 
 def _kept_noise(t: _Array) -> _Array:
@@ -182,9 +179,8 @@ class _Template(NamedTuple):
             each[:, : blocks * block].reshape(last - first, blocks, block).transpose(1, 0, 2).reshape(blocks, -1)
             for each in (picture[first:last], slope)
         )
-        return cls(
-            level - level.mean(1, keepdims=True), slope - slope.mean(1, keepdims=True), first, last - first, frames
-        )
+        level, slope = (each - each.mean(1, keepdims=True) for each in (level, slope))
+        return cls(level, slope, first, last - first, frames)
 
     def fit_shifts(self, picture: _Array, start: _Array) -> tuple[_Array, _Array, _Array]:
         """Shift of each block [px], its standard error, and the correlation; NaN where it is lost.
@@ -197,10 +193,8 @@ class _Template(NamedTuple):
         block = self.level.shape[1] // self.rows
         coefficients = spline_filter1d(picture, order=3, axis=0, mode="mirror")
         by_block = coefficients[:, : blocks * block].reshape(-1, blocks, block)
-        tt, ts, ss = (
-            (one * other).sum(1)
-            for one, other in ((self.level, self.level), (self.level, self.slope), (self.slope, self.slope))
-        )
+        pairs = ((self.level, self.level), (self.level, self.slope), (self.slope, self.slope))
+        tt, ts, ss = ((one * other).sum(1) for one, other in pairs)
         determinant = ss * tt - ts * ts
         shift = start.copy()
         for _ in range(_ITERATIONS):

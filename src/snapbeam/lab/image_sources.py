@@ -11,6 +11,7 @@ import math
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,8 @@ _RATES = ("frame_rate", "fps", "record_rate", "frame_rate_hz")
 _SIZES = ("pixel_size", "pixel_size_m")
 _SAME_RATE = 1.005  # ratio of rates that are rounded
 _EVEN = 0.02  # share by which the kinds of pixels under a mosaic may differ and count as one
-IMAGE_SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", ".jpg", ".jpeg")
+_JPEG = (".jpg", ".jpeg")
+IMAGE_SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", *_JPEG)
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mov", ".mkv", ".cine")
 LOSSLESS = (
     "rawvideo", "ffv1", "huffyuv", "ffvhuff", "utvideo", "magicyuv", "lagarith", "png", "tiff", "bmp", "qtrle",
@@ -124,6 +126,17 @@ class FrameSource:
             )
 
 
+@contextmanager
+def _reading(words: str) -> Iterator[None]:
+    """Turn errors of a library, which raises many kinds at a damaged file, into one of the input."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"{words} ({error})") from None
+
+
 def grey_of(colors: NDArray[Any]) -> NDArray[Any]:
     """Grey levels of pictures whose last axis is red, green, blue and perhaps opacity, of the same type."""
     grey = colors[..., :3].astype(np.float64) @ _LUMA
@@ -165,13 +178,11 @@ class TiffSource(FrameSource):
         super().__init__(path)
         import tifffile
 
-        self._file: Any = None
         self._stack: NDArray[Any] | None = None
-        try:
-            self._file = tifffile.TiffFile(path)
-            pages = self._file.pages
-            count = len(pages)
-            first = pages[0] if count else None
+        with _reading(f"{path}: cannot be read as a TIFF file"), ExitStack() as opened:
+            self._file: Any = opened.enter_context(tifffile.TiffFile(path))
+            count = len(self._file.pages)
+            first = self._file.pages[0] if count else None
             if first is None or first.dtype is None or not _are_pictures(first.shape, first.dtype):
                 kind = "no page" if first is None else f"pages of shape {first.shape} and type {first.dtype}"
                 raise InputError(
@@ -186,18 +197,13 @@ class TiffSource(FrameSource):
             if str(getattr(first.compression, "name", "NONE")).upper() in ("JPEG", "OJPEG", "JPEG2000", "WEBP"):
                 self.tell_lossy()
             self.metadata = {"format": "TIFF stack"}
-            count = self._lay_out(self._file.imagej_metadata or {}, count, first)
-            self.numbers = np.arange(count)
-            self._imagej(self._file.imagej_metadata or {}, first)
+            told = self._file.imagej_metadata or {}
+            self.numbers = np.arange(self._lay_out(told, count, first))
+            self._imagej(told, first)
             if self._file.is_ome:
-                self._ome(tifffile.xml2dict(self._file.ome_metadata)["OME"]["Image"])
+                self._ome(tifffile.xml2dict(str(self._file.ome_metadata))["OME"]["Image"])
             self.take_type(first.dtype)
-        except Exception as error:  # a damaged file makes tifffile raise many kinds
-            if self._file is not None:
-                self.close()
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path}: cannot be read as a TIFF file ({error})") from None
+            opened.pop_all()
 
     def _lay_out(self, told: dict[str, Any], count: int, page: Any) -> int:
         """Number of frames, by the axes that the file states."""
@@ -208,11 +214,8 @@ class TiffSource(FrameSource):
             if self._file.is_ome or told:
                 raise InputError(f"{self.path}: holds {len(series)} images of several frames; save one of them")
             return count
-        axes = {
-            axis: size
-            for axis, size in zip(series[0].axes, series[0].shape, strict=True)
-            if axis not in "YXS" and size > 1
-        }
+        sizes = zip(series[0].axes, series[0].shape, strict=True)
+        axes = {axis: size for axis, size in sizes if axis not in "YXS" and size > 1}
         # ImageJ calls the frames of a video that it opened slices
         moving = "TIQ" + ("Z" if {"finterval", "fps"} & set(told) and "spacing" not in told else "")
         if len(axes) > 1 or any(axis not in moving for axis in axes):
@@ -245,29 +248,24 @@ class TiffSource(FrameSource):
         if isinstance(shown, (int, float)) and shown > 0.0:
             rates["fps"] = float(shown)
         self.state_rate(rates)
-        across, down = (
-            self._size(told.get(key, told.get("unit")), page.tags.get(name))
-            for key, name in (("unit", "XResolution"), ("yunit", "YResolution"))
-        )
+        sizes = []
+        for key, name in (("unit", "XResolution"), ("yunit", "YResolution")):
+            unit, resolution = _unescaped(told.get(key, told.get("unit"))), page.tags.get(name)
+            known = resolution is not None and min(resolution.value) > 0 and unit not in ("in", "inch", "inches")
+            metres = unit_factor("pixel size", unit, "m") if known else None  # inches come from printers
+            sizes.append(None if metres is None else metres * resolution.value[1] / resolution.value[0])
+        across, down = sizes
         self.pixel_size, self.pixel_width = down or across, across or down
-
-    @staticmethod
-    def _size(unit: Any, resolution: Any) -> float | None:
-        """Metres per pixel of a resolution; inches come from printers."""
-        if resolution is None or not min(resolution.value) > 0 or _unescaped(unit) in ("in", "inch", "inches"):
-            return None
-        metres = unit_factor("pixel size", _unescaped(unit), "m")
-        return None if metres is None else metres * resolution.value[1] / resolution.value[0]
 
     def _ome(self, image: Any) -> None:
         """Take times and sizes of OME, whose units are micrometres and seconds unless stated."""
         pixels = (image[0] if isinstance(image, list) else image)["Pixels"]
-        sizes = {}
+        sizes = []
         for axis in "YX":
             size, unit = pixels.get(f"PhysicalSize{axis}"), _unescaped(pixels.get(f"PhysicalSize{axis}Unit", "um"))
             metres = unit_factor("pixel size", unit, "m")
-            sizes[axis] = None if not size or metres is None else float(size) * metres
-        self.pixel_size, self.pixel_width = sizes["Y"] or sizes["X"], sizes["X"] or sizes["Y"]
+            sizes.append(None if not size or metres is None else float(size) * metres)
+        self.pixel_size, self.pixel_width = sizes[0] or sizes[1], sizes[1] or sizes[0]
         rates: dict[str, float] = {}
         if step := pixels.get("TimeIncrement"):
             unit = str(pixels.get("TimeIncrementUnit", "s"))
@@ -285,14 +283,10 @@ class TiffSource(FrameSource):
     def _page(self, index: int) -> NDArray[Any]:
         if self._stack is not None:
             return grey_of(self._stack[index]) if self._colors else self._stack[index]
-        try:
+        with _reading(f"{self.path}: page {index} cannot be read"):
             page = self._file.pages[index]
             _refuse_picture(self.path, page.shape)
             image = page.asarray()
-        except InputError:
-            raise
-        except Exception as error:  # a damaged page makes tifffile raise many kinds
-            raise InputError(f"{self.path}: page {index} cannot be read ({error})") from None
         if image.shape[:2] != self.shape or (image.ndim == 3) != self._colors:
             raise InputError(f"{self.path}: page {index} is of shape {image.shape}, not {self.shape}")
         return grey_of(image) if self._colors else image
@@ -323,32 +317,28 @@ class ArraySource(FrameSource):
         self._file: Any = None
         self._rates: dict[str, float] = {}
         self._times: list[NDArray[np.float64]] = []
-        try:
-            self._stack = self._open(dataset)
-        except InputError:
-            self.close()
-            raise
-        except Exception as error:  # a damaged file makes both libraries raise many kinds
-            self.close()
-            raise InputError(f"{path}: cannot be read as a stack of pictures ({error})") from None
-        shape, dtype = self._stack.shape, self._stack.dtype
-        if not _are_pictures(shape, dtype, 1):
-            self.close()
-            raise InputError(
-                f"{path}: an array of shape {shape} and type {dtype}: must be (frames, height, width), or with 3 "
-                "colours last, of unsigned integers of 8 or 16 bits or floating point numbers"
-            )
-        _refuse_picture(path, shape[1:])
-        self.shape = (int(shape[1]), int(shape[2]))
-        self.numbers = np.arange(shape[0])
-        if self._times and shape[0] > 2:
-            self.numbers, step = numbers_of_stamps(path, self._times[0], 0.0)
-            self._rates["times of the frames"] = 1.0 / step
-        self.state_rate(self._rates)
-        self._colors = len(shape) == 4
-        if self._colors:
-            self.tell_colour(shape[3])
-        self.take_type(dtype)
+        with ExitStack() as opened:
+            opened.callback(self.close)
+            with _reading(f"{path}: cannot be read as a stack of pictures"):
+                self._stack = self._open(dataset)
+            shape, dtype = self._stack.shape, self._stack.dtype
+            if not _are_pictures(shape, dtype, 1):
+                raise InputError(
+                    f"{path}: an array of shape {shape} and type {dtype}: must be (frames, height, width), or with 3 "
+                    "colours last, of unsigned integers of 8 or 16 bits or floating point numbers"
+                )
+            _refuse_picture(path, shape[1:])
+            self.shape = (int(shape[1]), int(shape[2]))
+            self.numbers = np.arange(shape[0])
+            if self._times and shape[0] > 2:
+                self.numbers, step = numbers_of_stamps(path, self._times[0], 0.0)
+                self._rates["times of the frames"] = 1.0 / step
+            self.state_rate(self._rates)
+            self._colors = len(shape) == 4
+            if self._colors:
+                self.tell_colour(shape[3])
+            self.take_type(dtype)
+            opened.pop_all()
 
     def _open(self, dataset: str) -> Any:
         if self.path.suffix.lower() == ".npy":
@@ -357,19 +347,14 @@ class ArraySource(FrameSource):
         self._file = open_hdf5(self.path, in_parts=True)
         arrays = members_of(self._file)[1]
         found = {name: item for name, item in arrays.items() if _are_pictures(item.shape, item.dtype, 1)}
-        if dataset:
-            if dataset not in found:
-                raise InputError(
-                    f"{self.path}: holds no stack {dataset!r}; its stacks are {', '.join(found) or 'none'}"
-                )
-            chosen = dataset
-        elif len(found) == 1:
-            chosen = next(iter(found))
-        else:
+        names = ", ".join(found) or "none"
+        if dataset and dataset not in found:
+            raise InputError(f"{self.path}: holds no stack {dataset!r}; its stacks are {names}")
+        if not dataset and len(found) != 1:
             raise InputError(
-                f"{self.path}: holds {len(found)} stacks of pictures ({', '.join(found) or 'none'}); name one as in "
-                f"{self.path.name}::name"
+                f"{self.path}: holds {len(found)} stacks of pictures ({names}); name one as in {self.path.name}::name"
             )
+        chosen = dataset or names
         levels = (found[chosen].attrs, found[chosen].parent.attrs, self._file.attrs)
         self._rates = self._attributes(levels, _RATES)
         sizes = self._attributes(levels, _SIZES)
@@ -422,14 +407,9 @@ def take_header(source: FrameSource, header: CameraHeader) -> None:
     source.pixel_size, source.pixel_size_hint = header.pixel_size, header.scale_hint
     source.exposure = header.exposure
     source.diagnostics = (*header.diagnostics, *source.diagnostics)
-    source.metadata = {
-        "format": "Photron mraw" if not header.image_suffix else f"Photron header of {header.image_suffix} images",
-        "date": header.recorded,
-        **{
-            name: getattr(header, name)
-            for name in ("camera", "comment", "record_rate", "skip", "stored_bits", "effective_bits")
-        },
-    }
+    names = ("camera", "comment", "record_rate", "skip", "stored_bits", "effective_bits")
+    kind = "Photron mraw" if not header.image_suffix else f"Photron header of {header.image_suffix} images"
+    source.metadata = {"format": kind, "date": header.recorded} | {name: getattr(header, name) for name in names}
 
 
 class PhotronSource(FrameSource):
@@ -460,10 +440,7 @@ class PhotronSource(FrameSource):
 
 
 def _mosaic(frame: NDArray[Any]) -> tuple[NDArray[np.float64] | None, float]:
-    """Gains (2, 2) that bring the four kinds of pixels to one mean, and how far apart they are.
-
-    None for pixels that are all of one kind.
-    """
+    """Gains (2, 2) that bring the four kinds of pixels to one mean, None if all are alike, and their spread."""
     height, width = (size - size % 2 for size in frame.shape)
     kinds = frame[:height, :width].astype(np.float64).reshape(height // 2, 2, width // 2, 2).mean((0, 2))
     if not kinds.min() > 0.0:
@@ -519,8 +496,7 @@ def images_of_header(header: CameraHeader) -> FrameSource:
     Those whose names begin with the header's; where there are none, all of that kind in its folder.
     """
     folder = header.path.parent
-    kinds = (".tif", ".tiff") if header.image_suffix == ".tif" else (header.image_suffix,)
-    kinds = (".jpg", ".jpeg") if header.image_suffix == ".jpg" else kinds
+    kinds = {".tif": TIFF_SUFFIXES, ".jpg": _JPEG}.get(header.image_suffix, (header.image_suffix,))
     beside = sorted(one for one in folder.iterdir() if one.suffix.lower() in kinds)
     own = [one for one in beside if one.name.startswith(header.path.stem)] or beside
     if not own:
@@ -574,7 +550,7 @@ class ImageSource(FrameSource):
         self.shape, self._dtype = (first.shape[0], first.shape[1]), first.dtype
         self.take_type(first.dtype)
         self.metadata = {"format": "numbered images", "first_number": order[0]}
-        if any(one.suffix.lower() in (".jpg", ".jpeg") for one in self._files):
+        if any(one.suffix.lower() in _JPEG for one in self._files):
             self.tell_lossy()
 
     def _load(self, index: int) -> NDArray[Any]:
@@ -604,6 +580,7 @@ def _lossless_h264(context: Any) -> bool:
 
 
 _CURVE, _KNEE = 1.09929682680944, 0.018053968510807  # of ITU-R BT.709
+_EXPORT = "export it as an uncompressed AVI or as 16-bit TIFF images, and give frame_rate (--frame-rate)"
 
 
 def _light_of_packed(path: Path, bits: int) -> NDArray[np.uint16]:
@@ -614,10 +591,7 @@ def _light_of_packed(path: Path, bits: int) -> NDArray[np.uint16]:
     is not ours.
     """
     if bits != 10:
-        raise InputError(
-            f"{path}: packed pixels of {bits} bits: must be of 10 bits; export it as an uncompressed AVI or as 16-bit "
-            "TIFF images, and give frame_rate (--frame-rate)"
-        )
+        raise InputError(f"{path}: packed pixels of {bits} bits: must be of 10 bits; {_EXPORT}")
     signal = (np.arange(1024) - 64) / 950
     bright = ((np.maximum(signal, 0.0) + _CURVE - 1.0) / _CURVE) ** (1.0 / 0.45)
     light = 64 + 4000 * np.where(signal < 4.5 * _KNEE, signal / 4.5, bright)
@@ -671,11 +645,7 @@ class VideoSource(FrameSource):
                 name = stream.codec_context.pix_fmt or ""
                 self.shape = (stream.codec_context.height, stream.codec_context.width)
         except (av.error.FFmpegError, OSError) as error:
-            way_out = ""
-            if path.suffix.lower() == ".cine":
-                way_out = (
-                    "; export it as an uncompressed AVI or as 16-bit TIFF images, and give frame_rate (--frame-rate)"
-                )
+            way_out = f"; {_EXPORT}" if path.suffix.lower() == ".cine" else ""
             raise InputError(f"{path}: cannot be read as a video ({error}){way_out}") from None
         if count == 0 or 0 in self.shape:
             raise InputError(f"{path}: the video holds no frame")
@@ -732,37 +702,28 @@ class VideoSource(FrameSource):
         self._decoder = None
 
 
-# The source for a path, chosen by its suffix.
-
-
 def open_source(path: Path) -> FrameSource:
-    """The source for a path."""
+    """The source for a path, chosen by its suffix."""
     with needing(f"{path}: reading it", "lab"):
-        return _open_source(path)
-
-
-def _open_source(path: Path) -> FrameSource:
-    if path.is_dir() or any(mark in path.name for mark in "*?["):
-        return ImageSource(path)
-    name, _, dataset = str(path).partition("::")  # a dataset's name may hold "/"
-    path = path if path.exists() else Path(name)
-    dataset, suffix = dataset.replace("\\", "/"), path.suffix.lower()
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if suffix == ".mraw":
-        headers = [path.with_suffix(one) for one in (".cihx", ".cih") if path.with_suffix(one).exists()]
-        if not headers:
-            raise InputError(f"{path}: its header {path.stem}.cihx or {path.stem}.cih is not beside it")
-        path, suffix = headers[0], headers[0].suffix.lower()
-    if suffix in (".cih", ".cihx"):
-        header = read_header(path)
-        return images_of_header(header) if header.image_suffix else PhotronSource(header)
-    if suffix in VIDEO_SUFFIXES:
-        return VideoSource(path)
-    if suffix in TIFF_SUFFIXES:
-        return TiffSource(path)
-    if suffix in ARRAY_SUFFIXES:
-        return ArraySource(path, dataset)
+        if path.is_dir() or any(mark in path.name for mark in "*?["):
+            return ImageSource(path)
+        name, _, dataset = str(path).partition("::")  # a dataset's name may hold "/"
+        path = path if path.exists() else Path(name)
+        dataset, suffix = dataset.replace("\\", "/"), path.suffix.lower()
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+        if suffix == ".mraw":
+            headers = [path.with_suffix(one) for one in (".cihx", ".cih") if path.with_suffix(one).exists()]
+            if not headers:
+                raise InputError(f"{path}: its header {path.stem}.cihx or {path.stem}.cih is not beside it")
+            path, suffix = headers[0], headers[0].suffix.lower()
+        if suffix in (".cih", ".cihx"):
+            header = read_header(path)
+            return images_of_header(header) if header.image_suffix else PhotronSource(header)
+        if suffix in ARRAY_SUFFIXES:
+            return ArraySource(path, dataset)
+        if suffix in (*VIDEO_SUFFIXES, *TIFF_SUFFIXES):
+            return VideoSource(path) if suffix in VIDEO_SUFFIXES else TiffSource(path)
     raise InputError(
         f"{path}: unknown kind of recording; known are {', '.join(RECORDING_SUFFIXES)}, a folder of numbered images "
         "or a pattern such as 'test_*.png'"

@@ -70,26 +70,18 @@ class HeaderFields:
         """Return the error for a field that cannot be used."""
         return InputError(f"{self.path}: field {self.name(key)!r} {why}")
 
-    def text(self, key: str, default: str | None = None) -> str:
+    def text(self, key: str, default: str = "") -> str:
         """Return a field as text."""
-        value = self.values.get(self.name(key))
-        if value is None or value == "":
-            if default is None:
-                raise self.error(key, "is missing")
-            return default
-        return value
+        return self.values.get(self.name(key)) or default
 
     def number(self, key: str) -> float | None:
         """Return a field as a number; None if it is absent."""
-        raw = self.text(key, "")
+        raw = self.text(key)
         if raw == "":
             return None
         try:
-            if "/" in raw:
-                above, below = raw.split("/", 1)
-                value = float(above) / float(below)
-            else:
-                value = float(raw)
+            above, _, below = raw.partition("/")
+            value = float(above) / float(below) if "/" in raw else float(raw)
         except (ValueError, ZeroDivisionError):
             raise self.error(key, f"= {raw!r} is not a number") from None
         if not math.isfinite(value):
@@ -120,19 +112,14 @@ def read_fields(path: Path) -> HeaderFields:
     kind = path.suffix.lower()
     if kind not in (".cih", ".cihx"):
         raise InputError(f"{path}: a Photron header ends in .cih or .cihx")
-    raw = input_bytes("path", path)
-    if kind == ".cih":
-        return HeaderFields(path, _lines(path, raw), xml=False)
-    return HeaderFields(path, _tags(path, raw), xml=True)
+    values = (_lines if kind == ".cih" else _tags)(path, input_bytes("path", path))
+    return HeaderFields(path, values, xml=kind == ".cihx")
 
 
 def _lines(path: Path, raw: bytes) -> dict[str, str]:
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        text = raw.decode("utf-16", errors="replace")
-    else:
-        text = raw.decode("utf-8-sig", errors="replace")
+    wide = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
     values: dict[str, str] = {}
-    for line in text.splitlines():
+    for line in raw.decode("utf-16" if wide else "utf-8-sig", errors="replace").splitlines():
         match = re.match(r"\s*([^#:][^:]*?)\s*:\s?(.*)$", line)
         if match:  # the first of two fields of one name is the camera's own
             values.setdefault(match.group(1), match.group(2).strip())
@@ -171,7 +158,6 @@ def read_timing(fields: HeaderFields, frames: int) -> dict[str, Any]:
     skip = fields.integer("skip", 1, 2**40, default=1)
     recorded = fields.integer("recorded", 0, 2**50, default=0)
     question = ""
-    frame_rate = None if rate is None else rate / skip
     if rate is not None and skip > 1 and recorded > 0 and abs(math.ceil(recorded / skip) - frames) > 1:
         question = (
             f"the header contradicts itself: every {skip}th of {recorded} recorded frames would be "
@@ -179,19 +165,16 @@ def read_timing(fields: HeaderFields, frames: int) -> dict[str, Any]:
             f"{rate:g} Hz if no frame was left out, {rate / skip:g} Hz if every {skip}th was kept"
         )
         if frames < recorded:
-            step = recorded / frames
-            question += f", {rate / step:g} Hz if these {frames} are spread over all {recorded}"
-        frame_rate = None
-    if rate == 1.0 and "Generated sequence" in fields.text("comment", ""):
+            question += f", {rate / (recorded / frames):g} Hz if these {frames} are spread over all {recorded}"
+    if rate == 1.0 and "Generated sequence" in fields.text("comment"):
         question = (
             "the file was made by a program that writes 1 frame per second where it is not told "
             "another rate; give frame_rate (--frame-rate) in Hz"
         )
-        frame_rate = None
     exposure, diagnostics = _exposure(fields, rate)
     return {
-        "record_rate": rate, "skip": skip, "frame_rate": frame_rate, "question": question, "exposure": exposure,
-        "diagnostics": (*diagnostics, *_curve(fields)),
+        "record_rate": rate, "skip": skip, "frame_rate": None if rate is None or question else rate / skip,
+        "question": question, "exposure": exposure, "diagnostics": (*diagnostics, *_curve(fields)),
     }  # fmt: skip
 
 
@@ -231,13 +214,12 @@ _IMAGES = {"png": ".png", "tiff": ".tif", "tif": ".tif", "bmp": ".bmp", "jpeg": 
 class CameraHeader:
     """Content of a .cih or .cihx header.
 
-    ``record_rate`` [Hz] is the camera's, ``skip`` the step between saved frames; ``frame_rate`` [Hz] that of the saved
-    frames, None where it is missing or the header contradicts itself, which ``question`` then tells; ``exposure`` [s]
-    or None.  ``pixel_size`` [m] is None where the header does not hold it, and ``scale_hint`` says what it holds instead.  ``stored_bits`` is the size of a pixel in the file and
-    ``effective_bits`` how many of them carry the image, on the ``effective_side`` of the stored number;
-    ``raw_colors`` says that the pixels may lie under a mosaic of colour filters.  ``image_suffix`` is that of
-    the numbered images that hold the pixels, empty for a .mraw file.
-    ``recorded`` is date and time of the recording as the header states them.
+    ``record_rate`` [Hz] is the camera's, ``skip`` the step between saved frames; ``frame_rate`` [Hz] that of the
+    saved frames, None where it is missing or the header contradicts itself, which ``question`` then tells.
+    ``pixel_size`` [m] is None where the header does not hold it, and ``scale_hint`` says what it holds instead.
+    ``effective_bits`` of the ``stored_bits`` of a pixel carry the image, on the ``effective_side``; ``raw_colors``
+    says that pixels may lie under a mosaic of colour filters.  ``image_suffix`` is that of numbered images with the
+    pixels, empty for a .mraw file.
     """
 
     path: Path
@@ -264,11 +246,8 @@ class CameraHeader:
     @property
     def mraw(self) -> Path:
         """The file with the pixels."""
-        for suffix in (".mraw", ".MRAW", ".Mraw"):
-            candidate = self.path.with_suffix(suffix)
-            if candidate.exists():
-                return candidate
-        return self.path.with_suffix(".mraw")
+        named = [self.path.with_suffix(suffix) for suffix in (".mraw", ".MRAW", ".Mraw")]
+        return next((one for one in named if one.exists()), named[0])
 
     @property
     def max_value(self) -> int:
@@ -280,15 +259,13 @@ def read_header(path: str | Path) -> CameraHeader:
     """Read and check a Photron header, ``.cih`` or ``.cihx``."""
     fields = read_fields(Path(path))
     kind = fields.text("format", "mraw").lower()
-    if kind != "mraw" and kind not in _IMAGES:
-        raise fields.error(
-            "format", f"= {fields.text('format')!r}: must be MRaw, PNG, TIFF, BMP or JPEG; save it as one of these"
-        )
     color = fields.text("color", "Mono").lower()
-    if color not in ("mono", "raw"):
-        raise fields.error(
-            "color", f"= {fields.text('color')!r}: must be Mono or Raw; save the recording in grey levels"
-        )
+    for key, sound, allowed in (
+        ("format", kind == "mraw" or kind in _IMAGES, "MRaw, PNG, TIFF, BMP or JPEG; save it as one of these"),
+        ("color", color in ("mono", "raw"), "Mono or Raw; save the recording in grey levels"),
+    ):
+        if not sound:
+            raise fields.error(key, f"= {fields.text(key)!r}: must be {allowed}")
     stored, effective, side = _bits(fields, "" if kind == "mraw" else kind)
     frames = fields.integer("frame_count", 1, 2**40)
     header = CameraHeader(
@@ -303,9 +280,9 @@ def read_header(path: str | Path) -> CameraHeader:
         effective_side=side,
         raw_colors=color == "raw",
         image_suffix=_IMAGES.get(kind, ""),
-        camera=fields.text("camera", ""),
-        comment=fields.text("comment", ""),
-        recorded=f"{fields.text('date', '')} {fields.text('time', '')}".strip(),
+        camera=fields.text("camera"),
+        comment=fields.text("comment"),
+        recorded=f"{fields.text('date')} {fields.text('time')}".strip(),
         **read_timing(fields, frames),
     )
     if stored == 12 and not header.image_suffix and header.width * header.height % 2:
@@ -336,7 +313,7 @@ def _bits(fields: HeaderFields, images: str) -> tuple[int, int, str]:
 
 def _pixel_size(fields: HeaderFields) -> float | None:
     """Metres per pixel from the calibration block, where its unit is a length."""
-    factor = unit_factor("pixel", fields.text("unit", "").lower() if fields.xml else "", "m")
+    factor = unit_factor("pixel", fields.text("unit").lower() if fields.xml else "", "m")
     size = None if factor is None else fields.positive("pixel")
     return None if factor is None or size is None else size * factor
 
@@ -381,16 +358,12 @@ def check_pixels(header: CameraHeader) -> None:
 
 
 def unpack_12bit(packed: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Unpack 12-bit pixels, two in three bytes with the most significant bits first.
-
-    ``packed`` is a flat array of bytes whose length is a multiple of three.
-    """
+    """Unpack 12-bit pixels of a flat array, two in three bytes with the most significant bits first."""
     whole = np.ascontiguousarray(packed)
     count = whole.size // 3
-    # numbers of 16 bits, the first byte the higher, from every third byte and from the one behind it
-    first = np.ndarray(count, dtype=">u2", buffer=whole, offset=0, strides=(3,))
-    second = np.ndarray(count, dtype=">u2", buffer=whole, offset=1, strides=(3,))
     pixels = np.empty((count, 2), dtype=np.uint16)
+    # numbers of 16 bits, the first byte the higher, from every third byte and from the one behind it
+    first, second = (np.ndarray(count, dtype=">u2", buffer=whole, offset=at, strides=(3,)) for at in (0, 1))
     np.right_shift(first, 4, out=pixels[:, 0])
     np.bitwise_and(second, 0x0FFF, out=pixels[:, 1])
     return pixels.reshape(-1)
@@ -418,17 +391,13 @@ def read_mraw(
             for frame in range(count):
                 first = ((start + frame) * height + rows[0]) * width
                 last = first + wanted * width
-                head = first % 2 if bits == 12 else 0
-                tail = last % 2 if bits == 12 else 0
+                head, tail = (first % 2, last % 2) if bits == 12 else (0, 0)  # pixels of a pair that begins before
+                size = (last + tail - first + head) * bits // 8
                 file.seek((first - head) * bits // 8)
-                raw = np.frombuffer(file.read((last + tail - first + head) * bits // 8), dtype=np.uint8)
-                if raw.size * 8 != (last + tail - first + head) * bits:
+                raw = np.frombuffer(file.read(size), dtype=np.uint8)
+                if raw.size != size:
                     raise InputError(f"{header.mraw}: ends inside frame {start + frame}")
-                pixels: NDArray[Any]
-                if bits == 12:
-                    pixels = unpack_12bit(raw)[head : head + wanted * width]
-                else:
-                    pixels = raw.view("<u2") if bits == 16 else raw
+                pixels = unpack_12bit(raw)[head : head + wanted * width] if bits == 12 else raw.view(f"<u{bits // 8}")
                 out[frame] = pixels.reshape(wanted, width)
     except OSError as error:
         raise InputError(f"{header.mraw}: cannot be read ({error.strerror})") from None
@@ -440,21 +409,11 @@ def read_mraw(
 def frame_bytes(frames: Iterable[NDArray[np.integer]], bits: int) -> Iterable[bytes]:
     """The bytes of each frame as they stand in a .mraw file of 8, 12 or 16 bits."""
     for frame in frames:
-        if bits == 12:
-            yield pack_12bit(frame.astype(np.uint16)).tobytes()
-        else:
-            yield frame.astype("<u2" if bits == 16 else np.uint8).tobytes()
+        yield (pack_12bit(frame.astype(np.uint16)) if bits == 12 else frame.astype(f"<u{bits // 8}")).tobytes()
 
 
 # ----------------------------------------------------------------------------------------------------
 # Headers of Photron recordings, written.
-
-
-def _element(parent: ET.Element, tags: str, text: Any) -> None:
-    for tag in tags.split("/"):
-        found = parent.find(tag)
-        parent = ET.SubElement(parent, tag) if found is None else found
-    parent.text = str(text)
 
 
 def header_text(kind: str, values: Mapping[str, Any], pixel_size: float) -> bytes:
@@ -469,15 +428,16 @@ def header_text(kind: str, values: Mapping[str, Any], pixel_size: float) -> byte
         **{key: values[key] for key in values if key != "exposure"},
     }
     if kind == ".cih":
-        lines = ["#Camera Information Header"]
-        lines += [f"{names[0]} : {known[key]}" for key, (names, _) in NAMES.items() if names and key in known]
-        lines.append("")
-        return "\n".join(lines).encode("utf-8")
+        lines = [f"{names[0]} : {known[key]}\n" for key, (names, _) in NAMES.items() if names and key in known]
+        return "".join(["#Camera Information Header\n", *lines]).encode("utf-8")
+    known |= {"unit": "um", "pixel": repr(round(pixel_size * 1e6, 9))}
     root = ET.Element("cih")
     for key, (_, tags) in NAMES.items():
         if key in known and tags:
-            _element(root, tags, known[key])
-    _element(root, "plugin/calibration/distanceUnit", "um")
-    _element(root, "plugin/calibration/sizeOfPixel", repr(round(pixel_size * 1e6, 9)))
+            at = root
+            for tag in tags.split("/"):
+                found = at.find(tag)
+                at = ET.SubElement(at, tag) if found is None else found
+            at.text = str(known[key])
     ET.indent(root)
     return b"<?xml version='1.0' encoding='UTF-8'?>\n" + ET.tostring(root, encoding="utf-8") + b"\n"

@@ -15,10 +15,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import make_interp_spline
 
 from snapbeam.lab.camera import write_photron, write_video
 from snapbeam.lab.signals import make_signal
@@ -48,6 +49,13 @@ if TYPE_CHECKING:
 CELLS_PER_PIXEL = 4  # cells to a pixel, each way
 FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frames", "hidden_frames")
 _FINE = 8  # rows of light drawn for a row of pixels
+
+
+def _noise(snr_db: float, level: float) -> float:
+    """Standard deviation of the noise below a *level*, none at an infinite ratio."""
+    if isinstance(snr_db, float) and snr_db == math.inf:
+        return 0.0
+    return float(level / 10.0 ** (within("snr_db", snr_db, -20.0, 200.0, closed="both", unit="dB") / 20.0))
 
 
 @dataclass(frozen=True)
@@ -80,21 +88,19 @@ class SyntheticCamera:
     def __post_init__(self) -> None:
         rate = positive("frame_rate", self.frame_rate, "Hz")
         positive("pixel_size", self.pixel_size, "m")
-        for name in ("shape", "light"):
-            if not isinstance(getattr(self, name), (tuple, list)) or len(getattr(self, name)) != 2:
-                raise InputError(f"{name} = {shown(getattr(self, name))}: must be a pair of numbers")
-        for name, value in zip(("shape[0]", "shape[1]"), self.shape, strict=True):
-            integer(name, value, 16, 8192)
+        for name, pair in (("shape", self.shape), ("light", self.light)):
+            if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+                raise InputError(f"{name} = {shown(pair)}: must be a pair of numbers")
         exposure = 0.5 / rate if self.exposure is None else self.exposure
         exposure = within("exposure", exposure, 0.0, 1.0 / rate * (1 + 1e-9), closed="right", unit="s")
         object.__setattr__(self, "exposure", exposure)
         integer("bit_depth", self.bit_depth, 8, 16)
-        if not (isinstance(self.snr_db, float) and math.isinf(self.snr_db) and self.snr_db > 0.0):
-            within("snr_db", self.snr_db, -20.0, 200.0, closed="both", unit="dB")
+        _noise(self.snr_db, 1.0)
         choice("lens", self.lens, ("gaussian", "disk"))
         within("blur", self.blur, 0.0, 20.0, closed="left", unit="px")
-        for name, change in zip(("light[0]", "light[1]"), self.light, strict=True):
-            within(name, change, -1.0, 1.0)
+        for i in (0, 1):
+            integer(f"shape[{i}]", self.shape[i], 16, 8192)
+            within(f"light[{i}]", self.light[i], -1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -138,22 +144,20 @@ class SyntheticStage:
 
 
 # Every shape covers an exact share of each cell of a grid four times finer than the pixels, averaged over the
-# exposure; the cells are spread by the lens and summed into pixels.  Nothing here knows
-# of error functions, so a tracker that fits them is not tested against itself.
+# exposure; the cells are spread by the lens and summed into pixels.  Nothing here knows of error functions, so a
+# tracker that fits them is not tested against itself.
 
 
 def covered(rows: Floats, height: int) -> Floats:
     """Change of coverage by cell, shape (height, columns), by what lies below *rows* (instants, columns; cells from the top)."""
-    inside = np.maximum(rows, 0.0)
-    columns, at = rows.shape[-1], np.floor(inside).astype(np.int64)
+    inside, columns = np.maximum(rows, 0.0), rows.shape[-1]
+    at = np.floor(inside).astype(np.int64)
     share = at + 1.0 - inside
-    # what lies below the last row is counted in one more, which is left out
-    place = np.clip(np.stack([at, at + 1]), 0, height) * columns + np.arange(columns)
-    sums = [
-        np.bincount(k.ravel(), part.ravel(), (height + 1) * columns)
-        for k, part in zip(place, (share, 1.0 - share), strict=True)
-    ]
-    return np.asarray(np.add(*sums).reshape(height + 1, columns)[:height] / len(rows), dtype=np.float64)
+    total = np.zeros((height + 1) * columns)  # what lies below the last row is counted in one more, which is left out
+    for k, part in ((at, share), (at + 1, 1.0 - share)):
+        place = np.clip(k, 0, height) * columns + np.arange(columns)
+        total += np.bincount(place.ravel(), part.ravel(), total.size)
+    return np.asarray(total.reshape(height + 1, columns)[:height] / len(rows), dtype=np.float64)
 
 
 @functools.cache
@@ -194,9 +198,8 @@ class Picture:
         self.grain: NDArray[np.float32] | None = None
         if texture:
             raw = np.random.default_rng([seed, 7]).standard_normal((2 * self.rows, columns)).astype(np.float32)
-            self.grain = 1.0 + 3.0 * CELLS_PER_PIXEL * texture * cv2.blur(
-                raw, (3 * CELLS_PER_PIXEL, 3 * CELLS_PER_PIXEL)
-            )
+            size = 3 * CELLS_PER_PIXEL
+            self.grain = 1.0 + 3.0 * CELLS_PER_PIXEL * texture * cv2.blur(raw, (size, size))
 
     def draw(self, beam: Floats, tip: Floats, *, blurred: bool) -> NDArray[np.float32]:
         """Light of one exposure without noise; rows of beam and tip as for :func:`render_recording`."""
@@ -204,23 +207,19 @@ class Picture:
 
         stage, rows = self.stage, self.rows
         # row r of a pixel's centre is the cell border (r + 1/2 + margin) CELLS_PER_PIXEL
-        far, top = (
-            (row + 0.5 + self.margin) * CELLS_PER_PIXEL + sign * self.thickness
-            for row, sign in ((beam, -0.5), (tip, 0.5))
-        )
-        beam_rows = far[:, None] + self.slope
+        far = (beam + 0.5 + self.margin) * CELLS_PER_PIXEL - 0.5 * self.thickness
+        top = (tip + 0.5 + self.margin) * CELLS_PER_PIXEL + 0.5 * self.thickness
+        beam_rows, tips = far[:, None] + self.slope, top[:, None]
         light = (stage.beam - stage.background) * (covered(beam_rows, rows) - covered(beam_rows + self.thickness, rows))
         rod = np.zeros_like(light)
         seen = np.flatnonzero(self.rod)
         if seen.size:
-            near, tips = beam_rows[:, seen] + self.thickness, top[:, None]
-            change = (stage.shaker - stage.background) * covered(np.maximum(tips + self.profile[seen], near), rows)
-            if stage.marker_thickness > 0.0:
-                change += (stage.marker - stage.shaker) * (
-                    covered(np.maximum(tips + self.upper, near), rows)
-                    - covered(np.maximum(tips + self.lower, near), rows)
-                )
-            rod[:, seen] = self.rod[seen] * change
+            below, upper, lower = (
+                covered(np.maximum(tips + from_tip, beam_rows[:, seen] + self.thickness), rows)
+                for from_tip in (self.profile[seen], self.upper, self.lower)
+            )
+            mark = (stage.marker - stage.shaker) * (upper - lower)
+            rod[:, seen] = self.rod[seen] * ((stage.shaker - stage.background) * below + mark)
         layers = [np.cumsum(layer, axis=0).astype(np.float32) for layer in (light, rod)]
         if self.grain is not None:  # which moves with what it is on
             for layer, rows_of in zip(layers, (far, top), strict=True):
@@ -329,15 +328,12 @@ def read_out(
 ) -> NDArray[np.uint16]:
     """Grey levels of a picture of *light* (shares of full scale)."""
     light = light * np.float32(defects.gain)
-    if math.isfinite(camera.snr_db):
-        noise = abs(stage.beam - stage.background) / 10.0 ** (camera.snr_db / 20.0)
+    if noise := _noise(camera.snr_db, abs(stage.beam - stage.background)):
         light = light + np.float32(noise) * rng.standard_normal(light.shape, dtype=np.float32)
     if defects.shot:
         root = np.sqrt(np.clip(light, 0.0, None))
         light = light + np.float32(defects.shot) * root * rng.standard_normal(light.shape, dtype=np.float32)
-    level = np.clip(light, 0.0, 1.0)
-    if defects.gamma != 1.0:
-        level = level ** np.float32(defects.gamma)
+    level = np.clip(light, 0.0, 1.0) ** np.float32(defects.gamma)
     return np.asarray(np.rint(level * (2**camera.bit_depth - 1)), dtype=np.uint16)
 
 
@@ -353,7 +349,9 @@ class SyntheticRecording:
     stage: SyntheticStage
     defects: Defects
     truth: xr.Dataset
-    instants: _Instants = field(repr=False)
+    motion: tuple[Floats, Floats, Floats] = field(
+        repr=False
+    )  # instants [s], beam and tip towards the shaker's push [m]
     seed: int
 
     def __post_init__(self) -> None:
@@ -378,7 +376,7 @@ class SyntheticRecording:
     def _light(self, index: int) -> NDArray[np.float32]:
         """Light of one frame on the sensor, shares of full scale, shaker below."""
         defects, shape = self.defects, self._picture
-        beam, tip = self.instants.rows(index)
+        beam, tip = self._rows(index)
         shift = defects.drift * index / max(len(self) - 1, 1)
         if index in self._spoiled["hidden"]:
             beam = beam - 10.0 * shape.height
@@ -398,9 +396,20 @@ class SyntheticRecording:
             light = light * np.float32(1.0 + defects.flicker * math.sin(turn))
         return light
 
+    def _rows(self, index: int) -> list[Floats]:
+        """Rows of the beam's middle and of the tip less half a thickness, at instants of one exposure."""
+        size, exposure = self.camera.pixel_size, float(self.camera.exposure or 0.0)
+        time, *moving = self.motion
+        opened = float(time[0]) - self.truth.attrs["rest_frames"] / self.camera.frame_rate
+        opened += index / self.camera.frame_rate
+        ends = np.array([opened, opened + 0.5 * exposure, opened + exposure])
+        travel = max(np.ptp(np.interp(ends, time, values)) for values in moving) / size
+        count = int(np.clip(np.ceil(travel / 0.2), 4, 40))
+        at = opened + exposure * (np.arange(count) + 0.5) / count
+        return [self.truth.attrs["zero_row"] - np.interp(at, time, values) / size for values in moving]
+
     def __iter__(self) -> Iterator[NDArray[np.uint16]]:
-        for index in range(len(self)):
-            yield self.frame(index)
+        return (self.frame(index) for index in range(len(self)))
 
     def write(self, path: str | Path) -> Path:
         """Write the recording: ``.cihx`` (12-bit), ``.cih`` (16-bit), ``.avi`` or ``.mkv`` (8-bit).
@@ -412,63 +421,17 @@ class SyntheticRecording:
             return write_video(path, self, max_value=2**self.camera.bit_depth - 1)
         depth = self.camera.bit_depth
         stored = 8 if depth == 8 else 12 if depth <= 12 and path.suffix.lower() == ".cihx" else 16
-        return write_photron(
-            path,
-            self,
-            frame_rate=self.camera.frame_rate,
-            pixel_size=self.camera.pixel_size,
-            exposure=self.camera.exposure,
-            bit_depth=stored,
-            effective_bits=depth,
-            comment=f"synthetic, seed {self.seed}",
-        )
+        camera = self.camera
+        scales: dict[str, Any] = {name: getattr(camera, name) for name in ("frame_rate", "pixel_size", "exposure")}
+        comment = f"synthetic, seed {self.seed}"
+        return write_photron(path, self, **scales, bit_depth=stored, effective_bits=depth, comment=comment)
 
 
-class _Instants(NamedTuple):
-    """Rows of beam and tip at instants spread over each exposure, and their exact means."""
-
-    time: Floats
-    beam: Floats
-    shaker: Floats
-    camera: SyntheticCamera
-    start: float
-    zero_row: float
-
-    @property
-    def exposure(self) -> float:
-        """Shutter time [s]."""
-        return float(self.camera.exposure or 0.0)
-
-    def means(self, opened: Floats) -> tuple[Floats, Floats]:
-        """Mean displacements over the exposures that start at *opened*."""
-        closed = opened + self.exposure
-        out = []
-        for values in (self.beam, self.shaker):
-            total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(self.time))])
-            gained = self._integral(closed, values, total) - self._integral(opened, values, total)
-            out.append(gained / self.exposure)
-        return out[0], out[1]
-
-    def _integral(self, at: Floats, values: Floats, total: Floats) -> Floats:
-        """Integral of the piecewise linear motion from its first sample; at rest before, held after."""
-        inside = np.clip(at, self.time[0], self.time[-1])
-        k = np.clip(np.searchsorted(self.time, inside, side="right") - 1, 0, self.time.size - 2)
-        step = inside - self.time[k]
-        slope = (values[k + 1] - values[k]) / (self.time[k + 1] - self.time[k])
-        part = total[k] + step * (values[k] + 0.5 * slope * step)
-        part = part + np.minimum(at - self.time[0], 0.0) * values[0]
-        return part + np.maximum(at - self.time[-1], 0.0) * values[-1]
-
-    def rows(self, index: int) -> tuple[Floats, Floats]:
-        """Rows of the beam's middle and of the tip less half a thickness, at instants of one exposure."""
-        opened = self.start + index / self.camera.frame_rate
-        ends = np.array([opened, opened + 0.5 * self.exposure, opened + self.exposure])
-        size = self.camera.pixel_size
-        travel = max(np.ptp(np.interp(ends, self.time, values)) for values in (self.beam, self.shaker)) / size
-        count = int(np.clip(np.ceil(travel / 0.2), 4, 40))
-        at = opened + self.exposure * (np.arange(count) + 0.5) / count
-        beam = self.zero_row - np.interp(at, self.time, self.beam) / size
-        return beam, self.zero_row - np.interp(at, self.time, self.shaker) / size
+def _means(time: Floats, motion: Floats, opened: Floats, exposure: float) -> Floats:
+    """Means over exposures of a motion that is linear between its samples, at rest before, held after."""
+    first, last = min(time[0], opened[0]) - exposure, max(time[-1], opened[-1]) + 2.0 * exposure
+    integral = make_interp_spline([first, *time, last], np.pad(motion, 1, "edge"), 1).antiderivative()
+    return np.asarray((integral(opened + exposure) - integral(opened)) / exposure)
 
 
 def render_recording(
@@ -547,36 +510,32 @@ def render_recording(
     rest = integer("rest_frames", rest_frames, 0)
     seed = seed_of(rng)
     sign = Orientation(stage.side, camera.shape).sign
-    row = None if zero_row is None else finite("zero_row", zero_row)
-    if row is None:
-        row = _fitting_row(camera, stage, sign * beam, sign * shaker)
-    span = instants[-1] - instants[0]
-    count = rest + math.floor((span - float(camera.exposure or 0.0)) * camera.frame_rate + 1e-9) + 1
+    moving = (instants, sign * beam, sign * shaker)
+    row = _fitting_row(camera, stage, *moving[1:]) if zero_row is None else finite("zero_row", zero_row)
+    span, exposure = instants[-1] - instants[0], float(camera.exposure or 0.0)
+    count = rest + math.floor((span - exposure) * camera.frame_rate + 1e-9) + 1
     if count <= rest:
         raise InputError(f"time spans {span:g} s: must hold at least one exposure")
-    start = float(instants[0]) - rest / camera.frame_rate
-    moving = _Instants(instants, sign * beam, sign * shaker, camera, start, row)
-    means = moving.means(start + np.arange(count) / camera.frame_rate)
+    opened = float(instants[0]) + (np.arange(count) - rest) / camera.frame_rate
+    at_beam, at_tip = (_means(instants, values, opened, exposure) for values in moving[1:])
     disturbed = np.zeros(count, dtype=np.int8)
     for frames in defects.frames(count).values():
         disturbed[list(frames)] = 1
-    truth = trajectory_dataset(np.arange(count) / camera.frame_rate, attrs=_attributes(camera, stage, rest, row, seed))
-    for name, motion, long_name in (
-        ("displacement_mm", sign * means[0], "beam displacement, mean over the exposure"),
-        ("shaker_displacement_mm", sign * means[1], "shaker displacement, mean over the exposure"),
-        ("penetration_mm", means[1] - means[0], "penetration, mean over the exposure"),
+    attrs: dict[str, Any] = {
+        f"{kind}_{name}": list(value) if isinstance(value, tuple) else value
+        for kind, one in (("camera", camera), ("stage", stage))
+        for name, value in vars(one).items()
+    }
+    attrs |= {"rest_frames": rest, "zero_row": row, "seed": seed, "title": "truth of a synthetic recording"}
+    truth = trajectory_dataset(np.arange(count) / camera.frame_rate, attrs=attrs)
+    for name, motion, words in (
+        ("displacement_mm", sign * at_beam, "beam displacement"),
+        ("shaker_displacement_mm", sign * at_tip, "shaker displacement"),
+        ("penetration_mm", at_tip - at_beam, "penetration"),
     ):
-        truth[name] = ("time", 1e3 * motion, {"units": "mm", "long_name": long_name})
+        truth[name] = ("time", 1e3 * motion, {"units": "mm", "long_name": f"{words}, mean over the exposure"})
     truth["disturbed"] = ("time", disturbed, {"units": "1", "long_name": "whether the frame was spoiled"})
     return SyntheticRecording(camera, stage, defects, truth, moving, seed)
-
-
-def _attributes(camera: SyntheticCamera, stage: SyntheticStage, rest: int, row: float, seed: int) -> dict[str, Any]:
-    values = {f"camera_{name}": getattr(camera, name) for name in camera.__dataclass_fields__}
-    values |= {f"stage_{name}": getattr(stage, name) for name in stage.__dataclass_fields__}
-    plain = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
-    title = "truth of a synthetic recording"
-    return plain | {"rest_frames": rest, "zero_row": row, "seed": seed, "title": title}
 
 
 def _fitting_row(camera: SyntheticCamera, stage: SyntheticStage, beam: Floats, shaker: Floats) -> float:
@@ -647,12 +606,9 @@ def render_run(
         rng=rng,
         **options,
     )
-    for name, measured in (
-        ("displacement_at_striker", "displacement_mm"),
-        ("striker_displacement", "shaker_displacement_mm"),
-        ("penetration_normalised", "penetration_mm"),
-    ):
-        values = recording.truth[measured]
+    measured = ("displacement_mm", "shaker_displacement_mm", "penetration_mm")
+    scaled = ("displacement_at_striker", "striker_displacement", "penetration_normalised")
+    for name, values in zip(scaled, (recording.truth[one] for one in measured), strict=True):
         recording.truth[name] = ("time", values.values / (scale * 1e3), {**values.attrs, "units": "1"})
     recording.truth.attrs["buckling_level"] = scale
     return recording
@@ -714,23 +670,20 @@ def render_vibrometer(
     time_constant = nonnegative("start_up", start_up, "s")
     share = within("start_up_share", start_up_share, -1.0, 1.0, closed="both")
     second = within("distortion", distortion, 0.0, 1.0, closed="left")
-    if not (snr_db == math.inf):
-        within("snr_db", snr_db, -20.0, 200.0, closed="both", unit="dB")
+    noise = _noise(snr_db, amplitude / math.sqrt(2.0))
     seed = seed_of(rng)
-    noisy = np.random.default_rng(seed)
     time = np.arange(round(length * rate)) / rate
     since = np.maximum(time - begin, 0.0)
     envelope = 1.0 - share * np.exp(-since / time_constant) if time_constant > 0.0 else np.ones_like(since)
     angle = 2.0 * math.pi * freq * since + within("phase", phase, -1e6, 1e6, unit="rad")
     velocity = amplitude * envelope * (np.cos(angle) + second * np.cos(2.0 * angle)) * (time >= begin)
-    noise = 0.0 if snr_db == math.inf else amplitude / math.sqrt(2.0) * 10.0 ** (-snr_db / 20.0)
     truth = {
-        "true_frequency": freq,
-        "true_velocity_amplitude": amplitude,
-        "true_onset": begin,
-        "true_start_up": time_constant,
-        "true_noise": noise,
-        "seed": seed,
+        "frequency": freq,
+        "velocity_amplitude": amplitude,
+        "onset": begin,
+        "start_up": time_constant,
+        "noise": noise,
     }
-    values = velocity + noise * noisy.standard_normal(time.size)
-    return make_signal(values, "m/s", rate, name="shaker velocity", attrs=truth)
+    attrs = {f"true_{name}": value for name, value in truth.items()} | {"seed": seed}
+    values = velocity + noise * np.random.default_rng(seed).standard_normal(time.size)
+    return make_signal(values, "m/s", rate, name="shaker velocity", attrs=attrs)

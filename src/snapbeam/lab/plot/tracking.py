@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
+from snapbeam.lab.signals import stretches
 from snapbeam.lab.tracking.settings import FrameFlag, Orientation
 from snapbeam.lab.tracking.track import check_tracked, tracking_quality
 from snapbeam.plot.animation import write_mp4
@@ -146,10 +147,8 @@ def _scale_bar(axes: Any, recording: Recording, width: int, height: int) -> None
     right, row = 0.96 * width, 0.95 * height
     outline = {"facecolor": "black", "alpha": 0.55, "edgecolor": "none", "pad": 1.5}
     axes.plot([right - pixels, right], [row, row], color="white", lw=2.0, solid_capstyle="butt")
-    axes.text(
-        right, row - 0.02 * height, f"{length:g} mm", color="white", ha="right", va="bottom",
-        fontsize=6, bbox=outline,
-    )  # fmt: skip
+    place = {"ha": "right", "va": "bottom", "fontsize": 6, "bbox": outline}
+    axes.text(right, row - 0.02 * height, f"{length:g} mm", color="white", **place)
 
 
 def plot_tracking_quality(dataset: xr.Dataset) -> Figure:
@@ -180,10 +179,10 @@ def plot_tracking_quality(dataset: xr.Dataset) -> Figure:
         middle.set_ylim(bottom=0.0)
         flags = dataset["flags"].values.astype(int)
         names = list(quality["counts"])
-        for level, (flag, name) in enumerate(zip([flag for flag in FrameFlag if flag], names, strict=True)):
+        for level, flag in enumerate(one for one in FrameFlag if one):
             at = time[(flags & int(flag)) != 0]
             bottom.plot(at, np.full(at.size, level), "|", color=SHAKER_COLOR, ms=7, mew=0.8)
-            names[level] = f"{name}: {at.size}"
+            names[level] += f": {at.size}"
         bottom.set_yticks(range(len(names)), names)
         bottom.set(ylim=(len(names) - 0.4, -0.6), xlabel="time (ms)", ylabel="flags: frames")
         bottom.grid(axis="y", lw=0.3, color="0.85")
@@ -231,14 +230,11 @@ def annotated_video(
     canvas = _Canvas(recording.shape, dataset, low, max(high, low + 1.0))
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
-        done = 0
-        for batch in recording.batches(32):
-            for picture in batch:
-                if done % every == 0:
-                    yield canvas.draw(picture, int(recording.numbers[done]))
-                done += 1
+        for done, picture in enumerate(recording):
+            if done % every == 0:
+                yield canvas.draw(picture, int(recording.numbers[done]))
             if progress is not None:
-                progress(done, len(recording))
+                progress(done + 1, len(recording))
 
     with atomic_path(target) as temporary:
         write_mp4(pictures(), temporary, rate)
@@ -264,15 +260,12 @@ class _Canvas:
         values = [self.dataset[name].values for name, _ in names if name in self.dataset]
         both = np.concatenate(values)
         low, high = (np.nanmin(both), np.nanmax(both)) if np.isfinite(both).any() else (0.0, 1.0)
-        span = max(float(high - low), 1e-9)
         x = np.linspace(4, self.size[0] - 5, values[0].size)
         for line, (_, color) in zip(values, names, strict=False):
-            y = 8.0 + (_STRIP - 16.0) * (high - line) / span
-            for stretch in np.split(np.arange(line.size), np.flatnonzero(~np.isfinite(line))):
-                stretch = stretch[np.isfinite(line[stretch])]
-                if stretch.size > 1:
-                    points = np.stack([x[stretch], y[stretch]], axis=1) * 16.0
-                    cv2.polylines(strip, [np.rint(points).astype(np.int32)], False, color, 1, cv2.LINE_AA, 4)
+            y = 8.0 + (_STRIP - 16.0) * (high - line) / max(float(high - low), 1e-9)
+            points = np.stack([x, y], axis=1) * 16.0
+            runs = [np.rint(points[first:last]).astype(np.int32) for first, last in stretches(np.isfinite(line))]
+            cv2.polylines(strip, [run for run in runs if len(run) > 1], False, color, 1, cv2.LINE_AA, 4)
         return strip
 
     def draw(self, picture: NDArray[np.integer], index: int) -> NDArray[np.uint8]:

@@ -141,9 +141,8 @@ class SeenMotion:
     """Input of the diagnostics of a tracked recording, in addition to the scene.
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
-    [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video; ``order`` of the
-    frames; ``blur`` by the exposure; ``open_share``, the exposure over the time between frames, 0 if not known;
-    ``moves`` [px] of the background, 0 if it stands still.
+    [mm/px]; the largest ``drift`` [px] of the camera; ``open_share``, the exposure over the time between frames, 0 if
+    not known; ``moves`` [px] of the background, 0 if it stands still.
     """
 
     rows: TrackedRows
@@ -167,19 +166,25 @@ def tracking_diagnostics(
     *offset_mm* is the error of the rest position, *rate* that of the frames [Hz].
     """
     told = [*_of_the_beam(scene, seen), *_of_the_scale(scene, seen, settings)]
-    told += [*_of_the_rest(seen, settings, offset_mm)]
-    told += [*_of_the_motion(seen, settings, rate), *_of_the_order(seen.order, rate)]
+    told += _of_the_rest(seen, settings, offset_mm) + _of_the_motion(seen, settings, rate)
+    shape, noise, shift, order = scene.shape, scene.noise, rounding_shift(scene.beam), seen.order
+    alike = {"correlation": max(noise.along, noise.across), "factor": noise.factor, "made_px": noise.made_up}
+    lost, repeated, frames = order.missing, order.repeated, sum(order.many)
+    gaps = {"frames": frames, "places": len(lost), "first": min(lost, default=0), "short_ms": 1e3 * frames / rate}
+    clipped, bent = shape.clipped > CLIPPED, abs(shape.shift) > 0.02
+    moved = {"shift_px": 2.0 * abs(shape.shift)}
+    curve = {"gamma": settings.gamma * shape.gamma, "error": settings.gamma * shape.gamma_se, **moved}
     told += holding(
         KINDS,
+        ("frames_lost", bool(lost), gaps),
+        ("frames_repeated", bool(repeated), {"frames": len(repeated), "first": min(repeated, default=0)}),
+        *((kind, not lost, numbers) for kind, numbers in order.clock),
         ("lag", seen.blur.trail > 0.0, {"share_percent": 100.0 * seen.blur.trail}),
         ("pulse", seen.blur.pulse > 0.0, {"frames": seen.blur.pulse}),
         ("curved", seen.rows.hollow > 0.0, {"hollow_px": seen.rows.hollow}),
-    )
-    told += of_the_edges(scene.shape, settings)
-    noise, shift = scene.noise, rounding_shift(scene.beam)
-    alike = {"correlation": max(noise.along, noise.across), "factor": noise.factor, "made_px": noise.made_up}
-    told += holding(
-        KINDS,
+        ("overexposed", clipped, {"share_percent": 100.0 * shape.clipped, **moved}),
+        ("gamma", bent and not clipped, curve),
+        ("edge_shape", shape.misfit > 0.03 and not (bent or clipped), {"misfit_percent": 100.0 * shape.misfit}),
         ("interlaced", seen.fields.apart > 0.0, {"share": seen.fields.apart}),
         ("fields", seen.fields.shift > 0.0, {"shift_px": seen.fields.shift}),
         ("averaged", noise.lag > 0.0, {"correlation": noise.in_time, "lag": noise.lag}),
@@ -281,17 +286,6 @@ def _of_the_motion(seen: SeenMotion, settings: TrackingSettings, rate: float) ->
     return [KINDS["beyond"].found(told=", ".join(told))] if told else []
 
 
-def _of_the_order(order: FrameOrder, rate: float) -> list[Diagnostic]:
-    lost, repeated, frames = order.missing, order.repeated, sum(order.many)
-    numbers = {"frames": frames, "places": len(lost), "first": min(lost, default=0), "short_ms": 1e3 * frames / rate}
-    return holding(
-        KINDS,
-        ("frames_lost", bool(lost), numbers),
-        ("frames_repeated", bool(repeated), {"frames": len(repeated), "first": min(repeated, default=0)}),
-        *((kind, not lost, told) for kind, told in order.clock),
-    )
-
-
 def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float) -> list[Diagnostic]:
     if seen.rest.found:
         return []
@@ -308,48 +302,29 @@ def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float)
     return [KINDS["no_rest"].found(quiet=2 * seen.rest.indices.size, shift_mm=offset_mm)]
 
 
-def of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Diagnostic]:
-    """Return what the shape of edges says of a curve of the camera, of overexposure, or of the lens."""
-    if shape.clipped > CLIPPED:
-        return [KINDS["overexposed"].found(share_percent=100.0 * shape.clipped, shift_px=2.0 * abs(shape.shift))]
-    if abs(shape.shift) > 0.02:
-        gamma = settings.gamma * shape.gamma
-        error = settings.gamma * shape.gamma_se
-        return [KINDS["gamma"].found(gamma=gamma, error=error, shift_px=2.0 * abs(shape.shift))]
-    return holding(KINDS, ("edge_shape", shape.misfit > 0.03, {"misfit_percent": 100.0 * shape.misfit}))
-
-
 def _of_the_frames(rows: TrackedRows) -> list[Diagnostic]:
     told = []
-    count = rows.row.size
     for name, flag in (("jumps", FrameFlag.JUMP), ("distorted", FrameFlag.DISTORTED)):
-        frames = rows.flagged(flag)
-        if frames:
-            share = frames / count
+        if frames := rows.flagged(flag):
+            share = frames / rows.row.size
             severity = Severity.WARNING if share > _RARE else Severity.INFO
             told.append(KINDS[name].found(severity, frames=frames, share_percent=100.0 * share))
     share = float(np.isfinite(rows.row).mean())
-    if share < 0.9:
-        told.append(KINDS["lost"].found(share_percent=100.0 * share))
-    return told
+    return told + holding(KINDS, ("lost", share < 0.9, {"share_percent": 100.0 * share}))
 
 
 def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
     shaker = scene.shaker
     assert shaker is not None
-    told: list[Diagnostic] = []
-    gap = -seen.penetration
-    known = np.isfinite(gap)
     share = float(np.isfinite(seen.rows.shaker).mean())
-    if share < _STRIKER:
-        told.append(KINDS["striker_lost"].found(share_percent=100.0 * share))
-    if not known.any():
+    told = holding(KINDS, ("striker_lost", share < _STRIKER, {"share_percent": 100.0 * share}))
+    if not np.isfinite(seen.penetration).any():
         return told
     error = np.hypot(seen.rows.error, seen.rows.shaker_error)
     given = shaker.tip_source == "distance to the sticker as given"
     if shaker.isolated and not given and shaker.sticker is not None:
         # the sticker's own upper edge over the beam
-        nearest = float(np.nanmin(gap)) - shaker.tip_offset - 0.5 * shaker.sticker.thickness
+        nearest = -float(np.nanmax(seen.penetration)) - shaker.tip_offset - 0.5 * shaker.sticker.thickness
         told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
     closest = never_touching(seen.penetration, seen.rows)
     offset = {"depth_px": seen.touch.penetration, "error_px": seen.touch.error}

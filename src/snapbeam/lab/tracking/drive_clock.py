@@ -35,22 +35,26 @@ _SAME = 0.08  # by which their frequencies may differ
 _BLOCK = 8  # frames, for noise that is alike in neighbours
 
 
-def _filled(shaker: Floats) -> SignalSamples | None:
-    """The striker's rows over the numbers of frames, gaps by straight lines; None if there are too few."""
+def _filled(shaker: Floats) -> tuple[SignalSamples, float] | None:
+    """The striker's rows over the numbers of frames, gaps by straight lines, and their frequency; None if not told."""
     known = np.flatnonzero(np.isfinite(shaker))
     if known.size < 64 or known.size < 0.8 * shaker.size:
         return None
     frames = np.arange(shaker.size, dtype=np.float64)
-    return SignalSamples(np.interp(frames, frames[known], shaker[known]), frames, 1.0)
+    samples = SignalSamples(np.interp(frames, frames[known], shaker[known]), frames, 1.0)
+    try:
+        return samples, spectral_peak(samples)
+    except InputError:
+        return None
 
 
 def steady_striker(shaker: Floats) -> tuple[SignalSamples, SineFit] | None:
     """The steady part of the striker's rows [px], over the numbers of frames, and its sine; None if it is too short."""
-    samples = _filled(shaker)
-    if samples is None:
+    filled = _filled(shaker)
+    if filled is None:
         return None
+    samples, guess = filled
     try:
-        guess = spectral_peak(samples)
         first, last = moving_part(samples, guess)
         first = min(first + round(2.0 / guess), last)
         last = min(last, first + _MOST)
@@ -81,14 +85,10 @@ def drive_clock(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
 
 def _rate_change(shaker: Floats) -> list[tuple[str, dict[str, float]]]:
     """A frequency of the drive, counted in frames, that is another multiple from some frame on: the frame rate changed."""
-    samples = _filled(shaker)
-    if samples is None:
+    filled = _filled(shaker)
+    if filled is None:
         return []
-    values, frames, _ = samples
-    try:
-        guess = spectral_peak(samples)
-    except InputError:
-        return []
+    (values, frames, _), guess = filled
     width = max(round(_WINDOW / guess), _LEAST_WINDOW)
     if values.size < 4 * width:
         return []
@@ -123,9 +123,7 @@ def _steps(part: SignalSamples, off: Floats, noise: float, frequency: float) -> 
     turn = 2.0 * np.pi * frequency * part.time
     wave = np.column_stack([np.cos(turn), np.sin(turn)])
     since = part.time - part.time.mean()
-    slope = part.values - part.values.mean()
-    slope = wave @ lstsq(wave, slope)
-    slope = np.gradient(slope)
+    slope = np.gradient(wave @ lstsq(wave, part.values - part.values.mean()))
     begun = part.time - part.time[0]
     fading = [np.exp(-begun / (share * begun[-1]))[:, None] * wave for share in _FADING]
     base = np.linalg.qr(np.column_stack([np.ones_like(turn), wave, since * slope, *fading]))[0]

@@ -27,10 +27,9 @@ _ROOT_2PI = math.sqrt(2.0 * math.pi)
 class EdgeFit(NamedTuple):
     """Edges fitted in windows; every field has the shape of the windows without their last axis.
 
-    ``position`` is the row of the edge, counted from the middle of the window; NaN where no step of the
-    wanted sign was found inside it.  ``contrast`` is the height of the step, positive in the wanted sense.
-    ``residual`` is the standard deviation about the fit.  ``width`` is the blur [px] that would fit best, to
-    first order about the assumed one.
+    ``position`` is the row of the edge, counted from the middle of the window; NaN where no step of the wanted sign
+    was found inside it.  ``contrast`` is the height of the step, ``residual`` the standard deviation about the fit,
+    ``width`` the blur [px] that would fit best, to first order about the assumed one.
     """
 
     position: Floats
@@ -47,10 +46,9 @@ def edge_profile(offset: Floats, width: float) -> Floats:
     return s * (above - low * ndtr(low) - np.exp(-0.5 * low * low) / _ROOT_2PI)
 
 
-def _pair(data: Floats, first: NDArray[np.intp], second: NDArray[np.intp]) -> Floats:
-    """Mean of two rows of each window."""
-    both = np.take_along_axis(data, np.stack([first, second], axis=-1), axis=-1)
-    return both.mean(-1)
+def _pair(data: NDArray, first: NDArray[np.intp], second: NDArray[np.intp]) -> Floats:
+    """Mean of two values of each row."""
+    return np.asarray(np.take_along_axis(data, np.stack([first, second], axis=-1), axis=-1).mean(-1))
 
 
 def _terms(position: Floats, rows: int, width: float) -> tuple[Floats, Floats, Floats]:
@@ -137,13 +135,12 @@ def edge_noise(width: float, noise: float, contrast: float) -> float:
     return least if math.isfinite(least) else 0.0
 
 
-def masked_median(values: Floats, kept: NDArray[np.bool_]) -> Floats:
+def masked_median(values: NDArray, kept: NDArray[np.bool_]) -> Floats:
     """Median of the kept values along the last axis, NaN where none is."""
     count = kept.sum(-1)
     ordered = np.sort(np.where(kept, values, np.inf), axis=-1)
-    at = np.stack([np.maximum(count - 1, 0) // 2, np.maximum(count, 1) // 2], axis=-1)
-    middle = np.take_along_axis(ordered, np.minimum(at, values.shape[-1] - 1), axis=-1)
-    return np.where(count > 0, middle.mean(-1), np.nan)
+    middle = _pair(ordered, np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[-1] - 1))
+    return np.where(count > 0, middle, np.nan)
 
 
 def alike_columns(off: Floats, kept: NDArray[np.bool_], fitted: int) -> float:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,15 +96,11 @@ def without_repeats(rows: TrackedRows, order: FrameOrder) -> TrackedRows:
     """The rows without those of frames shown twice, which are flagged as lost."""
     if not order.repeated:
         return rows
-    at = list(order.repeated)
-    changed = {}
-    for name in ("row", "error", "slope", "shaker", "shaker_error"):
-        changed[name] = getattr(rows, name).copy()
-        changed[name][at] = np.nan
-    flags, confidence = rows.flags.copy(), rows.confidence.copy()
-    flags[at] |= np.uint16(FrameFlag.DROPPED)
-    confidence[at] = 0.0
-    return dataclasses.replace(rows, flags=flags, confidence=confidence, **changed)
+    again = np.isin(np.arange(rows.row.size), order.repeated)
+    names = ("row", "error", "slope", "shaker", "shaker_error")
+    changed: dict[str, Any] = {name: np.where(again, np.nan, getattr(rows, name)) for name in names}
+    flags = np.where(again, rows.flags | np.uint16(FrameFlag.DROPPED), rows.flags)
+    return dataclasses.replace(rows, flags=flags, confidence=np.where(again, 0.0, rows.confidence), **changed)
 
 
 def _better(values: Floats, half: int) -> Floats:
@@ -159,11 +155,7 @@ def _good(half: int, degree: int) -> float:
 
 
 def _designs(half: int, degree: int) -> list[Floats]:
-    """Motions about a place: with an even clock, and with each of what may be wrong there.
-
-    These are the first frame after it shown as the one before, up to three lost, the two beside it exchanged, and a jump
-    of the row.
-    """
+    """Motions about a place: with an even clock, a frame shown twice, up to three lost, two exchanged, and a jump."""
     even = np.arange(2.0 * half) - half + 0.5
     twice, turned = even.copy(), even.copy()
     twice[half] = even[half - 1]
@@ -187,8 +179,7 @@ def _powers(clock: Floats, degree: int) -> Floats:
 def _left(windows: Floats, design: Floats) -> Floats:
     """Sum of squares that the columns of *design* leave of each window."""
     basis = np.linalg.qr(design)[0]
-    left: Floats = ((windows - (windows @ basis) @ basis.T) ** 2).sum(1)
-    return left
+    return np.asarray(((windows - (windows @ basis) @ basis.T) ** 2).sum(1))
 
 
 def _noise(values: Floats) -> float:

@@ -29,9 +29,9 @@ from snapbeam.lab.tracking.settings import (
     BeamView,
     FrameFlag,
     Scene,
-    ShakerView,
     Sticker,
     TipOutline,
+    edges_about,
     gather,
 )
 from snapbeam.util.singular_values import polyfit
@@ -49,10 +49,9 @@ _OFTEN = 3  # stretches as quiet as the start from which the start is nothing sp
 
 
 class Rest(NamedTuple):
-    """Frames at rest: ``indices``; the row there and its standard error; whether it is one.
+    """Frames at rest, the row there and its standard error; whether it is one, or the recording begins in motion.
 
-    ``found`` is False where the recording begins in motion.  ``drift`` is by how much the row moves within the
-    frames, in standard errors of a frame.
+    ``drift`` is by how much the row moves within the frames, in standard errors of a frame.
     """
 
     indices: NDArray[np.intp]
@@ -113,22 +112,20 @@ def jumps(rows: Floats) -> NDArray[np.bool_]:
     before and after.
     """
     out = np.zeros(rows.shape, dtype=bool)
-    known = np.flatnonzero(np.isfinite(rows))
-    if known.size < 8:
+    at = np.flatnonzero(np.isfinite(rows))
+    if at.size < 8:
         return out
-    at, values = known, rows[known]
+    values = rows[at]
+    step = np.abs(np.diff(values, prepend=values[0], append=values[-1]))
     for length in range(1, _LONGEST + 1):
         n = values.size - length - 1
-        if n < 4:
-            break
-        before, behind = values[:n], values[length + 1 :]
+        before, *within, behind = np.lib.stride_tricks.sliding_window_view(values, n)
+        inside = np.stack(within)
         share = np.arange(1, length + 1)[:, None] / (length + 1.0)
-        inside = np.stack([values[j + 1 : j + 1 + n] for j in range(length)])
         bend = inside - (before + share * (behind - before))
         least = np.abs(bend).min(0)
         same = (bend > 0.0).all(0) | (bend < 0.0).all(0)
         usual = 1.4826 * float(np.median(np.abs(bend)))
-        step = np.abs(np.diff(values, prepend=values[0], append=values[-1]))
         own = np.maximum(step[:n], step[length + 2 :])
         steps = np.minimum(np.abs(inside[0] - before), np.abs(behind - inside[-1]))
         near = at[length + 1 :] - at[:n] <= length + 5
@@ -140,8 +137,7 @@ def jumps(rows: Floats) -> NDArray[np.bool_]:
 def wanderings(rows: Floats, lost: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Frames of a row that strays while something it leans on is *lost*.
 
-    Each run of lost frames is held against a straight line between the frames before and after; it may bend
-    as much as the motion bends elsewhere.
+    Lost frames are held against a line between those before and after, and may bend as the motion bends elsewhere.
     """
     out = np.zeros(rows.shape, dtype=bool)
     good = np.isfinite(rows) & ~lost
@@ -169,10 +165,9 @@ def distortion(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Deviation of the beam thickness from the usual value [px], and the distorted frames.
 
-    A frame is distorted if that exceeds five robust standard deviations, 0.06 px and the noise of rows
-    (*row_error* [px] of one edge), if the mean over 32 frames about
-    it is as far off (faint light that lasts), or if its edges are no steps: fits that leave three times as much as
-    usual without being blurred.
+    A frame is distorted if that exceeds five robust standard deviations, 0.06 px and the noise of rows (*row_error*
+    [px] of one edge), if the mean over 32 frames about it is as far off (faint light that lasts), or if its edges are
+    no steps: fits that leave three times as much as usual without being blurred.
     """
     known = np.isfinite(thickness)
     miss = np.zeros(thickness.shape)
@@ -195,13 +190,10 @@ def distortion(
 
 
 def _lasting(miss: Floats, least: float) -> Floats:
-    """Mean deviation of the thickness over the stretch around each frame, if it is significant and beyond *least*.
+    """Mean deviation of the thickness over the stretch around each frame; 0 unless significant and beyond *least*.
 
-    Otherwise 0.  It is the larger of those from the median and from the half of the stretches that are most alike,
-    for light on many frames moves the median.
-
-    What chance does is told by the steps from frame to frame: light that lasts over a good part of the recording
-    widens the scatter of all frames together, but not these.
+    It is the larger of those from the median and from the half of the stretches that are most alike, for light on many
+    frames moves the median.  Steps from frame to frame tell chance, which light that lasts does not widen.
     """
     out = np.zeros(miss.size)
     if miss.size < 4 * _STRETCH:
@@ -218,10 +210,7 @@ def _lasting(miss: Floats, least: float) -> Floats:
 
 
 def pooled(error: Floats) -> Floats:
-    """Standard errors of single frames, each from few columns, none less than the usual one.
-
-    A frame whose columns scatter less than usual does so by chance: no frame is better lit or sharper than most.
-    """
+    """Standard errors of single frames, none less than the usual one: few columns scatter less by chance."""
     known = np.isfinite(error)
     if not known.any():
         return error
@@ -233,17 +222,20 @@ def pooled(error: Floats) -> Floats:
 def unexplained_blur(row: Floats, width: Floats, usual: float, limit: float) -> Floats:
     """Excess of the edge width over lens and motion blur [px], over the frames; otherwise 0.
 
-    Beyond *limit*, where edges are too wide for their windows, that over the lens alone.
-
     An exposure is no longer than a frame, so motion smears an edge over no more than the step from frame to
-    frame, with a standard deviation of that over the root of 12.
+    frame, with a standard deviation of that over the root of 12.  Beyond *limit* edges are too wide for their windows:
+    the excess is that over the lens alone.
     """
-    step = np.abs(np.diff(row))
     with np.errstate(invalid="ignore"):
-        fastest = np.fmax(np.append(step, np.nan), np.append(np.nan, step))
-        explained = np.hypot(usual, fastest / np.sqrt(12.0))
+        explained = np.hypot(usual, fastest(row) / np.sqrt(12.0))
         excess = np.where(width > _WIDER * explained + 0.2, width - explained, 0.0)
         return np.where(width > limit, width - usual, excess)
+
+
+def fastest(row: Floats) -> Floats:
+    """The larger step of a row to the frame before or after, NaN where neither is known."""
+    step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
+    return np.asarray(np.fmax(step[1:], step[:-1]))
 
 
 def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int] | None) -> Rest:
@@ -274,22 +266,16 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
     away = gone & np.append(gone[1:], True)
     quiet = int(away.argmax()) + 1 if away.any() else known.size
     used = known[: (quiet + 1) // 2]
-    mean = float(row[used].mean())
-    found = quiet >= _QUIET
-    if found:
-        length = max(4 * quiet // 5, _QUIET)
-        still = _still(values[quiet:], length, noise)
-        if np.isfinite(shaker[known]).mean() > 0.5:
-            still &= _still(shaker[known][quiet:], length, noise)
-        found = len(stretches(still)) < _OFTEN
-    return Rest(used, mean, _mean_error(row[used], noise), found, 0.0)
+    length = max(4 * quiet // 5, _QUIET)
+    still = _still(values[quiet:], length, noise)
+    if np.isfinite(shaker[known]).mean() > 0.5:
+        still &= _still(shaker[known][quiet:], length, noise)
+    found = quiet >= _QUIET and len(stretches(still)) < _OFTEN
+    return Rest(used, float(row[used].mean()), _mean_error(row[used], noise), found, 0.0)
 
 
 def _beside(values: Floats, used: NDArray[np.intp], noise: float) -> float:
-    """Deviation of the row from few frames at rest to the neighbouring frames, in standard errors.
-
-    A few frames say nothing of motion themselves; at rest those of one side are at the same place.
-    """
+    """Deviation of few frames at rest, which tell no motion, from those of the nearer side, in standard errors."""
     short = _QUIET - used.size
     if short <= 0:
         return 0.0
@@ -304,10 +290,8 @@ def _still(values: Floats, length: int, noise: float) -> NDArray[np.bool_]:
         return np.zeros(0, dtype=bool)
     shift = -(length // 2)
     filled = np.where(np.isfinite(values), values, 1e6 * np.arange(values.size))
-    high = maximum_filter1d(filled, length, origin=shift)
-    low = minimum_filter1d(filled, length, origin=shift)
-    still: NDArray[np.bool_] = ((high - low) < 6.0 * noise)[: values.size - length + 1]
-    return still
+    high, low = (extreme(filled, length, origin=shift) for extreme in (maximum_filter1d, minimum_filter1d))
+    return np.asarray(((high - low) < 6.0 * noise)[: values.size - length + 1])
 
 
 def _mean_error(values: Floats, noise: float) -> float:
@@ -320,16 +304,26 @@ def _mean_error(values: Floats, noise: float) -> float:
 
 
 _CHECKED = 4  # columns of a group in which the near edge is fitted too
+_CONTRAST = (0.4, 1.8)  # of the usual, between which a step is the edge that is followed
+
+
+def _sound(contrast: Floats, usual: float) -> NDArray[np.bool_]:
+    return np.asarray((contrast > _CONTRAST[0] * usual) & (contrast < _CONTRAST[1] * usual))
+
+
+def _too_hot(windows: Floats, inside: NDArray[np.bool_], view: BeamView) -> Floats:
+    """Share of saturated pixels in the windows of each frame."""
+    return np.asarray(((windows >= view.saturated) & inside[..., None]).mean((1, 2)))
 
 
 class BeamRows(NamedTuple):
     """The far edge at the contact column of each frame, and what was seen on the way.
 
-    ``row`` and ``slope`` are NaN where it was not found.  ``thickness`` [px] is measured across the beam in
-    columns free of the shaker (NaN without such columns), ``hollow`` [px] by how much a parabola through the columns
-    lies off the line at the contact, ``residual`` what the fitted steps leave of their
-    windows, share of the contrast.  ``level_range`` is the range of grey levels along the columns over the
-    usual contrast, ``touches`` whether an object reached the far border there.
+    ``row`` and ``slope`` are NaN where it was not found.  ``thickness`` [px] is measured across the beam in columns
+    free of the shaker (NaN without such columns), ``hollow`` [px] by how much a parabola through the columns lies off
+    the line at the contact, ``residual`` what the fitted steps leave of their windows, share of the contrast.
+    ``level_range`` is the range of grey levels along the columns over the usual contrast, ``touches`` whether an
+    object reached the far border there.
     """
 
     row: Floats
@@ -353,33 +347,31 @@ def measure_beam(view: BeamView, frames: NDArray[np.floating]) -> BeamRows:
     guesses = np.full((len(view.groups), count), np.nan)
     ranges, touches = np.zeros(count), np.zeros(count, dtype=bool)
     longest = height if view.merged else 1.6 * view.thickness + 3.0
-    for g, group in enumerate(view.groups):
+    for guess, group in zip(guesses, view.groups, strict=True):
         profile = frames[:, :, group].mean(-1, dtype=np.float64)
         profile[:, 1:-1] = (profile[:, 2:] + profile[:, 1:-1] + profile[:, :-2]) / 3.0
         ranges = np.maximum(ranges, np.ptp(profile, axis=1) / view.contrast)
-        level = (profile - view.threshold) * view.sign
+        solid = (profile - view.threshold) * view.sign > 0.0
         for first, last in view.fixtures:
-            level[:, first:last] = -1.0
-        touches |= (level[:, :2] > 0.0).any(1)
-        guesses[g] = _first_band(level, view.thickness, longest)
+            solid[:, first:last] = False
+        touches |= solid[:, :2].any(1)
+        for k, inside in enumerate(solid):  # the far edge of the first band of fitting thickness
+            bands = (one for one, end in stretches(inside) if 0.6 * view.thickness <= end - one <= longest and one)
+            guess[k] = next(bands, np.nan) - 0.5
     about = frames[:, :, view.columns].mean(-1, dtype=np.float64)
     ranges = np.maximum(ranges, np.ptp(about, axis=1) / view.contrast)
     anchor, tilt = _anchor(guesses, [float(group.mean()) for group in view.groups])
     rows = anchor[:, None] + tilt[:, None] * view.columns
-    half = int(np.clip(view.thickness // 2, 2, HALF))
-    windows, inside = gather(frames, rows, view.columns, half)
-    fit = fit_edges(windows, view.edge_width, sign=view.sign)
-    edges = np.rint(np.where(np.isfinite(rows), rows, 0.0)) + fit.position
-    good = inside & np.isfinite(edges)
-    good &= (fit.contrast > 0.4 * view.contrast) & (fit.contrast < 1.8 * view.contrast)
+    half = view.half
+    windows, inside, fit, edges = edges_about(frames, rows, view.columns, half, view.edge_width, view.sign)
+    good = inside & np.isfinite(edges) & _sound(fit.contrast, view.contrast)
     for first, last in view.fixtures:
         with np.errstate(invalid="ignore"):
             good &= (rows < first - half) | (rows >= last + half)
     noise = edge_noise(view.edge_width, view.noise, view.contrast)
     row, error, slope, kept = fit_line(view.columns - view.contact_column, edges, good, 1.5, noise)
     share = kept.mean(1)
-    width = np.interp(masked_median(fit.width, kept), *view.width_table)
-    saturated = ((windows >= view.saturated) & inside[..., None]).mean((1, 2))
+    saturated = _too_hot(windows, inside, view)
     weak = (share < 0.5) | (saturated > view.hot_share + HOT)
     row[weak], slope[weak] = np.nan, np.nan
     return BeamRows(
@@ -388,7 +380,7 @@ def measure_beam(view: BeamView, frames: NDArray[np.floating]) -> BeamRows:
         slope=slope,
         share=share,
         contrast=masked_median(fit.contrast, inside) / view.contrast,
-        width=width,
+        width=np.interp(masked_median(fit.width, kept), *view.width_table),
         thickness=_thickness(view, frames, row, slope, half),
         residual=masked_median(fit.residual, kept) / view.contrast,
         saturated=saturated,
@@ -421,28 +413,13 @@ def _anchor(guesses: Floats, middles: list[float]) -> tuple[Floats, Floats]:
     return np.where(np.isfinite(left), left, guesses[1] - tilt * middles[1]), tilt
 
 
-def _first_band(level: Floats, thickness: float, longest: float) -> Floats:
-    """Far edge of the first band of fitting thickness in each profile; NaN where there is none.
-
-    ``level`` is positive inside objects.
-    """
-    out = np.full(level.shape[0], np.nan)
-    for k, solid in enumerate(level > 0.0):
-        bands = (first for first, last in stretches(solid) if 0.6 * thickness <= last - first <= longest and first)
-        out[k] = next(bands, np.nan) - 0.5
-    return out
-
-
 def _thickness(view: BeamView, frames: NDArray[np.floating], row: Floats, slope: Floats, half: int) -> Floats:
-    """Rows from the far edge to the near one, across the beam, in a few columns free of the shaker.
-
-    Light on one of the edges shows here, for the beam's thickness does not change.
-    """
+    """Rows across the beam, in a few columns free of the shaker, where light on one of the edges shows."""
     if view.merged:
         return np.full(row.shape, np.nan)
-    before = [group.mean() < view.contact_column for group in view.groups]
-    ends = zip(view.groups, before, strict=True)
-    columns = np.concatenate([group[:_CHECKED] if first else group[-_CHECKED:] for group, first in ends])
+    columns = np.concatenate(
+        [one[:_CHECKED] if one.mean() < view.contact_column else one[-_CHECKED:] for one in view.groups]
+    )
     across = columns - view.contact_column
     expected = row[:, None] + slope[:, None] * across + view.thickness
     windows, inside = gather(frames, expected, columns, half)
@@ -467,7 +444,6 @@ class ShakerRows(NamedTuple):
     error: Floats
     share: Floats
     contrast: Floats
-    width: Floats
     merged: NDArray[np.bool_]
     saturated: Floats
 
@@ -475,48 +451,35 @@ class ShakerRows(NamedTuple):
 def sticker_rows(
     view: BeamView, sticker: Sticker, frames: NDArray[np.floating], near: Floats, tip_offset: float | None = None
 ) -> ShakerRows:
-    """Rows of the sticker's middle in turned frames.
+    """Rows of the sticker's middle in turned frames, below the beam's near edge at *near*.
 
-    ``near`` is the row of the beam's near edge, ``tip_offset`` that of the tip from the sticker's middle if
-    it is known already: the tip cannot stand inside the beam.
+    ``tip_offset`` is the tip's row from the middle, if it is known already: the tip cannot stand inside the beam.
     """
-    both = _both_edges(view, sticker, frames, near, tip_offset)
-    middle = 0.5 * (both.upper + both.lower)
+    upper, lower, good, strength, saturated = _both_edges(view, sticker, frames, near, tip_offset)
     noise = math.sqrt(0.5) * edge_noise(view.edge_width, view.noise, sticker.contrast)
-    row, error, _, kept = fit_line(sticker.columns - view.contact_column, middle, both.good, 1.5, noise)
+    row, error, _, kept = fit_line(sticker.columns - view.contact_column, 0.5 * (upper + lower), good, 1.5, noise)
     share = kept.mean(1)
     return ShakerRows(
-        row=np.where((share >= 0.5) & (both.saturated <= view.hot_share + HOT), row, np.nan),
+        row=np.where((share >= 0.5) & (saturated <= view.hot_share + HOT), row, np.nan),
         error=error,
         share=share,
-        contrast=masked_median(both.strength, kept) / sticker.contrast,
-        width=masked_median(both.width, kept),
+        contrast=masked_median(strength, kept) / sticker.contrast,
         merged=np.zeros(row.shape, dtype=bool),
-        saturated=both.saturated,
+        saturated=saturated,
     )
 
 
 def sticker_thickness(view: BeamView, sticker: Sticker, frames: NDArray[np.floating], near: Floats) -> float:
     """Rows from the sticker's upper edge to its lower one, to a fraction of a pixel."""
-    both = _both_edges(view, sticker, frames, near, None)
-    found = (both.lower - both.upper)[both.good]
+    upper, lower, good, *_ = _both_edges(view, sticker, frames, near, None)
+    found = (lower - upper)[good]
     return float(np.median(found)) if found.size else sticker.thickness
-
-
-class _Edges(NamedTuple):
-    """Rows of the two edges (frames, columns), which are sound, and what was seen there."""
-
-    upper: Floats
-    lower: Floats
-    good: NDArray[np.bool_]
-    strength: Floats
-    width: Floats
-    saturated: Floats
 
 
 def _both_edges(
     view: BeamView, sticker: Sticker, frames: NDArray[np.floating], near: Floats, tip_offset: float | None
-) -> _Edges:
+) -> tuple[Floats, Floats, NDArray[np.bool_], Floats, Floats]:
+    """Rows of the upper and the lower edge, which are sound, their contrast (frames, columns), and saturated shares."""
     columns = sticker.columns
     half = int(np.clip(sticker.thickness // 2, 2, HALF))
     if tip_offset is not None:
@@ -526,31 +489,21 @@ def _both_edges(
     profiles = frames[:, :, columns].mean(-1, dtype=np.float64)
     top = _locate(sticker, profiles, np.where(np.isfinite(first), first, -np.inf), 0.1 * view.contrast)
     rows = np.repeat(top[:, None], columns.size, axis=1)
-    fits, edges, inside = [], [], np.ones(rows.shape, dtype=bool)
-    saturated: Floats = np.zeros(frames.shape[0])
+    edges, strength, saturated, good = [], [], [], np.ones(rows.shape, dtype=bool)
     for shift, sign in ((0.0, sticker.sign), (sticker.thickness, -sticker.sign)):
-        windows, within = gather(frames, rows + shift, columns, half)
-        fit = fit_edges(windows, view.edge_width, sign=sign)
-        fits.append(fit)
-        edges.append(np.rint(rows + shift) + fit.position)
-        inside &= within
-        hot = (windows >= view.saturated) & within[..., None]
-        saturated = np.maximum(saturated, hot.mean((1, 2)))
-    strength = np.stack([fit.contrast for fit in fits])
-    good = inside & np.isfinite(edges[0]) & np.isfinite(edges[1])
-    good &= (strength > 0.4 * sticker.contrast).all(0) & (strength < 1.8 * sticker.contrast).all(0)
+        windows, inside, fit, found = edges_about(frames, rows + shift, columns, half, view.edge_width, sign)
+        edges.append(found)
+        strength.append(fit.contrast)
+        saturated.append(_too_hot(windows, inside, view))
+        good &= inside & np.isfinite(found) & _sound(fit.contrast, sticker.contrast)
     good &= np.abs(edges[1] - edges[0] - sticker.thickness) < 3.0
-    width = 0.5 * (fits[0].width + fits[1].width)
-    return _Edges(edges[0], edges[1], good, strength.mean(0), width, saturated)
+    return edges[0], edges[1], good, np.mean(strength, axis=0), np.max(saturated, axis=0)
 
 
 def _locate(sticker: Sticker, profiles: Floats, first: Floats, least: float) -> Floats:
-    """Row of the sticker's upper edge, from *first* on, to about a pixel: by correlation with its profile.
-
-    Views whose range stays below *least* count for nothing.
-    """
+    """Row of the sticker's upper edge, from *first* on, to about a pixel, where the range is not below *least*."""
     template = sticker.template - sticker.template.mean()
-    template = template / np.sqrt((template * template).sum())
+    template /= np.sqrt((template * template).sum())
     if profiles.shape[1] <= template.size:
         return np.full(profiles.shape[0], np.nan)
     views = np.lib.stride_tricks.sliding_window_view(profiles, template.size, axis=1)
@@ -568,7 +521,7 @@ def _locate(sticker: Sticker, profiles: Floats, first: Floats, least: float) -> 
 # Collecting the measurements of all frames, with every frame's trouble on record.
 
 
-_HOLLOW = 0.06  # px
+_HOLLOW = 0.06  # px of curvature in all frames, more than of real surfaces
 _SMEARED = 0.25  # error over what edges are wider than explained
 
 BORDER = 14.0  # rows from the border within which a vanished object is taken to have left the region
@@ -577,11 +530,10 @@ KEPT = 0.5  # px by which a beam may look distorted and its row still be kept, w
 
 @dataclass(frozen=True)
 class TrackedRows:
-    """Rows [px, turned picture] of the whole recording, one entry a frame number.
+    """Rows [px, turned picture] of the whole recording, one entry a frame number; NaN and a flag where not measured.
 
-    ``shaker`` is the row of its reference; ``width`` that of the beam's edge; NaN and a flag where nothing
-    was measured.  Errors are standard errors.  ``hollow`` [px] is by how much the beam's curved edge lies off the
-    line through its columns at the contact; 0 where by no more than its columns scatter.
+    ``shaker`` is the row of its reference, ``width`` that of the beam's edge; errors are standard errors.  ``hollow``
+    [px] is that of :class:`BeamRows` over all frames, 0 where it is no more than columns scatter.
     """
 
     row: Floats
@@ -634,15 +586,14 @@ class Follower:
         ]
         _assign(flags, missing & ~lost, reasons)
         with np.errstate(invalid="ignore"):
-            flags[beam.width > self.blur_limit] |= np.uint16(FrameFlag.BLUR)
+            wide = beam.width > self.blur_limit
+        flags[wide] |= np.uint16(FrameFlag.BLUR)
         confidence = beam.share * np.minimum(1.0, np.nan_to_num(beam.contrast))
         confidence *= np.minimum(1.0, view.edge_width / np.fmax(beam.width, view.edge_width))
         row = np.full(beam.row.shape, np.nan)
-        error = row.copy()
+        error = row
         if tip is not None and self.scene.shaker is not None:
-            row, error = tip.row.copy(), tip.error.copy()
-            with np.errstate(invalid="ignore"):
-                wide = beam.width > self.blur_limit
+            row, error = tip.row.copy(), tip.error
             if self.scene.shaker.sticker is None:  # the beam's light cannot be taken out of such windows
                 row[wide] = np.nan
             gone = ~np.isfinite(row) & ~lost & ~wide
@@ -658,33 +609,22 @@ class Follower:
         flags[lost] = FrameFlag.DROPPED
         shift, shift_error = (0.0, 0.0) if drift is None else drift
         flags[~lost & ~np.isfinite(shift)] |= np.uint16(FrameFlag.GAP)  # no mark was seen
-        self._parts.append(
-            {
-                "row": np.where(lost, np.nan, beam.row) - shift,
-                "error": np.where(lost, np.nan, np.hypot(beam.error, shift_error)),
-                "slope": np.where(lost, np.nan, beam.slope),
-                "hollow": np.where(lost, np.nan, beam.hollow),
-                "width": beam.width,
-                "thickness": np.where(lost, np.nan, beam.thickness),
-                "residual": np.where(lost, np.nan, beam.residual),
-                "shaker": row - shift,
-                "shaker_error": np.hypot(error, shift_error),
-                "confidence": confidence,
-                "flags": flags,
-            }
-        )
+        seen = {name: getattr(beam, name) for name in ("slope", "hollow", "thickness", "residual")}
+        seen |= {"row": beam.row - shift, "error": np.hypot(beam.error, shift_error)}
+        seen = {name: np.where(lost, np.nan, values) for name, values in seen.items()}
+        seen |= {"shaker": row - shift, "shaker_error": np.hypot(error, shift_error), "width": beam.width}
+        self._parts.append(seen | {"confidence": confidence, "flags": flags})
 
     def result(self, numbers: NDArray[np.int64]) -> TrackedRows:
         """All batches joined and held against each other; *numbers* are those of the frames."""
         found = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
         found = _with_missing(found, numbers)
-        flags, row, shaker = found["flags"], found["row"], found["shaker"]
-        miss, odd = distortion(
-            found["thickness"], found["residual"], found["width"], self.scene.beam.edge_width, self.scene.row_errors[0]
-        )
+        flags, row, shaker, width = (found[name] for name in ("flags", "row", "shaker", "width"))
+        usual = self.scene.beam.edge_width
+        miss, odd = distortion(found["thickness"], found["residual"], width, usual, self.scene.row_errors[0])
         odd &= np.isfinite(row)
         flags[odd] |= np.uint16(FrameFlag.DISTORTED)
-        blur = unexplained_blur(row, found["width"], self.scene.beam.edge_width, self.blur_limit)
+        blur = unexplained_blur(row, width, usual, self.blur_limit)
         error = np.hypot(pooled(found["error"]), np.where(odd, np.fmax(miss, _SMEARED * blur), _SMEARED * blur))
         shaker_error = np.hypot(pooled(found["shaker_error"]), _SMEARED * blur)
         row[odd & (miss > KEPT)] = np.nan
@@ -696,16 +636,18 @@ class Follower:
             shaker[astray] = np.nan
             flags[astray] |= np.uint16(FrameFlag.JUMP)
         gone = ~np.isfinite(row) | (~np.isfinite(shaker) if self.scene.shaker is not None else False)
+        curved = found["hollow"][np.isfinite(found["hollow"])]
+        hollow = abs(float(np.median(curved))) if curved.size else 0.0
         return TrackedRows(
             row=row,
             error=np.where(np.isfinite(row), error, np.nan),
             slope=found["slope"],
-            width=found["width"],
+            width=width,
             shaker=shaker,
             shaker_error=np.where(np.isfinite(shaker), shaker_error, np.nan),
             confidence=np.where(gone, 0.0, found["confidence"]),
             flags=flags,
-            hollow=_lasting_hollow(found["hollow"]),
+            hollow=hollow if hollow > _HOLLOW else 0.0,
         )
 
     def _repeats(self, strip: NDArray[np.floating]) -> NDArray[np.bool_]:
@@ -718,31 +660,20 @@ class Follower:
 
     def _leaving(self, name: str, rows: Floats, height: int) -> NDArray[np.bool_]:
         """Mask of the frames whose preceding valid position was near the border of the region."""
-        near = np.where(np.isfinite(rows), (rows < BORDER) | (rows > height - 1 - BORDER), False)
-        known = np.isfinite(rows)
-        last = np.maximum.accumulate(np.where(known, np.arange(rows.size), -1))
+        near = (rows < BORDER) | (rows > height - 1 - BORDER)
+        last = np.maximum.accumulate(np.where(np.isfinite(rows), np.arange(rows.size), -1))
         out = np.where(last >= 0, near[last], self._border[name])
         self._border[name] = bool(out[-1])
         return out
-
-
-def _lasting_hollow(hollow: Floats) -> float:
-    """Curvature of the edge in all frames [px]; 0 if it is below that of real surfaces."""
-    known = hollow[np.isfinite(hollow)]
-    middle = float(np.median(known)) if known.size else 0.0
-    return abs(middle) if abs(middle) > _HOLLOW else 0.0
 
 
 def _assign(
     flags: NDArray[np.uint16], missing: NDArray[np.bool_], reasons: list[tuple[NDArray[np.bool_], FrameFlag]]
 ) -> None:
     """Give every missing frame its reasons, and a plain gap where none applies."""
-    explained = np.zeros(flags.shape, dtype=bool)
-    for where, flag in reasons:
-        here = missing & where
-        flags[here] |= np.uint16(flag)
-        explained |= here
-    flags[missing & ~explained] |= np.uint16(FrameFlag.GAP)
+    unexplained = ~np.any([where for where, _ in reasons], axis=0)
+    for where, flag in (*reasons, (unexplained, FrameFlag.GAP)):
+        flags[missing & where] |= np.uint16(flag)
 
 
 def _with_missing(found: dict[str, NDArray], numbers: NDArray[np.int64]) -> dict[str, NDArray]:
@@ -786,9 +717,7 @@ def fields_apart(
     half a step, whatever the sign.
     """
     row = rows.row
-    speed = np.full(row.size, np.nan)
-    speed[1:-1] = 0.5 * (row[2:] - row[:-2])
-    speed[~np.isfinite(row)] = np.nan
+    speed = np.where(np.isfinite(row), _speed(row), np.nan)
     at = np.searchsorted(recording.numbers, np.arange(row.size))
     seen = recording.numbers[np.minimum(at, recording.numbers.size - 1)] == np.arange(row.size)
     moving = np.flatnonzero(seen & (np.abs(np.nan_to_num(speed)) > _MOVES))
@@ -799,15 +728,12 @@ def fields_apart(
     frames = prepare(np.stack([recording.frame(int(at[k])) for k in chosen]))
     columns = view.columns if along_rows else np.arange(view.columns.min(), view.columns.max() + 1)
     lines = row[chosen][:, None] + rows.slope[chosen][:, None] * (columns - view.contact_column)
-    half = int(np.clip(view.thickness // 2, 2, HALF))
-    windows, inside = gather(frames, lines, columns, half)
-    fit = fit_edges(windows, view.edge_width, sign=view.sign)
-    good = inside & np.isfinite(fit.position) & (fit.contrast > 0.4 * view.contrast)
+    windows, inside, fit, edges = edges_about(frames, lines, columns, view.half, view.edge_width, view.sign)
+    good = inside & np.isfinite(fit.position) & (fit.contrast > _CONTRAST[0] * view.contrast)
     if along_rows:
         apart = _within_windows(windows * view.sign, fit.position, view.edge_width, np.rint(lines))
     else:
-        parity = np.where(columns % 2 == 0, 1.0, -1.0)
-        apart = 2.0 * parity * (np.rint(lines) + fit.position - lines)
+        apart = 2.0 * np.where(columns % 2 == 0, 1.0, -1.0) * (edges - lines)
     with np.errstate(invalid="ignore", divide="ignore"):
         difference = np.where(good, apart, 0.0).sum(1) / good.sum(1)
     known = np.isfinite(difference)
@@ -819,20 +745,23 @@ def fields_apart(
     return abs(slope) if abs(slope) > max(_CERTAIN * error, _PART) else 0.0
 
 
+def _speed(row: Floats) -> Floats:
+    """Step a frame of a row, from the frames before and after; NaN at the ends."""
+    return np.pad(0.5 * (row[2:] - row[:-2]), 1, constant_values=np.nan)
+
+
 def _within_windows(windows: Floats, position: Floats, width: float, centre: Floats) -> Floats:
     """Rows by which the edge in even rows lies beyond that in odd ones, to first order, for each window."""
     rows = windows.shape[-1]
     offset = np.arange(rows) - (rows - 1) / 2.0
     away = offset - np.nan_to_num(position)[..., None]
     profile = edge_profile(away, width)
-    slope = edge_profile(away + 0.05, width) - edge_profile(away - 0.05, width)
-    slope = -10.0 * slope  # by the position of the edge
+    slope = -10.0 * (edge_profile(away + 0.05, width) - edge_profile(away - 0.05, width))  # by the position of the edge
     comb = np.where((centre[..., None] + offset) % 2 == 0, 0.5, -0.5) * slope
     basis = np.stack([np.ones_like(profile), profile, slope, comb], axis=-1)
     gram = np.einsum("...ri,...rj->...ij", basis, basis) + 1e-9 * np.eye(4)
     solved = np.linalg.solve(gram, np.einsum("...ri,...r->...i", basis, windows)[..., None])[..., 0]
-    out: Floats = solved[..., 3] / np.where(np.abs(solved[..., 1]) > 0.0, solved[..., 1], np.nan)
-    return out
+    return np.asarray(solved[..., 3] / np.where(np.abs(solved[..., 1]) > 0.0, solved[..., 1], np.nan))
 
 
 _SURE_LAG = 4.0  # standard errors
@@ -842,7 +771,7 @@ _SELDOM = 0.05  # probability of a pulse that an interval of two standard errors
 
 
 class ExposureBlur(NamedTuple):
-    """Share of the frame before that a frame still shows, and frames by which its instant is open, by a lamp that pulses.
+    """Share of the frame before that a frame still shows, and frames by which a pulsing lamp leaves its instant open.
 
     Both are 0 if they are not told.  ``late`` is the standard error [frames] of the instant.
     """
@@ -861,10 +790,8 @@ def exposure_blur(row: Floats, width: Floats, exposure: float | None) -> Exposur
     that edges which do not show their blur leave it open.
     """
     nothing = ExposureBlur(0.0, 0.0, 0.0)
-    speed = np.full(row.size, np.nan)
-    speed[1:-1] = 0.5 * (row[2:] - row[:-2])
-    bend = np.full(row.size, np.nan)
-    bend[1:-1] = np.abs(row[2:] - 2.0 * row[1:-1] + row[:-2])
+    speed = _speed(row)
+    bend = np.pad(np.abs(row[2:] - 2.0 * row[1:-1] + row[:-2]), 1, constant_values=np.nan)
     with np.errstate(invalid="ignore"):
         used = np.isfinite(width) & (bend < 0.3 * np.abs(speed) + _MOVES)  # not where the beam is struck
     if np.count_nonzero(used & (np.abs(np.nan_to_num(speed)) > 3.0 * _MOVES)) < _LEAST:
@@ -923,25 +850,21 @@ def tip_edges(
     good: NDArray[np.bool_],
     light: Floats,
 ) -> tuple[Floats, NDArray[np.bool_], Floats]:
-    """Sub-pixel rows of the tip's edge at *columns*, with the beam's light taken out.
+    """Rows of the tip's edge at *columns*, without the beam's light; which are sound; saturated shares.
 
     ``tip`` and ``near`` are the expected row of the tip and the known row of the beam's near edge, (frames,
-    columns); ``light`` is the beam's contrast, (columns,).  Also returns which edges are sound, and the
-    share of saturated pixels in each frame.
+    columns); ``light`` is the beam's contrast, (columns,).
     """
     windows, inside = gather(frames, tip, columns, HALF)
     centre = np.rint(np.where(np.isfinite(tip), tip, 0.0))
     known = np.where(np.isfinite(near), near, -1e3)
     offsets: Floats = centre[..., None] + np.arange(-HALF, HALF + 1.0) - known[..., None]
-    covered: Floats = 1.0 - edge_profile(offsets, view.edge_width)
-    beam = light[None, :, None] * covered
+    beam = light[None, :, None] * (1.0 - edge_profile(offsets, view.edge_width))
     weights = (offsets > -2.0).astype(np.float64)
     weights[..., HALF - 2 :] = 1.0
     fit = fit_edges(windows - beam, view.edge_width, sign=view.sign, weights=weights)
-    sound = good & inside & np.isfinite(fit.position) & (fit.contrast > 0.4 * view.contrast)
-    sound &= fit.contrast < 1.8 * view.contrast
-    saturated = ((windows >= view.saturated) & inside[..., None]).mean((1, 2))
-    return centre + fit.position, sound, saturated
+    sound = good & inside & np.isfinite(fit.position) & _sound(fit.contrast, view.contrast)
+    return centre + fit.position, sound, _too_hot(windows, inside, view)
 
 
 def tip_rows(
@@ -976,29 +899,23 @@ def tip_rows(
     row = np.where(good, centred, 0.0).sum(1) / total
     off = np.where(good, centred - row[:, None], 0.0)
     spread = (off**2).sum(1) / np.maximum(total - 1, 1) * alike_columns(off, good, 1)
-    nothing = np.full(row.shape, np.nan)
     return ShakerRows(
         row=np.where(enough, row, np.nan),
         error=np.where(enough, np.sqrt(spread / total), np.nan),
         share=number / np.maximum(clear.sum(1), 1),
         contrast=np.ones(row.shape),
-        width=nothing,
         merged=np.isfinite(near) & seen & (clear.sum(1) < MIN_FLANK),
         saturated=saturated,
     )
 
 
-# ----------------------------------------------------------------------------------------------------
-# The shaker in every frame: by its sticker, or without one by its tip.
-
-
-def measure_shaker(
-    view: BeamView, shaker: ShakerView, frames: NDArray[np.floating], near: Floats, slope: Floats
-) -> ShakerRows:
-    """Row of the shaker's reference in a batch of turned frames.
-
-    ``near`` is the row of the beam's near edge at the contact column and ``slope`` the beam's slope.
-    """
+def measure(scene: Scene, frames: NDArray[np.floating]) -> tuple[BeamRows, ShakerRows | None]:
+    """Rows of the beam and of the shaker, by its sticker or without one by its tip, in a batch of turned frames."""
+    view, shaker = scene.beam, scene.shaker
+    beam = measure_beam(view, frames)
+    near = beam.row + view.thickness
+    if shaker is None:
+        return beam, None
     if shaker.sticker is not None:
-        return sticker_rows(view, shaker.sticker, frames, near, shaker.tip_offset)
-    return tip_rows(view, shaker.outline, frames, near, slope)
+        return beam, sticker_rows(view, shaker.sticker, frames, near, shaker.tip_offset)
+    return beam, tip_rows(view, shaker.outline, frames, near, beam.slope)

@@ -7,12 +7,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntFlag
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.lab.tracking.edges import Floats, edge_noise
+from snapbeam.lab.tracking.edges import EdgeFit, Floats, edge_noise, fit_edges
 from snapbeam.util.validation import (
     InputError,
     InputTypeError,
@@ -77,6 +78,15 @@ def gather(
     index = np.clip(centre, half, frames.shape[1] - 1 - half)[..., None] + np.arange(-half, half + 1)
     picked = frames[np.arange(frames.shape[0])[:, None, None], index, columns[None, :, None]]
     return picked.astype(np.float64), inside
+
+
+def edges_about(
+    frames: NDArray[np.floating], rows: NDArray, columns: NDArray[np.intp], half: int, width: float, sign: float
+) -> tuple[Floats, NDArray[np.bool_], EdgeFit, Floats]:
+    """Windows about *rows*, which lie inside the frame, the edges fitted in them, and the rows of these."""
+    windows, inside = gather(frames, rows, columns, half)
+    fit = fit_edges(windows, width, sign=sign)
+    return windows, inside, fit, np.rint(rows) + fit.position
 
 
 def spread_columns(low: int, high: int, count: int) -> NDArray[np.intp]:
@@ -164,37 +174,28 @@ class TrackingSettings:
     fixed_marks: Sequence[tuple[int, int, int, int]] = ()
 
     def __post_init__(self) -> None:
-        lengths = tuple(f"{name}{more}" for name in RULERS for more in ("", "_error"))
-        for name in ("buckling_level", "blur_limit", *lengths):
-            unit = "px" if name == "blur_limit" else "m"
-            self._keep(name, lambda value, name=name, unit=unit: positive(name, value, unit))
-        for name in ("rest_displacement", "threshold"):
-            self._keep(name, lambda value, name=name: finite(name, value))
-        self._keep("tip_distance", lambda value: within("tip_distance", value, 0.0, 0.1, closed="left"))
-        self._keep("location", lambda value: within("location", value, 0.0, 1.0))
-        self._keep("gamma", lambda value: within("gamma", value, 0.1, 10.0))
-        self._keep("columns", lambda value: integer("columns", value, 3, 1000))
-        self._keep("background", lambda value: finite_array("background", value, 2))
-        choice("side", self.side, SIDES)
-        choice("objects", self.objects, ("auto", "bright", "dark"))
-        for name in ("shaker", "marker"):
-            flag(name, getattr(self, name))
-        if isinstance(self.rest_frames, (tuple, list)):
-            if len(self.rest_frames) != 2:
-                raise InputError(f"rest_frames = {self.rest_frames!r}: must be a number or (first, last + 1)")
-            pair = tuple(integer(f"rest_frames[{i}]", v, -(2**40)) for i, v in enumerate(self.rest_frames))
-            object.__setattr__(self, "rest_frames", pair)
-        else:
-            self._keep("rest_frames", lambda value: integer("rest_frames", value, 1))
+        lengths = [f"{name}{more}" for name in RULERS for more in ("", "_error")]
+        checks: list[tuple[str, Any, tuple[Any, ...]]] = [
+            *((name, positive, ("m",)) for name in ("buckling_level", *lengths)),
+            ("blur_limit", positive, ("px",)),
+            *((name, finite, ()) for name in ("rest_displacement", "threshold")),
+            ("tip_distance", partial(within, closed="left"), (0.0, 0.1)),
+            ("location", within, (0.0, 1.0)),
+            ("gamma", within, (0.1, 10.0)),
+            ("columns", integer, (3, 1000)),
+            ("background", finite_array, (2,)),
+            ("side", choice, (SIDES,)),
+            ("objects", choice, (("auto", "bright", "dark"),)),
+            ("shaker", flag, ()),
+            ("marker", flag, ()),
+            ("rest_frames", _rest_frames, ()),
+        ]
+        for name, check, allowed in checks:
+            if getattr(self, name) is not None or check in (choice, flag):
+                object.__setattr__(self, name, check(name, getattr(self, name), *allowed))
         if not isinstance(self.fixed_marks, (tuple, list)):
             raise InputTypeError(f"fixed_marks = {shown(self.fixed_marks)}: must be a list of marks")
         object.__setattr__(self, "fixed_marks", tuple(_mark(i, m) for i, m in enumerate(self.fixed_marks)))
-
-    def _keep(self, name: str, check: Any) -> None:
-        """Replace a value that was given by what *check* makes of it."""
-        value = getattr(self, name)
-        if value is not None:
-            object.__setattr__(self, name, check(value))
 
     def changed(self, **changes: Any) -> TrackingSettings:
         """Copy of the settings with some changed, by name."""
@@ -241,6 +242,14 @@ class TrackingSettings:
             return 0.0
         sign = Orientation(self.side, (1, 1)).sign
         return -sign * self.buckling_level * 0.5 * (1.0 - math.cos(2.0 * math.pi * self.location))
+
+
+def _rest_frames(name: str, value: Any) -> int | tuple[int, ...]:
+    if not isinstance(value, (tuple, list)):
+        return integer(name, value, 1)
+    if len(value) != 2:
+        raise InputError(f"{name} = {value!r}: must be a number or (first, last + 1)")
+    return tuple(integer(f"{name}[{i}]", one, -(2**40)) for i, one in enumerate(value))
 
 
 def _mark(number: int, value: Any) -> tuple[int, ...]:
@@ -295,6 +304,11 @@ class BeamView:
         """+1 for objects brighter than the background, -1 for darker ones."""
         return 1.0 if self.bright else -1.0
 
+    @property
+    def half(self) -> int:
+        """Half height of windows that hold one edge of the beam."""
+        return int(np.clip(self.thickness // 2, 2, HALF))
+
 
 @dataclass(frozen=True)
 class Sticker:
@@ -325,14 +339,13 @@ class TipOutline:
 class ShakerView:
     """The shaker: the ``rod`` of columns it covers, and what of it is followed.
 
-    The reference row is the middle of the sticker, or without one the tip itself; ``tip_offset`` is the row
-    of the tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in
-    words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker;
-    ``certain`` that the tip is no sticker, by its distance or since its body has no gap down to the border.
-    ``width`` [px] is that of the rod behind the tip, and its standard error; NaN where it is not seen.  ``loose``
-    [px] is by how much the sticker moves against the tip, standard deviation.  ``turn`` is the tangent of the angle
-    by which the camera is turned against rod and beam.  ``cut`` says that one border of the picture cuts the rod, so
-    that its middle is not seen.
+    The reference row is the middle of the sticker, or without one the tip itself; ``tip_offset`` is the row of the
+    tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in words where that
+    is known from; ``isolated`` that the sticker was all that could be seen of the shaker; ``certain`` that the tip is
+    no sticker, by its distance or since its body has no gap down to the border. ``width`` [px] is that of the rod
+    behind the tip, and its standard error; NaN where it is not seen.  ``loose`` [px] is by how much the sticker moves
+    against the tip, standard deviation; ``turn`` the tangent of the angle by which the camera is turned against rod
+    and beam; ``cut`` that a border of the picture cuts the rod, whose middle is not seen.
     """
 
     rod: tuple[int, int]
@@ -368,8 +381,7 @@ class EdgeShape:
     ``misfit`` is the root mean square of what the blurred step leaves of it, share of the contrast; ``gamma`` the
     exponent of grey level over light that makes it symmetric, NaN if the sample is too small; ``shift`` the rows by
     which the fitted edge lies outside that one, ``open`` their standard deviation over the curves that are not excluded
-    where none is told;
-    ``clipped`` the share of saturated pixels in the middle of the beam.
+    where none is told; ``clipped`` the share of saturated pixels in the middle of the beam.
     """
 
     misfit: float
@@ -382,12 +394,10 @@ class EdgeShape:
 
 @dataclass(frozen=True)
 class NoiseShape:
-    """Correlations of the noise of pixels.
+    """Correlations of noise with the next pixel in time, ``along`` the beam and ``across`` it; 0 where not told.
 
-    ``in_time`` with the same pixel in the next frame, ``along`` the beam with the next pixel, and ``across`` the
-    beam; 0 where the noise is that of a sensor or too small to decide.  ``rows`` is the standard deviation of what
-    all pixels of a row along the beam have in common, in grey levels, and ``fixed_rows`` of the part of it that is
-    the same in every frame.
+    ``rows`` is the standard deviation of what all pixels of a row along the beam have in common, in grey levels, and
+    ``fixed_rows`` of the part of it that is the same in every frame.
     """
 
     in_time: float
@@ -458,9 +468,8 @@ class Scene:
     def placed_error(self) -> float:
         """Standard error [px] of where the tip stands against the beam, the same in all frames.
 
-        Never less than a fiftieth of a pixel: the tip is round and uneven.  A tip that is followed by its own
-        outline is seen against the beam through the same lens: what the blurred step leaves of an edge is left
-        there several times over.
+        At least a fiftieth of a pixel: the tip is round and uneven.  A tip that is followed by its own outline is seen
+        through the beam's lens: what the blurred step leaves of an edge is left there several times over.
         """
         if self.shaker is None:
             return 0.0
@@ -510,27 +519,18 @@ class FrameFlag(IntFlag):
 
 
 _ADVICE = {
-    FrameFlag.GAP: (
-        "an edge was not found; look at the frame (--picture, --frame), narrow region (--region) or set "
-        "threshold (--threshold)"
-    ),
-    FrameFlag.BLUR: (
-        "the edges are much wider than usual; shorten the exposure or refocus (blur_limit, --blur-limit, "
-        "moves the limit)"
-    ),
+    FrameFlag.GAP: "an edge was not found; look at the frame (--picture, --frame), narrow region (--region) or set "
+    "threshold (--threshold)",
+    FrameFlag.BLUR: "the edges are much wider than usual; shorten the exposure or refocus (blur_limit, --blur-limit, "
+    "moves the limit)",
     FrameFlag.DROPPED: "the camera lost the frame: it is absent, blank or a repeat of the one before",
-    FrameFlag.GLARE: (
-        "light saturates the edge; turn the lamp or choose other columns (contact_column, --contact-column)"
-    ),
+    FrameFlag.GLARE: "light saturates the edge; turn the lamp or choose other columns (contact_column, "
+    "--contact-column)",
     FrameFlag.MERGED: "beam and shaker touch and the shaker shows no edge of its own; put a sticker on it",
-    FrameFlag.LOW_CONTRAST: ("the edge is too faint; add light or set objects (--objects) and threshold (--threshold)"),
+    FrameFlag.LOW_CONTRAST: "the edge is too faint; add light or set objects (--objects) and threshold (--threshold)",
     FrameFlag.OUT_OF_REGION: "the object left the region; make region (--region) taller",
-    FrameFlag.JUMP: (
-        "the position leaves its neighbours for a frame or few and comes back: something else was taken for "
-        "the object; look at the frame (--picture, --frame)"
-    ),
-    FrameFlag.DISTORTED: (
-        "the beam looks thicker or thinner than usual, or its edge is no step: light or another object lies "
-        "on it; look at the frame (--picture, --frame)"
-    ),
+    FrameFlag.JUMP: "the position leaves its neighbours for a frame or few and comes back: something else was taken "
+    "for the object; look at the frame (--picture, --frame)",
+    FrameFlag.DISTORTED: "the beam looks thicker or thinner than usual, or its edge is no step: light or another "
+    "object lies on it; look at the frame (--picture, --frame)",
 }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +33,7 @@ from snapbeam.lab.tracking.settings import (
     Sticker,
     TipOutline,
     TrackingSettings,
+    edges_about,
     gather,
     spread_columns,
 )
@@ -51,8 +51,7 @@ _BORDER = 0.25  # share of the rows that a bar along the border may cover
 _MOVES = 2.0  # rows by which a beam must move to be told from a bar
 
 
-@dataclass(frozen=True)
-class ColumnObjects:
+class ColumnObjects(NamedTuple):
     """The first two objects from the far side in each column of each frame, arrays (frames, columns).
 
     ``start`` and ``end`` (one past the last row) of the first where ``found``; ``after`` and ``after_end`` of
@@ -83,11 +82,17 @@ def column_objects(mask: NDArray[np.bool_]) -> ColumnObjects:
     start, found = solid.argmax(1), solid.any(1)
     end = end_of(start)
     later = solid & (rows >= end[:, None])
-    after = later.argmax(1)
-    follows: NDArray[np.bool_] = np.asarray(later.any(1))
+    after, follows = later.argmax(1), np.asarray(later.any(1))
     after_end = np.where(follows, end_of(after), mask.shape[1])
-    further: NDArray[np.bool_] = np.asarray((solid & (rows >= after_end[:, None])).any(1))
+    further = np.asarray((solid & (rows >= after_end[:, None])).any(1))
     return ColumnObjects(start, end, found & (start > 0), after, after_end, follows, further, mask.shape[1])
+
+
+def without_rows(mask: NDArray[np.bool_], first: int, last: int) -> NDArray[np.bool_]:
+    """A mask without the rows of a bar (last one past its end), and one on either side."""
+    rest = mask.copy()
+    rest[:, max(first - 1, 0) : last + 1] = False
+    return rest
 
 
 def longest_stretch(columns: NDArray[np.bool_]) -> tuple[int, int]:
@@ -96,15 +101,11 @@ def longest_stretch(columns: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def fixed_bars(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
-    """Rows (first, one past the last) of bars that cross the picture and never move, beside a beam that does.
-
-    A bar that stands alone is none: it may be a beam at rest.
-    """
+    """Rows of bars that cross the picture and never move, beside a beam that does: one alone may be a beam at rest."""
     bars: list[tuple[int, int]] = []
-    left = mask.copy()
+    left = mask
     for bar in _still_bands(mask):
-        rest = left.copy()
-        rest[:, max(bar[0] - 1, 0) : bar[1] + 1] = False
+        rest = without_rows(left, *bar)
         if _moving_beam(rest):
             bars.append(bar)
             left = rest
@@ -123,26 +124,20 @@ def border_bar(side: NDArray[np.bool_]) -> int:
     if still.mean() < _ACROSS or not 1.0 <= np.median(usual[still]) <= _BORDER * side.shape[1]:
         return 0
     rows = int(np.percentile(usual[still], 90)) + 1
-    rest = side.copy()
-    rest[:, : rows + 1] = False
-    return rows if _moving_beam(rest, exits) else 0
+    return rows if _moving_beam(without_rows(side, 0, rows), exits) else 0
 
 
 def _still_bands(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Bands whose two edges stand still in most of the sample, across most columns."""
     columns = np.unique(np.linspace(0, mask.shape[2] - 1, min(mask.shape[2], 32)).astype(int))
     steps = np.diff(mask[:, :, columns].astype(np.int8), axis=1)
-    share = {}
-    for sign in (1, -1):
-        near = steps == sign
-        spread = near.copy()
-        spread[:, 1:] |= near[:, :-1]
-        spread[:, :-1] |= near[:, 1:]
-        share[sign] = spread.mean(0)  # (rows - 1, columns)
+    usual = [ndimage.maximum_filter1d(steps == sign, 3, axis=1).mean(0) >= _STILL for sign in (1, -1)]
     marks = np.zeros((mask.shape[1], columns.size), dtype=bool)
     for c in range(columns.size):
-        rising = _peaks(share[1][:, c])
-        falling = _peaks(share[-1][:, c])
+        rising, falling = (
+            np.array([(first + last - 1) // 2 for first, last in stretches(edge[:, c])], dtype=np.intp)
+            for edge in usual
+        )
         for first in rising:
             stops = falling[falling > first]
             if stops.size and not ((rising > first) & (rising < stops[0])).any():
@@ -150,24 +145,15 @@ def _still_bands(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return stretches(marks.mean(1) >= _ACROSS)
 
 
-def _peaks(share: NDArray[np.floating]) -> NDArray[np.intp]:
-    """Middle of each range of rows with an edge in most of the sample."""
-    return np.array([(first + last - 1) // 2 for first, last in stretches(share >= _STILL)], dtype=np.intp)
-
-
 def _moving_beam(mask: NDArray[np.bool_], edge: NDArray[np.intp] | None = None) -> bool:
-    """Return whether the rest of a mask contains a moving object that crosses the image and ends within it.
-
-    Against *edge*, rows (frames, columns), if given.
-    """
+    """Return whether a mask contains an object that crosses the image, ends within it and moves (against *edge*)."""
     objects = column_objects(mask)
     bounded = objects.found & (objects.end < mask.shape[1]) & (objects.end - objects.start >= 3)
-    if (bounded.mean(0) > 0.4).mean() < _ACROSS:
+    columns = bounded.mean(0) > 0.4
+    if columns.mean() < _ACROSS:
         return False
-    where = np.where(bounded, objects.start if edge is None else objects.start - edge, np.nan)
-    columns = np.flatnonzero(bounded.mean(0) > 0.4)
-    travel = np.nanpercentile(where[:, columns], 97, axis=0) - np.nanpercentile(where[:, columns], 3, axis=0)
-    return bool(np.median(travel) > _MOVES)
+    where = np.where(bounded, objects.start if edge is None else objects.start - edge, np.nan)[:, columns]
+    return bool(np.median(np.subtract(*np.nanpercentile(where, (97, 3), axis=0))) > _MOVES)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -182,6 +168,7 @@ CLIPPED = 0.1  # share of saturated pixels in the middle of the beam that counts
 _CLIPPED_SHIFT = 0.5  # px by which the edge of an overexposed object may lie off
 _STEP = 0.25  # px
 _REACH = 5.0
+_AWAY = np.arange(0.5, 4.0 / _STEP) * _STEP  # from the centre of an edge, where its halves are held against each other
 _LEAST = 200  # windows
 _MIRRORED = 5e-4  # of the contrast to which the halves of an edge are alike
 _GRAIN = 4  # columns that share a grain of texture
@@ -250,8 +237,7 @@ def _symmetry(
     bent = _totals(x, _light(y, error, float(_GAMMAS[best]), ratio, sign)[0], float(centres[best])) - _totals(
         x, y, float(np.interp(0.0, np.log(_GAMMAS), centres))
     )
-    away = np.arange(0.5, 4.0 / _STEP) * _STEP
-    variance = sum(np.interp(side, x, error) ** 2 for side in (away, -away)) + _MIRRORED**2
+    variance = sum(np.interp(side, x, error) ** 2 for side in (_AWAY, -_AWAY)) + _MIRRORED**2
     grains = np.stack([_totals(x, one, 0.0) + 1.0 for one in by_grain.T])
     along = float(((grains @ (bent / variance)) ** 2).sum() / max(float((bent**2 / variance).sum()), 1e-300))
     unit = max(unit, along)
@@ -283,27 +269,23 @@ def _together(x: Floats, error: Floats, by_grain: Floats) -> float:
     that of independent steps.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (by_grain.shape[1], 128))
-    away = np.arange(0.5, 4.0 / _STEP) * _STEP
-    halves = [np.stack([np.interp(side, x, one) for one in (by_grain @ signs).T]) for side in (away, -away)]
-    spread = np.hypot(*(np.interp(side, x, error) for side in (away, -away)))
+    halves = [np.stack([np.interp(side, x, one) for one in (by_grain @ signs).T]) for side in (_AWAY, -_AWAY)]
+    spread = np.hypot(*(np.interp(side, x, error) for side in (_AWAY, -_AWAY)))
     chi = ((halves[0] + halves[1]) ** 2 / (spread**2 + _MIRRORED**2)).sum(1)
-    return max(float(np.var(chi)) / (2.0 * away.size), 1.0)
+    return max(float(np.var(chi)) / (2.0 * _AWAY.size), 1.0)
 
 
 def _totals(x: Floats, light: Floats, centre: float) -> Floats:
     """An edge and itself turned about its *centre*, less 1."""
-    away = np.arange(0.5, 4.0 / _STEP) * _STEP
-    return np.interp(centre + away, x, light) + np.interp(centre - away, x, light) - 1.0
+    return np.interp(centre + _AWAY, x, light) + np.interp(centre - _AWAY, x, light) - 1.0
 
 
 def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
     """Chi-square of an edge turned about its centre against itself, minimum over the centre, and the centre."""
-    away = np.arange(0.5, 4.0 / _STEP) * _STEP
 
     def chi(centre: float) -> float:
-        total = np.interp(centre + away, x, light) + np.interp(centre - away, x, light) - 1.0
-        spread = np.hypot(np.interp(centre + away, x, error), np.interp(centre - away, x, error))
-        return float(np.sum((total / np.hypot(spread, _MIRRORED)) ** 2))
+        spread = np.hypot(*(np.interp(side, x, error) for side in (centre + _AWAY, centre - _AWAY)))
+        return float(np.sum((_totals(x, light, centre) / np.hypot(spread, _MIRRORED)) ** 2))
 
     near = min(np.linspace(-0.8, 0.8, 2 * _CENTRES + 1), key=chi)
     step = 0.8 / _CENTRES
@@ -418,20 +400,19 @@ def beam_view(
     width = _edge_width(frames, far, columns, good, half, sign)
     windows, fits, edges, usable = [], [], [], good.copy()
     for rows, rising in ((near, -sign), (far, sign)):
-        window, within = gather(frames, rows, columns, half)
-        fit = fit_edges(window, width, sign=rising)
+        window, within, fit, found = edges_about(frames, rows, columns, half, width, rising)
         windows.append(window)
         fits.append(fit)
-        edges.append(np.rint(rows) + fit.position)
-        usable &= within & np.isfinite(fit.position)
+        edges.append(found)
+        usable &= within & np.isfinite(found)
     contrast, thickness, error = abs(inside - background), bands.thickness, 0.5
     if usable.any():
         contrast = float(np.median(fits[1].contrast[usable]))
         thickness = float(np.median((edges[0] - edges[1])[usable]))
-        by_column = masked_median((edges[0] - edges[1]).T, usable.T)
-        seen = np.isfinite(by_column)
-        by_column, across = by_column[seen], columns[seen] - known["contact_column"]
-    if usable.any() and across.size > 1:  # a line needs two columns
+    by_column = masked_median((edges[0] - edges[1]).T, usable.T)
+    seen = np.isfinite(by_column)
+    by_column, across = by_column[seen], columns[seen] - known["contact_column"]
+    if across.size > 1:  # a line needs two columns
         # the surface is uneven on the scale of three pixels: neighbouring columns count as one
         independent = max(min(by_column.size, float(np.ptp(columns)) / 3.0), 1.0)
         error = float(np.std(by_column)) / math.sqrt(independent)
@@ -440,30 +421,18 @@ def beam_view(
         if abs(lean) * math.sqrt(independent / by_column.size) > _LEANS * left * math.sqrt(cover[0, 0]):
             thickness = float(level)
             error = max(left, _SURFACE) * math.sqrt(cover[1, 1] * by_column.size / independent)
-    clipped = max(_hot(frames, rows, columns, good, saturated) for rows in (0.5 * (far + near), far - half))
+    clipped = 0.0
+    for rows in (0.5 * (far + near), far - half):
+        window, within = gather(frames, rows, columns, 1)
+        clipped = max(clipped, float((window[within & good] >= saturated).mean()) if (within & good).any() else 0.0)
     hot = float((windows[1][good] >= saturated).mean()) if good.any() else 0.0
-    view = BeamView(
-        **known,
-        contrast=contrast,
-        thickness=thickness,
-        thickness_error=error,
-        edge_width=width,
-        width_table=width_calibration(width, 2 * half + 1),
-        hot_share=hot,
-    )
+    known |= {"contrast": contrast, "thickness": thickness, "thickness_error": error, "hot_share": hot}
+    view = BeamView(**known, edge_width=width, width_table=width_calibration(width, 2 * half + 1))
     blur = masked_median(fits[1].width, usable)
     steady = usable
     if np.isfinite(blur).any():  # an edge that speeds up within the exposure is bent whatever the camera's curve
         steady = usable & (blur <= _STEADY * np.nanpercentile(blur, 25.0))[:, None]
     return view, edge_shape(windows[1], np.rint(far), fits[1], steady, width, sign, clipped)
-
-
-def _hot(
-    frames: NDArray[np.floating], rows: Floats, columns: NDArray[np.intp], good: NDArray[np.bool_], level: float
-) -> float:
-    """Share of saturated pixels about the given rows."""
-    windows, seen = gather(frames, rows, columns, 1)
-    return float((windows[seen & good] >= level).mean()) if (seen & good).any() else 0.0
 
 
 def _levels(smooth: NDArray[np.floating], objects: ColumnObjects, alone: NDArray[np.bool_]) -> tuple[float, float]:
@@ -490,7 +459,7 @@ def _edge_width(
     windows, inside = gather(frames[few], far[few], columns, half)
     width = 1.0
     for _ in range(4):
-        fit: EdgeFit = fit_edges(windows, width, sign=sign)
+        fit = fit_edges(windows, width, sign=sign)
         usable = inside & good[few] & np.isfinite(fit.position)
         if not usable.any():
             raise InputError(
@@ -588,18 +557,20 @@ def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
     even &= np.ptp(head, axis=0) > 0.0
     if np.count_nonzero(even) < _LEAST_NOISE:
         return none
+
+    def power(steps: list[Floats]) -> float:
+        return float(np.median([np.var(one[even]) for one in steps]))
+
     rows = row_noise(head, even)
     fixed = min(row_noise(mean[None], even), rows)
-    far = float(np.median([np.var(one[even]) for one in apart]))
+    far = power(apart)
     if far < 2.0 * _ROUNDED**2:
-        return dataclasses.replace(none, rows=rows, fixed_rows=fixed)
+        return NoiseShape(0.0, 0.0, 0.0, rows, fixed)
     near = [_noise_of(after, before, mean) for before, after in itertools.pairwise(head)]
-    in_time = 1.0 - float(np.median([np.var(one[even]) for one in near])) / far
-    across = _alike(apart, even, 0) / far
     count = np.maximum(even.sum(1, keepdims=True), 1)
     own = [one - np.where(even, one, 0.0).sum(1, keepdims=True) / count for one in apart]
-    along = _alike(own, even, 1) / float(np.median([np.var(one[even]) for one in own]))
-    in_time, along, across = (min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in (in_time, along, across))
+    alike = (1.0 - power(near) / far, _alike(own, even, 1) / power(own), _alike(apart, even, 0) / far)
+    in_time, along, across = (min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in alike)
     return NoiseShape(in_time, along, across, rows, fixed)
 
 
@@ -624,20 +595,19 @@ def row_noise(frames: NDArray[np.floating], even: NDArray[np.bool_]) -> float:
 
 def _alike(apart: list[Floats], even: NDArray[np.bool_], axis: int) -> float:
     """Mean product of neighbouring pixels, both of them even, along an axis."""
-    here, there = slice(1, None), slice(None, -1)
-    first, second = ((slice(None), one) if axis else (one, slice(None)) for one in (here, there))
-    both = even[first] & even[second]
-    return float(np.median([np.mean(one[first][both] * one[second][both]) for one in apart]))
+    if axis:
+        apart, even = [one.T for one in apart], even.T
+    both = even[1:] & even[:-1]
+    return float(np.median([np.mean(one[1:][both] * one[:-1][both]) for one in apart]))
 
 
 def _noise_of(after: NDArray[np.floating], before: NDArray[np.floating], mean: Floats) -> Floats:
     """The difference of two frames without a change of light between them."""
-    step: Floats = (after - before).astype(np.float64)
+    step = (after - before).astype(np.float64)
     level = mean - mean.mean()
     total = float(np.sum(level * level))
     slope = float(np.sum(step * level)) / total if total > 0.0 else 0.0
-    left: Floats = step - np.median(step - slope * level) - slope * level
-    return left
+    return np.asarray(step - np.median(step - slope * level) - slope * level)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -677,11 +647,8 @@ def find_sticker(
     if len(same) < SEEN * profiles.shape[0]:
         return None
     margin = int(np.clip(min(smooth.shape[1] - 1 - bottom for _, _, bottom, _ in same), 2, HALF))
-    cut = [
-        profiles[k, top - margin : top + round(size) + margin + 1]
-        for k, top, bottom, _ in same
-        if top + round(size) + margin < smooth.shape[1]
-    ]
+    ends = [(k, top - margin, top + round(size) + margin + 1) for k, top, *_ in same]
+    cut = [profiles[k, first:last] for k, first, last in ends if last <= smooth.shape[1]]
     if not cut:
         return None
     return Sticker(
@@ -733,16 +700,8 @@ def tip_outline(rows: Floats, good: NDArray[np.bool_], reference: Floats) -> tup
     return profile, counted
 
 
-class Apex(NamedTuple):
-    """Point of the tip nearest to the beam: row, standard error of the row, column from the contact."""
-
-    row: float
-    error: float
-    column: float
-
-
-def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) -> Apex | None:
-    """The apex of an outline; None if it is not known on both sides of the contact.
+def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) -> tuple[float, float, float] | None:
+    """Row of an outline's apex, its standard error and column from the contact; None if not known on both sides of it.
 
     The outline is taken as symmetric, y = a + b (x - c)^2 + d (x - c)^4, about a column c near the middle of
     the shaker: a flat tip alone would not tell it.  Columns nearer than three pixels to each other count as
@@ -774,7 +733,7 @@ def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) 
     full[list(powers)] = solution
     rounded = float(np.polynomial.polynomial.polyval(0.9, full)) - float(solution[0]) > 0.3
     error = math.sqrt(max(variance, 1e-5) * 2.0 / independent)
-    return Apex(float(solution[0]), error, centre * half) if rounded or covered else None
+    return (float(solution[0]), error, centre * half) if rounded or covered else None
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -828,24 +787,31 @@ def shaker_view(
         size = sticker_thickness(view, sticker, frames, near)
         sticker = dataclasses.replace(sticker, thickness=size)
         reference = sticker_rows(view, sticker, frames, near).row
-    outline, loose = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
+    nothing: Floats = np.empty(0)
+    outline, loose, width, lean = TipOutline(np.empty(0, dtype=np.intp), nothing, nothing), 0.0, *_NO_SIDES
+    if not isolated:
+        outline, loose = _outline(view, frames, bands, rod, beam, reference)
+        width, lean = rod_sides(frames, rod, view.edge_width)
     column = view.contact_column
-    certain = _reaches_border(bands, middle) if sticker is None else distance is not None
-    sides = Rod(math.nan, math.nan, 0.0) if isolated else rod_sides(frames, rod, view.edge_width)
-    turned = abs(sides.lean) > _TURNED and abs(sides.lean + float(np.nanmedian(beam.slope))) < _SQUARE
-    turn = -sides.lean if turned else 0.0
+    certain = distance is not None
+    if sticker is None:  # the object below the beam reaches the border of the picture without a gap
+        after = bands.objects.after_end[:, middle][(bands.alone & bands.objects.follows)[:, middle]]
+        certain = bool(after.size and (after == bands.objects.height).mean() > 0.9)
+    turned = abs(lean) > _TURNED and abs(lean + float(np.nanmedian(beam.slope))) < _SQUARE
+    turn = -lean if turned else 0.0
     free = settings.contact_column is None
     cut = free and (rod[0] < 2) != (rod[1] > frames.shape[2] - 2)
-    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, sides[:2], loose, turn, cut)
+    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated, certain, width, loose, turn, cut)
     if sticker is not None and distance is not None:
         offset = -(distance + 0.5 * sticker.thickness)
         return dataclasses.replace(shown, tip_offset=offset, tip_source="distance to the sticker as given"), column
     upright = dataclasses.replace(outline, profile=outline.profile - turn * (outline.columns - column))
     apex = None if isolated else find_apex(upright, rod, column)
     if apex is not None:
-        column += apex.column if free else 0.0
+        row, error, away = apex
         source = "tip seen apart from the beam"
-        return dataclasses.replace(shown, tip_offset=apex.row, tip_error=apex.error, tip_source=source), column
+        column += away if free else 0.0
+        return dataclasses.replace(shown, tip_offset=row, tip_error=error, tip_source=source), column
     if sticker is not None:
         offset = _offset_at_rest(beam, near, reference, head)
         source = "assumed to touch the beam in the first frames"
@@ -857,27 +823,19 @@ def shaker_view(
     )
 
 
-class Rod(NamedTuple):
-    """The shaker's rod behind its tip: width [px] across it, its standard error, and columns by which a row leans.
+_NO_SIDES = ((math.nan, math.nan), 0.0)
 
-    NaN and 0 where its sides are not seen.
+
+def rod_sides(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -> tuple[tuple[float, float], float]:
+    """Width [px] across the rod, its standard error, and columns by which a row leans; NaN and 0 where not seen.
+
+    The rod moves along its sides, so that they are sharp in the mean over the sample.  Rows of the lower half count
+    that show as much contrast as most do: neither sticker nor tip.
     """
-
-    width: float
-    error: float
-    lean: float
-
-
-def rod_sides(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -> Rod:
-    """The rod by its sides, along which it moves, so that they are sharp in the mean over the sample.
-
-    Rows of the lower half count that show as much contrast as most do: neither sticker nor tip.
-    """
-    unknown = Rod(math.nan, math.nan, 0.0)
     mean = frames[:, frames.shape[1] // 2 :].mean(0, dtype=np.float64)
     low, high = rod[0] - HALF, rod[1] + HALF
     if low < 0 or high > mean.shape[1]:
-        return unknown
+        return _NO_SIDES
     outside = 0.5 * (mean[:, low : low + 3].mean(1) + mean[:, high - 3 : high].mean(1))
     step = mean[:, rod_middle(rod, 0.2)].mean(1) - outside
     sign = float(np.sign(np.median(step)))
@@ -886,25 +844,17 @@ def rod_sides(frames: NDArray[np.floating], rod: tuple[int, int], blur: float) -
     first, last = low + solid.argmax(1) - 0.5, high - solid[:, ::-1].argmax(1) - 0.5
     sides = []
     for guess, rising in ((first, sign), (last, -sign)):
-        windows, inside = gather(mean.T[None], guess[None], rows, HALF)
-        fit = fit_edges(windows[0], blur, sign=rising)
-        sides.append(np.where(inside[0], np.rint(guess) + fit.position, np.nan))
+        _, inside, _, side = edges_about(mean.T[None], guess[None], rows, HALF, blur, rising)
+        sides.append(np.where(inside, side, np.nan)[0])
     found, middle = sides[1] - sides[0], 0.5 * (sides[0] + sides[1])
     known = np.isfinite(found)
     known &= np.abs(found - np.median(found[known])) < 1.0 if known.any() else known
     if np.count_nonzero(known) < _ROWS:
-        return unknown
+        return _NO_SIDES
     lean = float(polyfit(rows[known], middle[known], 1)[0])
     across = 1.0 / math.sqrt(1.0 + lean * lean)
     scatter = float(np.std(found[known])) / math.sqrt(np.count_nonzero(known) / 3.0)
-    return Rod(across * float(np.mean(found[known])), math.hypot(scatter, _SIDE), lean)
-
-
-def _reaches_border(bands: BeamBands, middle: NDArray[np.intp]) -> bool:
-    """Return True if the object below the beam reaches the border of the picture without a gap."""
-    objects = bands.objects
-    shown = (bands.alone & objects.follows)[:, middle]
-    return bool(shown.any() and (objects.after_end[:, middle] == objects.height)[shown].mean() > 0.9)
+    return (across * float(np.mean(found[known])), math.hypot(scatter, _SIDE)), lean
 
 
 def _stands_alone(bands: BeamBands, middle: NDArray[np.intp], near: Floats) -> bool:
@@ -920,9 +870,10 @@ def _stands_alone(bands: BeamBands, middle: NDArray[np.intp], near: Floats) -> b
     ends = ~objects.further[:, middle] & (objects.after_end[:, middle] < objects.height)
     if (ends & shown)[frames].sum() < 0.8 * shown[frames].sum():
         return False
-    size = (objects.after_end - objects.after)[:, middle]
-    height = np.array([np.median(size[k][shown[k]]) for k in np.flatnonzero(frames)])
-    top = np.array([np.median(objects.after[k, middle][shown[k]]) for k in np.flatnonzero(frames)])
+    height, top = (
+        masked_median(one[:, middle][frames], shown[frames])
+        for one in (objects.after_end - objects.after, objects.after)
+    )
     gap = (top - near[frames])[np.isfinite(near[frames])]
     even = np.ptp(np.percentile(height, (10, 90))) <= 2.5
     return bool(even and gap.size and np.percentile(gap, 2) > _CLEAR)
@@ -931,17 +882,13 @@ def _stands_alone(bands: BeamBands, middle: NDArray[np.intp], near: Floats) -> b
 def _begin(view: BeamView, bands: BeamBands, middle: NDArray[np.intp], isolated: bool) -> NDArray[np.intp]:
     """Row in each frame of the sample from which to look for a sticker; -1 where nothing is seen."""
     objects = bands.objects
-    begin = np.full(objects.start.shape[0], -1, dtype=np.intp)
-    for k in range(begin.size):
-        apart = bands.alone[k, middle] & objects.follows[k, middle]
-        if apart.mean() > 0.5:
-            if isolated:
-                begin[k] = int(np.median(objects.end[k, middle][apart])) + 2
-            else:
-                begin[k] = int(np.median(objects.after[k, middle][apart])) + 4
-        elif objects.found[k, middle].any() and not isolated:
-            begin[k] = int(np.median(objects.start[k, middle][objects.found[k, middle]]) + view.thickness) + 4
-    return begin
+    apart, found = (bands.alone & objects.follows)[:, middle], objects.found[:, middle]
+    clear = apart.mean(1) > 0.5
+    if isolated:
+        return np.where(clear, np.nan_to_num(masked_median(objects.end[:, middle], apart)) + 2, -1).astype(np.intp)
+    after = np.nan_to_num(masked_median(objects.after[:, middle], apart)).astype(np.intp)
+    start = np.nan_to_num(masked_median(objects.start[:, middle], found) + view.thickness, nan=-5.0)
+    return np.where(clear, after, start.astype(np.intp)) + 4
 
 
 def _outline(
@@ -951,17 +898,12 @@ def _outline(
     rod: tuple[int, int],
     beam: BeamRows,
     reference: Floats,
-    *,
-    learn: bool,
 ) -> tuple[TipOutline, float]:
     """The tip's outline where it stands clear of the beam, counted from the sticker if there is one.
 
     Also the standard deviation [px] by which the sticker moves against the tip; 0 if it is no more than noise.
     """
     columns = spread_columns(rod[0] + 1, rod[1] - 2, 48)
-    if not learn:
-        nothing: Floats = np.empty(0)
-        return TipOutline(np.empty(0, dtype=np.intp), nothing, nothing), 0.0
     objects = bands.objects
     near = beam.row + view.thickness
     edge = near[:, None] + beam.slope[:, None] * (columns - view.contact_column)
@@ -979,8 +921,7 @@ def _outline(
     at = np.flatnonzero(known)
     smooth = np.abs(np.diff(outline[at])) < _STEEP * np.diff(columns[at])
     first, last = longest_stretch(smooth)  # beyond a step it is not the tip
-    known[:] = False
-    known[at[first : last + 1]] = True
+    known = np.isin(np.arange(columns.size), at[first : last + 1])
     loose = 0.0
     seen = good & known & np.isfinite(reference)[:, None]
     count = seen.sum(1)
@@ -1028,10 +969,10 @@ def survey(
         bright = far > level
     mask = smooth > level if bright else smooth < level
     if border:
-        mask[:, : border + 1] = False
+        mask = without_rows(mask, 0, border)
     fixtures = ((0, border), *fixed_bars(mask)) if border and bright == (far > level) else fixed_bars(mask)
-    for first, last in fixtures:
-        mask[:, max(first - 1, 0) : last + 1] = False
+    for bar in fixtures:
+        mask = without_rows(mask, *bar)
     bands = find_bands(column_objects(mask), height, level, bright)
     rod = find_rod(bands)
     if settings.shaker and rod is None:

@@ -31,10 +31,11 @@ from snapbeam.lab.tracking.measure import (
     TrackedRows,
     alternation,
     exposure_blur,
+    fastest,
     fields_apart,
     find_rest,
+    measure,
     measure_beam,
-    measure_shaker,
     touching,
 )
 from snapbeam.lab.tracking.settings import FrameFlag, Orientation, Scene, TrackingSettings, VideoFields
@@ -74,7 +75,8 @@ def tracked_dataset(
     """
     motion_blur = ExposureBlur(0.0, 0.0, 0.0)
     opened = None if recording.exposure is None else recording.exposure * recording.frame_rate
-    if not (fields.shift or fields.apart or scene.noise.lag):
+    whole = not (fields.shift or fields.apart or scene.noise.lag)  # frames, each of an instant
+    if whole:
         motion_blur = exposure_blur(rows.row, rows.width, opened)
     rows = _as_filtered(rows, scene, fields, motion_blur.late)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
@@ -97,7 +99,7 @@ def tracked_dataset(
     scale = down * 1e3 / math.hypot(1.0, 0.0 if scene.shaker is None else scene.shaker.turn * down / across)
     beam, shaker = scene.beam, scene.shaker
     order = FrameOrder((), (), ())
-    if not (fields.shift or fields.apart or scene.noise.lag):
+    if whole:
         steady = np.nan if shaker is not None and shaker.loose else 1.0  # a sticker that swings is no clock
         clock = tuple(drive_clock(steady * rows.shaker))
         if all(kind != "scattered" for kind, _ in clock):  # frames at uneven times look like lost ones
@@ -110,7 +112,8 @@ def tracked_dataset(
     tip = rows.shaker + (shaker.tip_offset if shaker is not None else np.nan)
     shaker_mm = settings.rest * 1e3 - turn.sign * scale * (tip - beam.thickness - rest.row)
     closing_mm = turn.sign * (shaker_mm - beam_mm)
-    offset = math.hypot(_offset_error(rows.row, rest), scene.row_errors[1])
+    at_rest = rest.error if rest.found else float(np.nanmax(rows.row) - np.nanmin(rows.row))  # the range of the motion
+    offset = math.hypot(at_rest, scene.row_errors[1])
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
     seen = SeenMotion(
@@ -159,11 +162,13 @@ def tracked_dataset(
         "beam_row_stderr": (rows.error, "px", "noise of the beam's row, standard error"),
     }
     if shaker is not None:
-        own["shaker_displacement_mm"] = (shaker_mm, "mm", "shaker displacement")
-        own["penetration_mm"] = (closing_mm, "mm", "penetration")
-        own["shaker_stderr_mm"] = (scale * shaker_error, "mm", "standard error of the shaker displacement")
-        own["tip_row"] = (tip, "px", "row of the shaker's tip at the contact column")
-        own["tip_row_stderr"] = (rows.shaker_error, "px", "noise of the tip's row, standard error")
+        own |= {
+            "shaker_displacement_mm": (shaker_mm, "mm", "shaker displacement"),
+            "penetration_mm": (closing_mm, "mm", "penetration"),
+            "shaker_stderr_mm": (scale * shaker_error, "mm", "standard error of the shaker displacement"),
+            "tip_row": (tip, "px", "row of the shaker's tip at the contact column"),
+            "tip_row_stderr": (rows.shaker_error, "px", "noise of the tip's row, standard error"),
+        }
         if shaker.sticker is not None:
             own["marker_row"] = (rows.shaker, "px", "row of the middle of the sticker")
     for name, (values, units, long_name) in own.items():
@@ -182,23 +187,12 @@ def _as_filtered(rows: TrackedRows, scene: Scene, fields: VideoFields, late: flo
     lag = noise.lag + fields.lag + late
 
     def widened(row: Floats, error: Floats) -> Floats:
-        step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
-        most = np.nan_to_num(np.fmax(step[1:], step[:-1]))
-        return np.hypot(np.hypot(noise.factor * error, lag * most), math.hypot(fields.shift, scene.row_errors[0]))
+        moved = lag * np.nan_to_num(fastest(row))
+        return np.hypot(np.hypot(noise.factor * error, moved), math.hypot(fields.shift, scene.row_errors[0]))
 
-    if lag == 0.0 and noise.factor == 1.0 and fields.shift == 0.0 and scene.noise.rows == 0.0:
-        return rows
     return dataclasses.replace(
         rows, error=widened(rows.row, rows.error), shaker_error=widened(rows.shaker, rows.shaker_error)
     )
-
-
-def _offset_error(row: Floats, rest: Rest) -> float:
-    """Standard error [px] of the row at rest; the range of the motion where the rest was not recorded."""
-    if rest.found:
-        return rest.error
-    known = row[np.isfinite(row)]
-    return float(np.ptp(known)) if known.size else float("nan")
 
 
 def _attributes(
@@ -315,9 +309,7 @@ def track(
     done = 0
     for batch in recording.batches(size):
         frames = prepare(batch)
-        beam = measure_beam(scene.beam, frames)
-        near = beam.row + scene.beam.thickness
-        tip = None if scene.shaker is None else measure_shaker(scene.beam, scene.shaker, frames, near, beam.slope)
+        beam, tip = measure(scene, frames)
         follower.add(frames, beam, tip, marks(batch))
         background.add(frames, beam.row)
         done += batch.shape[0]
@@ -346,17 +338,14 @@ def edges_in(
 ) -> Callable[[int], tuple[dict[str, Any], dict[str, float]]]:
     """Find beam and shaker; return a function of a frame that gives attributes and variables of it as :func:`track` does."""
     scene, prepare = _find_scene(recording, settings, *_sample(recording))
-    beam, shaker = scene.beam, scene.shaker
 
     def measured(index: int) -> tuple[dict[str, Any], dict[str, float]]:
-        frames = prepare(recording.frame(index)[None])
-        seen = measure_beam(beam, frames)
-        rows = {"beam_row": float(seen.row[0]), "beam_slope": float(seen.slope[0])}
-        if shaker is not None:
-            row = float(measure_shaker(beam, shaker, frames, seen.row + beam.thickness, seen.slope).row[0])
-            rows["tip_row"] = row + shaker.tip_offset
-            if shaker.sticker is not None:
-                rows["marker_row"] = row
+        beam, tip = measure(scene, prepare(recording.frame(index)[None]))
+        rows = {"beam_row": float(beam.row[0]), "beam_slope": float(beam.slope[0])}
+        if tip is not None and scene.shaker is not None:
+            rows["tip_row"] = float(tip.row[0]) + scene.shaker.tip_offset
+            if scene.shaker.sticker is not None:
+                rows["marker_row"] = float(tip.row[0])
         return _of_scene(scene, settings), rows
 
     return measured
@@ -398,12 +387,8 @@ class _Prepare:
     """Rotate a batch of frames so that the shaker is below, linearise grey levels, subtract the background."""
 
     def __init__(self, recording: Recording, turn: Orientation, settings: TrackingSettings, saturated: float) -> None:
-        self.turn = turn
-        self.full = float(recording.max_value)
-        self.power = 1.0 / settings.gamma
-        self.saturated = saturated
-        if math.isfinite(saturated) and settings.gamma != 1.0:
-            self.saturated = float(self._light(np.array(saturated, dtype=np.float32)))
+        self.turn, self.full, self.power = turn, np.float32(recording.max_value), np.float32(1.0 / settings.gamma)
+        self.saturated = float(self._light(np.array(saturated, dtype=np.float32)))
         self.background: Floats | None = None
         if settings.background is not None:
             picture = self._light(np.asarray(settings.background, dtype=np.float32))
@@ -413,10 +398,7 @@ class _Prepare:
     def _light(self, grey: NDArray) -> NDArray[np.float32]:
         if self.power == 1.0:
             return grey
-        light: NDArray[np.float32] = (
-            np.float32(self.full) * np.maximum(grey / np.float32(self.full), 0.0) ** np.float32(self.power)
-        ).astype(np.float32)
-        return light
+        return np.asarray(self.full * np.maximum(grey / self.full, 0.0) ** self.power, dtype=np.float32)
 
     def __call__(self, batch: NDArray[np.integer]) -> NDArray[np.float32]:
         frames = self._light(batch.astype(np.float32))
@@ -429,23 +411,20 @@ class _FixedMarks:
     """Rows by which the camera has sunk against marks that stand still, batch by batch."""
 
     def __init__(self, head: NDArray[np.integer], settings: TrackingSettings, turn: Orientation) -> None:
-        self.marks = settings.fixed_marks
-        self.turn = turn
-        self.references = [self._profiles(head, mark).mean(0) for mark in self.marks]
+        self.marks, self.turn = settings.fixed_marks, turn
+        self.references = [profiles.mean(0) for profiles in self._profiles(head)]
         self.largest = 0.0
 
-    def _profiles(self, batch: NDArray[np.integer], mark: tuple[int, int, int, int]) -> NDArray[np.float64]:
-        top, bottom, left, right = mark
-        part = self.turn.turn(batch[:, top:bottom, left:right].astype(np.float64))
-        profile: NDArray[np.float64] = part.mean(-1)
-        return profile
+    def _profiles(self, batch: NDArray[np.integer]) -> list[NDArray[np.float64]]:
+        parts = (batch[:, top:bottom, left:right].astype(np.float64) for top, bottom, left, right in self.marks)
+        return [self.turn.turn(part).mean(-1) for part in parts]
 
     def __call__(self, batch: NDArray[np.integer]) -> Drift | None:
         if not self.marks:
             return None
         total, weight = np.zeros(batch.shape[0]), np.zeros(batch.shape[0])
-        for mark, reference in zip(self.marks, self.references, strict=True):
-            shift, error = profile_shift(self._profiles(batch, mark), reference)
+        for profiles, reference in zip(self._profiles(batch), self.references, strict=True):
+            shift, error = profile_shift(profiles, reference)
             sound = np.isfinite(shift) & np.isfinite(error) & (error < 1.0)
             inverse = np.where(sound, 1.0 / np.maximum(error, 1e-3) ** 2, 0.0)
             total += np.where(sound, shift, 0.0) * inverse
@@ -563,13 +542,11 @@ def tracking_quality(dataset: xr.Dataset) -> dict[str, Any]:
     """
     dataset = check_tracked(dataset)
     flags = dataset["flags"].values.astype(int)
-    measured = np.isfinite(dataset["displacement_mm"].values)
-    shaker = "shaker_displacement_mm" in dataset
-    if shaker:
-        measured &= np.isfinite(dataset["shaker_displacement_mm"].values)
+    moving = [dataset[name].values for name in ("displacement_mm", "shaker_displacement_mm") if name in dataset]
+    measured = np.isfinite(moving).all(0)
     pixel = dataset.attrs["pixel_size"] * 1e3
     runs = np.diff(np.flatnonzero(np.concatenate([[True], measured, [True]]))) - 1
-    steps = np.abs(np.diff(dataset["displacement_mm"].values)) / pixel
+    steps = np.abs(np.diff(moving[0])) / pixel
     return {
         "frames": int(flags.size),
         "measured_share": float(measured.mean()),
@@ -577,7 +554,7 @@ def tracking_quality(dataset: xr.Dataset) -> dict[str, Any]:
         "counts": {flag.words: int(((flags & int(flag)) != 0).sum()) for flag in FrameFlag if flag},
         "longest_gap": int(runs.max()),
         "beam_stderr_px": _median(dataset["displacement_stderr_mm"].values / pixel),
-        "shaker_stderr_px": _median(dataset["shaker_stderr_mm"].values / pixel) if shaker else float("nan"),
+        "shaker_stderr_px": _median(dataset["shaker_stderr_mm"].values / pixel) if len(moving) > 1 else float("nan"),
         "confidence": _median(dataset["confidence"].values),
         "largest_step_px": float(np.nanmax(steps)) if np.isfinite(steps).any() else float("nan"),
         "snr_db": float(dataset.attrs["snr_db"]),
@@ -609,18 +586,14 @@ def tracking_report(dataset: xr.Dataset, *, diagnostics: bool = True) -> str:
     quality = tracking_quality(dataset)
     attrs = dataset.attrs
     pixel = attrs["pixel_size"] * 1e6
+    shaker = f", shaker {quality['shaker_stderr_px']:.3f} px (tip: {attrs['tip_source']})"
+    shaker = "" if np.isnan(quality["shaker_stderr_px"]) else shaker
     lines = [
         f"{quality['frames']} frames at {attrs['frame_rate']:g} Hz, {pixel:g} um per pixel; "
         f"{100 * quality['measured_share']:.2f} % measured, {100 * quality['flagged_share']:.2f} % flagged",
         f"signal to noise {quality['snr_db']:.1f} dB, edge width {quality['edge_width']:.2f} px, beam "
-        f"{attrs['beam_thickness_px'] * pixel * 1e-3:.3f} mm thick, "
-        f"shaker followed by: {attrs['shaker_mark']}",
-        f"standard error: beam {quality['beam_stderr_px']:.3f} px"
-        + (
-            ""
-            if np.isnan(quality["shaker_stderr_px"])
-            else f", shaker {quality['shaker_stderr_px']:.3f} px (tip: {attrs['tip_source']})"
-        ),
+        f"{attrs['beam_thickness_px'] * pixel * 1e-3:.3f} mm thick, shaker followed by: {attrs['shaker_mark']}",
+        f"standard error: beam {quality['beam_stderr_px']:.3f} px{shaker}",
     ]
     if quality["largest_step_px"] > 0.0:
         lines.append(f"the beam moved at most {quality['largest_step_px']:.1f} px between frames")
@@ -690,12 +663,11 @@ def contact_onsets(dataset: xr.Dataset, *, tolerance: float | None = None, minim
     middle = 0.5 * exposure if math.isfinite(exposure) else 0.0
     rows = []
     for start, stop, bounded in _contacts(gap, limit):
-        if stop - start < minimum_frames:
-            continue
-        onset, speed, onset_error = _crossing(time, gap, start, -1, limit, noise)
-        end, _, end_error = _crossing(time, gap, stop - 1, +1, limit, noise)
-        span = math.hypot(onset_error, end_error)
-        rows.append((onset + middle, onset_error, max(end - onset, 0.0), span, stop - start, speed, bounded))
+        if stop - start >= minimum_frames:
+            onset, speed, onset_error = _crossing(time, gap, start, -1, limit, noise)
+            end, _, end_error = _crossing(time, gap, stop - 1, +1, limit, noise)
+            span = math.hypot(onset_error, end_error)
+            rows.append((onset + middle, onset_error, max(end - onset, 0.0), span, stop - start, speed, bounded))
     table = np.array(rows, dtype=np.float64).reshape(-1, 7)
     names = {
         "onset": ("s", "time at which contact begins"),
@@ -716,12 +688,9 @@ def contact_onsets(dataset: xr.Dataset, *, tolerance: float | None = None, minim
 def _noise(dataset: xr.Dataset) -> float:
     """Standard deviation of the penetration [mm] from the noise of both edges."""
     scale = float(dataset.attrs.get("pixel_size", 0.0)) * 1e3
-    errors = [
-        scale * float(np.nanmedian(dataset[name].values))
-        for name in ("beam_row_stderr", "tip_row_stderr")
-        if name in dataset and np.isfinite(dataset[name].values).any()
-    ]
-    return float(np.hypot(errors[0], errors[1])) if len(errors) == 2 else 0.0
+    names = [name for name in ("beam_row_stderr", "tip_row_stderr") if name in dataset]
+    errors = [scale * _median(dataset[name].values) for name in names]
+    return float(np.hypot(errors[0], errors[1])) if len(errors) == 2 and np.isfinite(errors).all() else 0.0
 
 
 def _contacts(gap: np.ndarray, limit: float) -> list[tuple[int, int, bool]]:
@@ -750,28 +719,26 @@ def _crossing(
 ) -> tuple[float, float, float]:
     """Time at which a line through the frames beyond *edge* meets zero, its speed [m/s], the time's error.
 
-    As few frames as the noise allows, two to five, since beam and tip do not move in straight lines.
-
-    ``edge`` is the first (``step`` = -1, approach) or last (+1, parting) frame of the contact.  The crossing
-    is sought from the nearest frame outside to the first inside that has closed to within the noise.
+    As few frames as the noise allows, two to five, since beam and tip do not move in straight lines.  ``edge`` is the
+    first (``step`` = -1, approach) or last (+1, parting) frame of the contact.  The crossing is sought from the
+    nearest frame outside to the first inside that has closed to within the noise.
     """
     outside: list[int] = []
     k = edge + step
-    while 0 <= k < gap.size and len(outside) < 5 and gap[k] <= -limit:
-        if outside and gap[k] > gap[outside[-1]] + limit:
-            break
+    while (
+        0 <= k < gap.size and len(outside) < 5 and gap[k] <= min(-limit, gap[outside[-1]] + limit if outside else 0.0)
+    ):
         outside.append(k)
         k += step
     usual = float(np.median(np.diff(time)))
-    if len(outside) < 2:
-        return float(time[edge]), float("nan"), 0.5 * usual
-    frame = abs(float(time[outside[0]] - time[edge]))
+    slope = 0.0
     for count in range(2, len(outside) + 1):
         slope, level = polyfit(time[outside[:count]] - time[edge], gap[outside[:count]], 1)
         # The line's error where it is continued to, about 2 noise/sqrt(count), in frames of the approach.
+        frame = abs(float(time[outside[0]] - time[edge]))
         if slope * step < 0.0 and 2.0 * noise / math.sqrt(count) < 0.2 * abs(slope) * frame:
             break
-    if slope * step >= 0.0:
+    if slope * step >= 0.0:  # also of fewer than two frames
         return float(time[edge]), float("nan"), 0.5 * usual
     inside = edge
     while 0 <= inside - step < gap.size and gap[inside] < -noise and gap[inside - step] > -limit:
