@@ -176,7 +176,8 @@ def _peak(of: str) -> Callable[[Reading], Values]:
 def _rms(of: str) -> Callable[[Reading], Values]:
     def value(reading: Reading) -> Values:
         mean = _over(reading.seen(f"square_{of}"), reading.duration)
-        return np.asarray(np.sqrt(mean) / (reading.speed if "velocity" in of else reading.length))
+        real = np.where(mean >= 0.0, mean, np.nan)  # less its change along a chaotic run it may be negative
+        return np.asarray(np.sqrt(real) / (reading.speed if "velocity" in of else reading.length))
 
     return value
 
