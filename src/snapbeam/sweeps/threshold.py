@@ -122,7 +122,11 @@ def threshold(
     axes = {} if axes is None else axes
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map parameters to arrays of values")
-    if (not isinstance(values, (range, list, tuple)) and np.asarray(values).ndim == 0) or len(values) < 2:  # type: ignore[arg-type]
+    try:
+        count = 0 if isinstance(values, (str, bytes)) else len(values)  # type: ignore[arg-type]
+    except TypeError:  # of what has no length
+        count = 0
+    if count < 2:
         raise InputError(f"{parameter}: must be an array of at least two values to choose from")
     asked = Integration() if integration is None else integration
     if not isinstance(asked, Integration):
