@@ -7,14 +7,14 @@ import time
 from pathlib import Path
 from typing import Any
 
-from snapbeam.solver.splitting import COMPOSITIONS
-
 from benchmarks.cases import Case
 from benchmarks.charts import scaling_chart
 from benchmarks.ensemble import ensemble_of, sample
 from benchmarks.report import save, table
 from benchmarks.timing import measure
+from snapbeam import _core
 from snapbeam.solver import native
+from snapbeam.solver.step_size import composition_of
 
 __all__ = ["run"]
 
@@ -63,7 +63,7 @@ def _modes(count: int, repeats: int) -> dict[str, Any]:
     ensemble = case.ensemble(plan, 200)
     timing = measure(lambda: native.run_ensemble(ensemble, 1), repeats)
     accumulators_of_runs = native.run_ensemble(ensemble, 1)
-    kicks = int(accumulators_of_runs["steps"][0]) * COMPOSITIONS[plan.order].flow.size
+    kicks = int(accumulators_of_runs["steps"][0]) * len(_core.COMPOSITIONS[composition_of(plan.order)][0])
     return {
         "modes": count,
         "milliseconds": 1e3 * timing.seconds,
