@@ -15,6 +15,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="interrupts are 
 # the kernel continues sem_wait after each signal (siginterrupt), so that it never comes back to Python
 BLOCKED = """
 import ctypes, signal
+from pathlib import Path
 from snapbeam.util import interrupts
 interrupts.install()
 libc, semaphore = ctypes.CDLL(None), ctypes.create_string_buffer(64)
@@ -35,7 +36,7 @@ BODIES = {
         blocked()""",
     "held": """
     with interrupts.held_back() as incomplete:
-        incomplete.add(interrupts.Path("half"))
+        incomplete.add(Path("half"))
         open("half", "w").close()
         blocked()""",
 }

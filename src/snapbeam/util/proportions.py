@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from snapbeam.util.validation import InputError, finite_array, shown, within
 
@@ -29,6 +28,8 @@ def proportion(
     good, total, lost = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (hits, runs, failed)))
     if (good < 0).any() or (good > total).any():
         raise InputError("hits: must be between 0 and the number of runs")
+    from scipy import special  # not loaded with every figure
+
     z = float(special.ndtri(0.5 * (1.0 + within("confidence", confidence, 0.0, 1.0))))
     share = np.divide(good, total, where=total > 0, out=np.full(total.shape, np.nan))
     low, high = _limits(good, total + lost, z)[0], _limits(good + lost, total + lost, z)[1]
@@ -48,6 +49,8 @@ def mean_interval(values: ArrayLike, confidence: float = 0.95, positive: bool = 
     mean = np.divide(np.where(known, given, 0.0).sum(axis=-1), count, where=count > 0, out=np.full(count.shape, np.nan))
     squares = np.where(known, (given - mean[..., None]) ** 2, 0.0).sum(axis=-1)
     freedom = np.maximum(count - 1, 1)
+    from scipy import special  # not loaded with every figure
+
     half = special.stdtrit(freedom, 0.5 * (1.0 + confidence)) * np.sqrt(squares / freedom / np.maximum(count, 1))
     least, most = (np.fmin.reduce(given, -1, initial=np.inf), np.fmax.reduce(given, -1, initial=-np.inf))
     good = (least < most) & known.all(axis=-1)
