@@ -45,4 +45,4 @@ def test_chirp_that_ends_in_contact(start: float, stop: float, velocity: float, 
         assert np.ptp(balance[at_edge]) < 2e-9 * run.summary.gross_work
     inside = (time > 0.0) & (time < float(run.impacts.duration[0]))
     most, recorded = float(run.impacts.peak_force[0]), float(force[inside].max())
-    assert most >= recorded * (1.0 - (1e-6 if accuracy == "standard" else 1e-9))
+    assert most >= recorded * (1.0 - (2e-5 if accuracy == "standard" else 1e-9))

@@ -86,7 +86,7 @@ CASES = [
     ("hunt-crossley", 8, 1, 1e-7, 1e-11),
     # the force begins with a jump, whose onset lies between two ticks
     ("kelvin-voigt", 1, 5, 1.3e-6, 4e-11),
-    ("kelvin-voigt", 3, 2, 1e-7, 4e-12),
+    ("kelvin-voigt", 3, 2, 2e-7, 4e-12),
     ("kelvin-voigt", 8, 1, 3.4e-8, 1e-11),
 ]
 
