@@ -384,6 +384,13 @@ def test_runs_of_the_same_parts_are_consistent(kind: int, tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [607, 810, 933, 1131, 1379, 1424])
+def test_systems_with_a_circuit_faster_than_the_step(seed: int) -> None:
+    """Their errors were beyond what is allowed before the lag of such a circuit was taken into account."""
+    judge([checked(seed, levels=("reference", "standard"))])
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("first", range(0, COUNT, CHUNK))
 def test_random_systems(first: int) -> None:
     """Any parts with any numbers; every tenth also at the standard level."""

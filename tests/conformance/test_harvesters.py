@@ -101,6 +101,20 @@ def test_a_circuit_faster_than_the_step(strikers, decay) -> None:
     assert deviation(sb.System(model(3), harvesters=[coil], **parts), 1.0 / decay) < 3e-8
 
 
+@pytest.mark.filterwarnings("ignore:contact. the mass that an impulse")
+@pytest.mark.parametrize(("ratio", "velocity"), [(0.05, 0.02), (0.3, 0.2)])
+def test_a_circuit_faster_than_the_step_beside_a_tip_that_holds_the_beam(ratio, velocity) -> None:
+    """Newton's law: the beam stays on the tip for a third of the time; what holds it moves the circuit too."""
+    drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
+    contacts = [sb.Contact(sb.Restitution(coefficient=0.5), sb.Striker(drive=drive))]
+    step = flight_step(sb.System(model(3), contacts=contacts))
+    coil = sb.ElectromagneticHarvester(force_factor=1.5, resistance=40.0, inductance=40.0 * step / 60.0, location=0.4)
+    system = sb.System(model(3), contacts=contacts, harvesters=[coil])
+    held = sb.simulate(system, sb.Integration(cycles=2, accuracy="reference")).summary.contact_time_fraction
+    assert held > 0.25
+    assert deviation(system, 1.0 / 60.0) < 2e-7
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("modes", [1, 3, 8])
 def test_piezo(modes) -> None:

@@ -18,7 +18,7 @@ namespace SNAPBEAM_SET {
 constexpr double GRADING = 0.5, RELEASE = 0.5, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
 constexpr double CONTACT_TURN[3] = {0.5, 0.35, 0.35};  // of each composition
 constexpr double REVERSAL[3] = {1.0, 0.5, 0.5}, SLIDING = 4.0;  // friction reverses: change of speed in a step, and speed above which it slides, over the scale
-constexpr double ACROSS[3] = {1.0, 0.125, 0.125};  // drag reverses, scale 0: the step across over others
+constexpr double ACROSS[3] = {1.0, 0.125, 0.125};  // drag reverses (scale 0): shortest step across zero speed, over the flight step
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
 template <class L> constexpr int MOST_CORRECTIONS = L::directions > 0 ? 30 : CORRECTIONS;  // of a state the error is of second order, of derivatives of first
 

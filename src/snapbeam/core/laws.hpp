@@ -45,9 +45,6 @@ template <int NUMBERS, bool CONTACT> struct Law {
     static constexpr int numbers = NUMBERS;
     static int state(const double *) { return -1; }
     static constexpr bool contact = CONTACT, lossy = false, timed = false, affine = CONTACT, memory = false, impulsive = false, rough = false;
-    template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
-    template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
-    template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T damping(T, T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T pressing(T, T, const T *) { return T(1.0); }
     template <class T> static SNAPBEAM_FN T yield(const T *) { return T(INFINITY); }
@@ -58,7 +55,11 @@ template <int NUMBERS, bool CONTACT> struct Law {
     template <class T> static SNAPBEAM_FN T high(const T *) { return T(INFINITY); }
 };
 template <int NUMBERS> using ContactLaw = Law<NUMBERS, true>;
-template <int NUMBERS> using ForceLaw = Law<NUMBERS, false>;
+template <int NUMBERS> struct ForceLaw : Law<NUMBERS, false> {  // a contact has no force, potential and stiffness by default
+    template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T stiffness(T, const T *) { return T(0.0); }
+};
 
 struct Hertz : ContactLaw<1> {  // f = k d^(3/2)
     template <class T> static SNAPBEAM_FN T force(T d, T, const T *P) { return P[0] * d * sqrt(d); }
@@ -134,6 +135,8 @@ struct ElasticPlastic : ContactLaw<3> {
 // together r.omega^2 r/(r.r)^2, the stiffness that it cancels along the row.
 struct Restitution : ContactLaw<2> {
     static constexpr bool lossy = true, affine = false, impulsive = true;
+    template <class T> static SNAPBEAM_FN T force(T, T, const T *) { return T(0.0); }
+    template <class T> static SNAPBEAM_FN T potential(T, const T *) { return T(0.0); }
     template <class T> static SNAPBEAM_FN T stiffness(T, const T *P) { return P[1]; }
 };
 

@@ -347,9 +347,22 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
             const Number own = fma(after, slope[i], v[i]);
             y[i] = c.contact ? tip[i] - own : own;
             f[i] = force_at(c, c.x, y[i]);
-            if (c.circuit) f[i] = select(c.follows, f[i], Number(0.0));
         }
-        for (int i = 0; i < count; ++i) f[i] += pulled_along(z, z.channel[z.late[i]], f, i, count);
+        for (int sweep = 0;; ++sweep) {
+            for (int i = 0; i < count; ++i) {
+                const Channel<L> &c = z.channel[z.late[i]];
+                if (c.circuit) f[i] = select(c.follows, force_at(c, c.x, y[i]), Number(0.0)) + pulled_along(z, c, f, i, count);
+            }
+            if (sweep >= (held > 1 ? 16 : following ? 2 * held : held)) break;
+            for (int i = 0; i < count; ++i) {  // held together, each by the others
+                const Channel<L> &c = z.channel[z.late[i]];
+                if (!c.impulsive) continue;
+                f[i] = wanted[i];
+                for (int j = 0; j < count; ++j)
+                    if (j != i) f[i] -= c.M[z.late[j]] * f[j];
+                f[i] = select(acting(c), f[i] / c.M[z.late[i]], Number(0.0));
+            }
+        }
     };
     // f of a circuit beside what free modes carry along
     const auto apart = [&](int i) { return f[i] + v[i] - z.channel[z.late[i]].x + pushed[i]; };
@@ -385,15 +398,6 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
         for (int i = 0; i < count; ++i) change[i] = slope[i] = Number(0.0), twice[i] = fma(step, impulse[i], twice[i]);
         for (int stage = 0; stage < 4; ++stage) {
             push(Number(ahead[stage]) * step);
-            for (int sweep = 0; sweep < (held > 1 ? 16 : held); ++sweep)  // held together, each by the others
-                for (int i = 0; i < count; ++i) {
-                    const Channel<L> &c = z.channel[z.late[i]];
-                    if (!c.impulsive) continue;
-                    f[i] = wanted[i];
-                    for (int j = 0; j < count; ++j)
-                        if (j != i) f[i] -= c.M[z.late[j]] * f[j];
-                    f[i] = select(acting(c), f[i] / c.M[z.late[i]], Number(0.0));
-                }
             const Number weight = Number(share[stage]) * step;
             for (int i = 0; i < count; ++i) {
                 const Channel<L> &c = z.channel[z.late[i]];

@@ -419,6 +419,12 @@ def calibrate(
         raise InputError(
             "lower_well_shape, upper_well_shape: between unequal ends no mode is symmetric; give frequencies by order"
         )
+    first = [_symmetric(measured, well)[:1] for well in ("lower", "upper")]
+    if imperfection is not None and not all(first):
+        raise InputError(
+            f"imperfection = {imperfection!r}: needs the first frequency about both wells; the "
+            f"{'upper' if first[0] else 'lower'} one's is not given"
+        )
     fitted = _fit(beam, data, names, count)
     result, diagnostics = fitted["beam"], fitted.pop("diagnostics")
     damping, damping_se = _mean(measured.damping_ratio, measured.damping_ratio_se, 0.1)
@@ -445,14 +451,8 @@ def calibrate(
     diagnostics += doubts(answer, measured)
     told = remarks(answer, measured)
     if imperfection is not None:
-        both = [_symmetric(measured, well)[:1] for well in ("lower", "upper")]
-        if not all(both):
-            raise InputError(
-                f"imperfection = {imperfection!r}: needs the first frequency about both wells; the "
-                f"{'upper' if both[0] else 'lower'} one's is not given"
-            )
         # of the beam, the buckling level alone changes: two numbers from two frequencies
-        uneven = identify_imperfection(result, float(both[0][0]), float(both[1][0]), imperfection, count)
+        uneven = identify_imperfection(result, float(first[0][0]), float(first[1][0]), imperfection, count)
         assert uneven.beam is not None
         value, level = getattr(uneven.imperfection, imperfection), uneven.beam.buckling_level * 1e3
         told.append(

@@ -43,7 +43,6 @@ def definitions(problem: dict[str, Any]) -> dict[str, str]:
     found = {
         "SET": "gpu",
         "WIDTH": 1,
-        "ARRAYS": 1,
         "BLOCK": _BLOCK,
         "FIXED": modes if in_registers else 0,
         "CELLS": modes,
