@@ -59,6 +59,10 @@ template <int K> SNAPBEAM_FN Dual<K> sqrt(const Dual<K> &x) {  // slope 0 at 0: 
 }
 template <int K> SNAPBEAM_FN Dual<K> exp(const Dual<K> &x) { const double y = exp(x.v); return {y, Pack<K>(y) * x.d}; }
 template <int K> SNAPBEAM_FN Dual<K> log(const Dual<K> &x) { return {log(x.v), Pack<K>(1.0 / x.v) * x.d}; }
+template <int K> SNAPBEAM_FN Dual<K> decay_of(const Dual<K> &x) {
+    const double less = decay_of(x.v);
+    return {less, Pack<K>(-1.0 - less) * x.d};
+}
 template <int K> SNAPBEAM_FN Dual<K> tanh(const Dual<K> &x) { const double y = tanh(x.v); return {y, Pack<K>(1.0 - y * y) * x.d}; }
 template <int K> SNAPBEAM_FN Dual<K> sinh(const Dual<K> &x) { const double y = ::sinh(x.v); return {y, Pack<K>(sqrt(1.0 + y * y)) * x.d}; }
 template <int K> SNAPBEAM_FN Turn<Dual<K>> turn(const Dual<K> &x) {

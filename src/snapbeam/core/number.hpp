@@ -57,6 +57,7 @@ SNAPBEAM_FN int count(int *counter) {
 // --- packs and masks ----------------------------------------------------------------------------------------------------
 template <int W> struct Mask;
 template <int W> struct Pack;
+template <class T> struct Bits { typedef long long Type; };  // integers of the same size
 #if defined(__CUDACC_RTC__)  // a thread has one run
 typedef double Wide;
 #else  // vector types of GCC and Clang
@@ -65,6 +66,7 @@ template <int W> struct Vectors {
     typedef double Reals __attribute__((vector_size(8 * W)));
     typedef long long Marks __attribute__((vector_size(8 * W)));
 };
+template <int W> struct Bits<Pack<W>> { typedef typename Vectors<W>::Marks Type; };
 #define SNAPBEAM_BINARY(RESULT, NAME, FIELD, OPERATOR) \
     friend SNAPBEAM_FN RESULT NAME(Pack a, Pack b) { RESULT r; r.FIELD = a.v OPERATOR b.v; return r; }
 
@@ -235,11 +237,7 @@ template <int W> SNAPBEAM_FN Pack<W> sqrt(Pack<W> x) {
 #endif
     return each(x, [](double y) { return sqrt(y); });
 }
-template <class T> SNAPBEAM_FN T exp(T x) { return each(x, [](double y) { return ::exp(y); }); }
-template <class T> SNAPBEAM_FN T log(T x) { return each(x, [](double y) { return ::log(y); }); }
 template <class T> SNAPBEAM_FN T sinh(T x) { return each(x, [](double y) { return ::sinh(y); }); }
-template <class T> SNAPBEAM_FN T tanh(T x) { return each(x, [](double y) { return ::tanh(y); }); }
-template <class T> SNAPBEAM_FN T power(T x, T n) { return select(x > T(0.0), exp(n * log(max(x, T(1e-300)))), T(0.0)); }
 
 // Nearest integer for |x| < 2^51; needs a compiler that does not reassociate.
 template <class T> SNAPBEAM_FN T nearest(T x) {
@@ -288,14 +286,48 @@ template <class T> SNAPBEAM_CALLED Turn<T> turn(T x) {
     return {sine, cosine, select(quadrant < T(0.5), less, cosine - T(1.0))};
 }
 
-// exp(-x) - 1 for |x| <= 4, within 2e-14 of exp(-x).
-template <class T> SNAPBEAM_FN T decay_less_one(T x) {
+// The bits of a number of one type as another.
+template <class To, class From> SNAPBEAM_FN To same_bits(const From &x) {
+    To to;
+    __builtin_memcpy(&to, &x, sizeof to);
+    return to;
+}
+constexpr double LN_2[2] = {0.693147180369123816490, 1.90821492927058770002e-10};  // and what it lacks
+constexpr double TWO_52 = 4503599627370496.0;  // whose last bits count ones
+
+// e^x = 2^k e^r, |r| <= ln(2)/2, by the Taylor polynomial; within 3e-16 of it.
+template <class T> SNAPBEAM_FN T exp(T x) {
+    const T k = nearest(min(max(x, T(-708.0)), T(709.78)) * T(1.4426950408889634)), r = fma(k, T(-LN_2[1]), fma(k, T(-LN_2[0]), x));
+    const T e = horner(r, {1.0, 1.0, 0.5, 1.666666666666667e-01, 4.166666666666666e-02, 8.333333333333333e-03, 1.388888888888889e-03, 1.984126984126984e-04,
+                           2.480158730158730e-05, 2.755731922398589e-06, 2.755731922398589e-07, 2.505210838544172e-08, 2.087675698786810e-09, 1.605904383682161e-10});
+    const T half = same_bits<T>(same_bits<typename Bits<T>::Type>(k + T(TWO_52 + 1022.0)) << 52);  // 2^(k - 1)
+    return select(x < T(-708.0), T(0.0), select(x > T(709.78), T(INFINITY), T(2.0) * (e * half)));
+}
+// ln x of normal x > 0: x = 2^k m, 2^(-1/2) < m <= 2^(1/2), ln m = 2 artanh s, s = (m - 1)/(m + 1).
+template <class T> SNAPBEAM_FN T log(T x) {
+    typedef typename Bits<T>::Type Integers;
+    const Integers bits_of = same_bits<Integers>(x);
+    T m = same_bits<T>((bits_of & 0x000fffffffffffffLL) | 0x3ff0000000000000LL), k = same_bits<T>((bits_of >> 52) | 0x4330000000000000LL) - T(TWO_52 + 1023.0);
+    const auto large = m > T(1.4142135623730951);
+    m = select(large, T(0.5) * m, m), k = select(large, k + T(1.0), k);
+    const T s = (m - T(1.0)) / (m + T(1.0)), z = s * s;
+    const T tail = z * horner(z, {2.0 / 3, 2.0 / 5, 2.0 / 7, 2.0 / 9, 2.0 / 11, 2.0 / 13, 2.0 / 15, 2.0 / 17, 2.0 / 19, 2.0 / 21});
+    return fma(k, T(LN_2[0]), fma(s, T(2.0), fma(s, tail, k * T(LN_2[1]))));
+}
+template <class T> SNAPBEAM_FN T power(T x, T n) { return select(x > T(0.0), exp(n * log(max(x, T(1e-300)))), T(0.0)); }
+
+// e^(-x) - 1 for any x, within 2e-14 of e^(-x).
+template <class T> SNAPBEAM_FN T decay_of(T x) {
+    const auto fast = abs(x) > T(4.0);
     const T y = x * T(-0.0625);
-    T e = horner(y, {1.0, 0.5, 1.666666666666667e-01, 4.166666666666666e-02, 8.333333333333333e-03, 1.388888888888889e-03,
-                     1.984126984126984e-04, 2.480158730158730e-05, 2.755731922398589e-06, 2.755731922398589e-07, 2.505210838544172e-08, 2.08767569878681e-09});
-    e = y * e;
+    T e = y * horner(y, {1.0, 0.5, 1.666666666666667e-01, 4.166666666666666e-02, 8.333333333333333e-03, 1.388888888888889e-03,
+                         1.984126984126984e-04, 2.480158730158730e-05, 2.755731922398589e-06, 2.755731922398589e-07, 2.505210838544172e-08, 2.08767569878681e-09});
     for (int i = 0; i < 4; ++i) e = e * (e + T(2.0));
-    return e;
+    return any(fast) ? select(fast, exp(-x) - T(1.0), e) : e;
+}
+template <class T> SNAPBEAM_FN T tanh(T x) {
+    const T e = decay_of(T(2.0) * abs(x)), size = -(e / (T(2.0) + e));
+    return select(x < T(0.0), -size, size);
 }
 
 // --- cubics -------------------------------------------------------------------------------------------------------------

@@ -48,18 +48,6 @@ template <> struct SlopesOf<0> { typedef double Type; };
 template <class L> using Slopes = typename SlopesOf<L::directions>::Type;  // derivatives beside a plain number
 constexpr int FEWEST_PARTS = 8, PARTS_PER_TURN = 12;
 
-// e^(-x) - 1 for any x.
-template <class T> SNAPBEAM_FN T decay_of(T x) {
-    const auto fast = abs(x) > T(4.0);
-    const T less = decay_less_one(x);
-    return any(fast) ? select(fast, each(x, [](double y) { return ::expm1(-y); }), less) : less;
-}
-
-template <int K> SNAPBEAM_FN Dual<K> decay_of(const Dual<K> &x) {
-    const double less = decay_of(x.v);
-    return {less, Pack<K>(-1.0 - less) * x.d};
-}
-
 // The four numbers of the flow of a mode over a time.
 template <class T> SNAPBEAM_CALLED void set_flow(T time, T sigma, T omega, T *a) {
     const T omega2 = omega * omega, square = fma(sigma, -sigma, omega2), damped = sqrt(max(square, T(1e-200)));
