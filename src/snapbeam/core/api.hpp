@@ -32,8 +32,6 @@ struct Problem {
     double center_rest;           // displacement of the centre in the first well
     double dividing_height;       // displacement of the centre that divides the wells
     int levels;                   // lengths of steps: the flight step, the contact step and its halves
-    int fewest_parts;             // parts of a kick in which forces of the velocity are integrated, at least
-    double parts_per_decay;       // and parts over the time in which the damping stops the motion along a row
     int updates;                  // statistics of a user
     const long long *update;      // address of the Update of each
 };

@@ -183,8 +183,7 @@ static Problem problem_of(Arguments &a) {
         if (plain::with_law(p.laws[j], [](auto law) { return int(law.numbers); }) > p.law_numbers) a.refuse("law_numbers", "is less than a law has");
     p.center = a.array<double>("center", {n}), p.center_rest = a.number("center_rest", -1e300, 1e300);
     p.dividing_height = a.number("dividing_height", -1e300, 1e300);
-    p.levels = a.integer("levels", 2, 40), p.fewest_parts = a.integer("fewest_parts", 1, 256);
-    p.parts_per_decay = a.number("parts_per_decay", 0.0, 1e6);
+    p.levels = a.integer("levels", 2, 40);
     const size_t updates = a.length("update");
     p.updates = int(updates), p.update = a.array<long long>("update", {updates}, false);
     for (size_t i = 0; i < updates; ++i)
@@ -470,6 +469,7 @@ NB_MODULE(_core, m) {
     }
     m.attr("COMPOSITIONS") = compositions;
     m.def("integrate", &integrate, nb::arg("problem"), nb::arg("batch"), nb::arg("layout"), nb::arg("set"), nb::arg("threads"), nb::arg("progress").none());
+    m.def("kick_parts", &plain::kick_parts<double>, nb::arg("composition"), nb::arg("decay"));
     m.attr("DIRECTIONS") = int(snapbeam::DIRECTIONS);
     m.def("integrate_tangents", &integrate_tangents, nb::arg("problem"), nb::arg("batch"), nb::arg("tangent"), nb::arg("set"), nb::arg("threads"), nb::arg("progress").none());
     m.def("record", &record, nb::arg("problem"), nb::arg("batch"), nb::arg("recorder"), nb::arg("layout"), nb::arg("set"));

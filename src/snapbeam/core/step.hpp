@@ -387,8 +387,7 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
         assign(alone, impulse[i], own_impulse), assign(alone, twice[i], own_twice), assign(alone, lost[i], own_lost);
         exact = exact | alone;
     }
-    Real parts = nearest(decay * abs(value(w)) * Real(s.problem->parts_per_decay) + Real(0.5));
-    parts = min(max(parts, Real(double(s.problem->fewest_parts))), Real(256.0));
+    const Real parts = kick_parts(s.problem->composition, decay * abs(value(w)));
     const Number h = w / Number(parts);
     const double ahead[4] = {0.0, 0.5, 0.5, 1.0}, share[4] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
     for (int part = 0;; ++part) {

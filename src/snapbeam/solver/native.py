@@ -16,7 +16,7 @@ from snapbeam.model.matrix_pairs import coupled_blocks
 from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP
 from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.solver.statistics import OF_CONTACT, OF_CORE, SAMPLED, OutputStates, Recorded, empty_accumulators, updated
-from snapbeam.solver.step_size import CALM, PARTS, barrier_of, composition_of
+from snapbeam.solver.step_size import CALM, barrier_of, composition_of
 from snapbeam.solver.user_laws import Function, updates_of
 from snapbeam.util.cores import instruction_set, usable_cores
 from snapbeam.util.interrupts import raise_held
@@ -103,7 +103,6 @@ class _Arrays:
         halvings = (table["max_halvings"] - table["min_contact_halvings"]).astype(float) + graded
         if np.isin(channels.laws, STEEP).any() or any(each.limited for each in channels.of_user):
             halvings += _STEEP  # near a magnet or an electrode
-        fewest, per_decay = PARTS[ensemble.order]
         has_two = structure.stretch > 0.0
         wells = structure.unequal_wells if has_two else None
         high = structure.high_modes(ensemble.high_omega)
@@ -136,7 +135,7 @@ class _Arrays:
             "laws": channels.laws, "uses": channels.uses, "signal_kinds": channels.kinds, "windows": channels.windows,
             "signals": channels.kinds.size, "jumps": channels.jumps.shape[1], "law_numbers": channels.numbers.shape[2],
             "center": row(structure.center), "center_rest": float(structure.center_rest),
-            "dividing_height": float(structure.dividing_height), "fewest_parts": fewest, "parts_per_decay": per_decay,
+            "dividing_height": float(structure.dividing_height),
             "levels": int(halvings.max()) + 2, "update": np.array([each.address for each in self.updates], np.int64),
         }  # fmt: skip
         signals, tones, tick = channels.signals.copy(), channels.kinds == 0, run[:, :1]

@@ -154,8 +154,6 @@ _MOST_GROWTH = 0.05
 _SQUARINGS = 14
 _COUPLED = 10.0
 """Error limit of damping that couples modes, over that of the tension: of a period and any start, here in energies."""
-PARTS = {4: (4, 8.0), 6: (4, 16.0)}
-"""Parts of a kick, at least, and over the time in which damping stops a motion, by the order of the composition."""
 
 
 def _with_coupled_damping(structure: Structure, order: int, step: float, limit: float, period: float) -> float:
@@ -173,7 +171,6 @@ def _with_coupled_damping(structure: Structure, order: int, step: float, limit: 
     alone[:, 0, 1], alone[:, 1, 0], alone[:, 1, 1] = scale, -(structure.omega**2) / scale, -2.0 * sigma
     matrix = np.block([[np.diag(alone[:, i, j]) for j in (0, 1)] for i in (0, 1)])
     matrix[n:, n:] -= (rows.T * coefficients) @ rows
-    fewest, per_decay = PARTS[order]
 
     from scipy.linalg import expm  # takes a quarter of a second, and few structures have such dampers
 
@@ -182,7 +179,7 @@ def _with_coupled_damping(structure: Structure, order: int, step: float, limit: 
         flows = {weight: expm(weight * h * alone) for weight in set(composition[0])}
         for weight, between in zip_longest(composition[1], composition[0]):
             decay = float(np.abs(weight * h * coefficients).sum())
-            parts = min(max(round(decay * per_decay + 0.5), fewest), 256)
+            parts = _core.kick_parts(composition_of(order, True), decay)
             x = -weight * h * coefficients / parts  # by Runge and Kutta, as the core kicks
             gain = (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0)))) ** parts - 1.0
             found[n:] += (rows.T * gain) @ (rows @ found[n:])
@@ -297,7 +294,7 @@ class _Bench:
             "gamma": float(self.structure.nonlinear_stiffness), "shift": None, "far_force": self.force.copy(), "second": None, "high": None,
             "beam": np.ones(n), "lift": 0.0, "block_sizes": self.blocks, "laws": np.zeros(0, np.int32),
             "signals": 0, "uses": nothing, "signal_kinds": np.zeros(0, np.int32), "windows": np.zeros(0, np.int32), "jumps": 0, "law_numbers": 0, "center": zero, "center_rest": 0.0, "dividing_height": 0.0, "levels": 2,
-            "update": np.zeros(0, np.int64), "fewest_parts": 1, "parts_per_decay": 1.0,
+            "update": np.zeros(0, np.int64),
         }  # fmt: skip
 
     def fewest(self, limit: float) -> float:
