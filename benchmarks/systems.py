@@ -75,18 +75,14 @@ MODELS: dict[str, Parts] = {
 def _ensemble(parts: Parts, size: int, cycles: int) -> Ensemble:
     """Runs at random velocities, and at random frequencies where the drive has one."""
     random = np.random.default_rng(_SEED)
-    columns: dict[str, np.ndarray] = {}
     ratio, velocity = random.uniform(0.3, 3.5, size), random.uniform(0.05, 0.6, size)
     system = _system(parts)
     assert system.striker is not None
     known = system.striker.drive.values()
-    for name, values in (
-        ("frequency_ratio", ratio),
-        ("velocity_amplitude", velocity),
-        ("velocity_rms", 0.5 * velocity),
-    ):
-        if name in known:
-            columns[f"drive.{name}"] = values
+    drawn = {"frequency_ratio": ratio, "velocity_amplitude": velocity, "velocity_rms": 0.5 * velocity}
+    drawn |= {f"{name}_1": values for name, values in drawn.items()}  # tones of a sum
+    drawn |= {"frequency_ratio_2": 2.0 * ratio, "velocity_amplitude_2": 0.5 * velocity}
+    columns = {f"drive.{name}": drawn[name] for name in known if name in drawn}
     return make_ensemble(system, sb.Integration(cycles=cycles), columns)
 
 
