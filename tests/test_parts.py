@@ -68,6 +68,12 @@ CORE = [
 ]
 
 
+def test_modules_of_tests_have_different_names() -> None:
+    """Two of one name cannot be collected together, which shows only where the extras of both are installed."""
+    names = [file.name for file in TESTS.rglob("test_*.py")]
+    assert {name for name in names if names.count(name) > 1} == set()
+
+
 def test_every_import_of_a_part_is_found(tmp_path: Path) -> None:
     file = tmp_path / "module.py"
     for text in (

@@ -64,6 +64,7 @@ def test_the_explorer(tmp_path, refused):
 
 
 @EXPLORER
+@pytest.mark.slow
 def test_the_page_over_a_recording(tmp_path, refused):
     np.save(tmp_path / "a.npy", np.zeros((3, 32, 32), dtype=np.uint8))
     refused(tmp_path, [["look", "a.npy"]], "explorer")
@@ -91,6 +92,7 @@ def test_commands_of_the_laboratory(files, refused):
     refused(files, LABORATORY, "lab")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "extra"),
     [([*RUN, "--animate", "a.mp4"], "video"), ([*MAP, "--cluster", "local:2", "-o", "a.nc"], "cluster")],

@@ -56,7 +56,8 @@ def test_a_reader_that_does_not_end(path, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of a process")
-@pytest.mark.parametrize("rows, columns", [(-22, 1), pytest.param(-1, 22, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("rows, columns", [(-22, 1), (-1, 22)])
 def test_sizes_of_version_4_that_lead_back(tmp_path, rows, columns):
     """The header of 20 bytes and the name of 2 are followed by -22 bytes, which SciPy reads without end."""
     place = tmp_path / "four.mat"

@@ -32,7 +32,7 @@ def followed(recording, folder, name="a.cihx", **options):
         return track(read, buckling_level=BUCKLING_LEVEL, **options)
 
 
-@pytest.mark.parametrize(("seed", "name"), [(0, "a.cihx"), (1, "b.cih")])
+@pytest.mark.parametrize(("seed", "name"), [(0, "a.cihx"), pytest.param(1, "b.cih", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("stage", [STICKER, PLAIN_TIP], ids=["sticker", "tip"])
 @pytest.mark.parametrize(
     ("snr", "error", "bias"), [pytest.param(30.0, 0.1, 0.05, marks=pytest.mark.slow), (15.0, 0.3, None)]
@@ -59,7 +59,9 @@ def test_a_sticker_that_is_not_looked_for_does_not_mislead(tmp_path):
     assert (tracked["flags"] != 0).mean() < 0.01
 
 
-@pytest.mark.parametrize("side", ["above", "left", "right"])
+@pytest.mark.parametrize(
+    "side", [pytest.param("above", marks=pytest.mark.slow), "left", pytest.param("right", marks=pytest.mark.slow)]
+)
 def test_every_side_and_dark_objects_before_bright_light(tmp_path, side):
     time, beam, shaker, *_ = impacts(3)
     sign = 1.0 if side == "left" else -1.0
@@ -233,7 +235,7 @@ def test_bad_parameters_are_refused_by_name(tmp_path, options, name):
 
 
 @pytest.mark.parametrize("snr", [pytest.param(30.0, marks=pytest.mark.slow), 15.0])
-@pytest.mark.parametrize("gap_px", [4.6, pytest.param(9.0, marks=pytest.mark.slow), 25.0])
+@pytest.mark.parametrize("gap_px", [4.6, *(pytest.param(gap, marks=pytest.mark.slow) for gap in (9.0, 25.0))])
 def test_onsets_of_isolated_impacts_within_one_frame(tmp_path, snr, gap_px):
     motion = impacts(6, gap_px=gap_px)
     recording = rendered(motion, snr=snr)
