@@ -36,6 +36,9 @@ def record(
 def law_values(law: int, arrays: Mapping[str, Any]) -> None:
     """Evaluate a law; writes into *arrays*."""
 
+def kick_parts(composition: int, decay: float) -> float:
+    """Parts of a kick in which forces of velocities are integrated, by the decay of the velocities within it."""
+
 def instruction_sets() -> list[str]:
     """Return the instruction sets that this build and this processor have, best first."""
 

@@ -79,3 +79,26 @@ def test_the_stiffness_bounds_the_slope_of_the_force(law):
     found, moved = (values(number, numbers, x + dx, np.zeros(x.size)) for dx in (0.0, 1e-9))
     slope = np.abs(moved["force"] - found["force"]) / 1e-9
     assert (slope <= found["stiffness"] * (1.0 + 1e-3) + 1e-9).all()
+
+
+def test_powers_of_any_size():
+    """x^n = exp(n ln x) is as exact as the rounding of n ln x leaves it."""
+    d = np.geomspace(1e-200, 1e200, 2001)
+    for exponent in (1.0, 0.5, 1.4):
+        exact = (1e6 * d) ** exponent
+        kept = np.isfinite(exact)
+        found = values(LAWS[sb.PowerLaw][0], [1.0, exponent], d, np.zeros(d.size))["force"]
+        allowed = 2.3e-16 * (4.0 + 2.0 * np.abs(np.log(exact, where=kept, out=np.zeros(d.size))))
+        assert (np.abs(found / exact - 1.0)[kept] <= allowed[kept]).all()
+    assert values(LAWS[sb.PowerLaw][0], [1.0, 2.0], np.array([0.0, 1e-200, 1e200]), np.zeros(3))["force"].tolist() == [
+        0.0,
+        0.0,
+        np.inf,
+    ]
+
+
+def test_friction_at_any_speed():
+    speeds = np.geomspace(1e-300, 1e300, 3001)
+    for side in (1.0, -1.0):
+        found = values(LAWS[sb.CoulombFriction][0], [1.0, 1.0], np.zeros(speeds.size), side * speeds)["force"]
+        np.testing.assert_allclose(found, -side * np.tanh(speeds), rtol=2e-15, atol=0.0)
