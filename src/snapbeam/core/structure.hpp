@@ -42,8 +42,8 @@ SNAPBEAM_FN Composition composition_of(int number) {
             {0.0829844064174052, 0.396309801498368, -0.0390563049223486,
              1 - 2 * (0.0829844064174052 + 0.396309801498368 - 0.0390563049223486), 0, 0}};
 }
-// Parts of a kick in which forces of velocities are integrated by the method of order four, whose error is that of the composition
-// at most, by the logarithm of the *decay* of the velocities in it.
+// Parts of a kick in which the method of order four integrates forces of velocities, by the *decay* of these within the kick: one
+// where they hardly change, then up to four, and more only where one of four would err more than the composition.
 template <class Real> SNAPBEAM_FN Real kick_parts(int composition, Real decay) {
     const Real few = min(Real(composition ? 1000.0 : 160.0) * decay, Real(4.0)), many = Real(composition ? 16.0 : 8.0) * decay;
     return min(max(nearest(max(few, many) + Real(0.5)), Real(1.0)), Real(256.0));
