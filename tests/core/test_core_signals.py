@@ -16,7 +16,7 @@ from snapbeam.model import default_values
 from snapbeam.model.drive.base import DRIVES, Drive, Timed
 from snapbeam.model.drive.components import Tone, fitted, in_pieces
 from snapbeam.model.quantity import RUN, quantity
-from snapbeam.solver import native
+from snapbeam.solver import channels, native
 from snapbeam.solver.excitation import motion_of
 from snapbeam.util.validation import InputError
 
@@ -98,6 +98,27 @@ def test_a_run_in_pieces_is_the_run(modes, monkeypatch):
     again = sb.simulate(system, how).dataset
     for name in whole.data_vars:
         assert np.array_equal(whole[name].values, again[name].values, equal_nan=True), name
+
+
+NOISE = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.2, seed=7)
+
+
+@pytest.mark.parametrize("modes", [2, 40])
+@pytest.mark.parametrize("drive", [NOISE, SINE + NOISE], ids=["noise", "sine+noise"])
+def test_a_sum_of_many_tones_is_its_tones_and_has_their_derivatives(drive, modes, monkeypatch):
+    how = sb.Integration(cycles=2, accuracy="reference")
+    system, found = driven(drive, modes), []
+    names = [name for name in system.parameters if name.startswith(("drive.velocity", "drive.low", "drive.frequency"))]
+    for few in (channels._FEW_TONES, 1000):
+        monkeypatch.setattr(channels, "_FEW_TONES", few)
+        assert (channels.PARTIAL in arrays(system, 2).problem["signal_kinds"]) == (few < 1000)
+        run = sb.simulate(system, how)
+        assert run.summary.impacts > 0
+        slopes = sb.uncertainty.gradient(system, "rms_displacement", names[:3], integration=how)
+        statistics = [run.summary[name] for name in ("rms_displacement", "peak_force", "max_displacement")]
+        found.append((statistics, slopes["derivative"].values))
+    for one, other, close in zip(*found, (1e-9, 1e-6), strict=True):
+        np.testing.assert_allclose(one, other, rtol=close)
 
 
 @dataclass(frozen=True, kw_only=True)

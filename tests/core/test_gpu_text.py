@@ -107,6 +107,8 @@ def beam(modes):
     return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.005)
 
 
+CHIRP = sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=4.0)
+NOISE = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.02, seed=3)
 SYSTEMS = {
     "one mode": lambda: sb.System(beam(1), contacts=[striker()]),
     "modes in registers": lambda: sb.System(beam(4), contacts=[striker()]),
@@ -118,6 +120,11 @@ SYSTEMS = {
         ],
         forces=[sb.LocalSpring(stiffness=20.0, location=0.3)],
         harvesters=[sb.PiezoelectricHarvester(moment_per_volt=1e-4, capacitance=3e-7, resistance=1e4)],
+    ),
+    "noise and a chirp on the base": lambda: sb.System(
+        beam(2),
+        contacts=[striker(), sb.Contact(default_values.CONTACT, sb.Striker(drive=CHIRP, side="above", gap=1e-4))],
+        base_excitation=sb.BaseExcitation(motion=NOISE, striker_on_base=False),
     ),
 }
 

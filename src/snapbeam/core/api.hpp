@@ -50,12 +50,13 @@ enum RunNumber : int {
     TICK, STEP, END, OUTPUT_INTERVAL, LAST_QUARTER, WELL_SIGN, CONTACT_STEP, HALVINGS, DECIDE_ENERGY, DECIDE_REACH, DECIDE_CROSSINGS,
     MAX_STEPS, STRETCH, CALM_ENERGY, LOWEST, RUN_NUMBERS
 };
-// Numbers of a signal (signals.hpp): of a tone, with its period in ticks, 0 if it has none; of pieces; of a sweep.  SHIFT is the time of
-// its own at which a run begins, s; MOST_ are bounds of value, slope and second derivative.
-enum SignalKind : int { TONE, PIECES, SWEEP, SIGNAL_KINDS };
+// Numbers of a signal (signals.hpp): of a tone, with its period in ticks, 0 if it has none; of pieces; of a sweep; of a sum of tones,
+// which names its first PARTIAL and has the rate of the fastest.  SHIFT is the time of its own at which a run begins, s; MOST_ are
+// bounds of value, slope and second derivative.  Partials have the numbers of tones; they follow all signals and are none.
+enum SignalKind : int { TONE, PIECES, SWEEP, TONES, PARTIAL, SIGNAL_KINDS };
 enum SignalNumber : int {
     MEAN, AMPLITUDE, RATE, PHASE, PERIOD, EXPONENTIAL, POWER, MOST_VALUE, MOST_SLOPE, MOST_BEND, SIGNAL_NUMBERS,
-    GAIN = 0, FIRST_PIECE = 1, PIECE_COUNT = 2, SHIFT = 3, SIZE = 0, FIRST_RATE = 1, LAST_RATE = 2, DURATION = 4
+    GAIN = 0, FIRST_PIECE = 1, PIECE_COUNT = 2, SHIFT = 3, SIZE = 0, FIRST_RATE = 1, LAST_RATE = 2, DURATION = 4, FIRST_TONE = 1, TONE_COUNT = 4
 };
 constexpr int PIECE_NUMBERS = 7;  // begin of a piece, s, and six coefficients
 enum Status : int { OK, EARLY_STOP, RUNNING, DIVERGED, STEP_LIMIT };

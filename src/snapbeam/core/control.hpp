@@ -79,7 +79,9 @@ template <class L> struct Group {
 
     SNAPBEAM_SELDOM void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
         s = &structure, problem = s->problem, batch = &b;
-        const int n = s->cells, channels = problem->channels, signals = problem->signals;
+        const int n = s->cells, channels = problem->channels;
+        int signals = 0;
+        while (signals < problem->signals && problem->signal_kinds[signals] != snapbeam::PARTIAL) ++signals;
         z.s = s, z.channels = channels, z.signals = signals, z.account = b.account || (RECORDS && b.recorder);
         Held<Cell, CELLS> *rows[] = {&z.q, &z.p, &z.k, &z.q1, &z.p1, &z.k1, &z.r};
         for (auto *row : rows) row->take(arena, n);
@@ -132,7 +134,7 @@ template <class L> struct Group {
             with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state(batch->numbers + long(j) * problem->law_numbers), c.memory = law.memory, c.impulsive = law.impulsive; });
             c.circuit = c.law == CIRCUIT, circuits |= c.circuit, c.harvests = c.circuit || c.law == LINEAR_DAMPING;
             for (int i = 0; i < z.signals; ++i)
-                if (problem->uses[j * z.signals + i] != 0.0) c.signal[c.uses] = i, c.factor[c.uses++] = problem->uses[j * z.signals + i];
+                if (const double factor = problem->uses[j * problem->signals + i]; factor != 0.0) c.signal[c.uses] = i, c.factor[c.uses++] = factor;
             for (int i = 0; i < problem->law_numbers; ++i) c.P[i] = Number(1.0);
         }
         totals.shared = shares_row();
@@ -185,8 +187,11 @@ template <class L> struct Group {
         set_lane(stretch_at_rest, l, of_run(i, STRETCH)), set_lane(calm, l, of_run(i, CALM_ENERGY)), set_lane(lowest, l, of_run(i, LOWEST)), set_lane(z.t, l, 0.0), set_lane(stretch, l, 0.0);
         set_lane(z.parts, l, s->parts(of_run(i, STEP) * of_run(i, TICK)));
         for (int k = 0; k < z.signals; ++k) {
-            const double *numbers = batch->signals + (long(i) * z.signals + k) * SIGNAL_NUMBERS;
-            for (int x = 0; x < SIGNAL_NUMBERS; ++x) set_lane(z.signal[k].p[x], l, numbers[x]);
+            Signal<L> &one = z.signal[k];
+            const double *all = batch->signals + long(i) * problem->signals * SIGNAL_NUMBERS, *numbers = all + k * SIGNAL_NUMBERS;
+            for (int x = 0; x < SIGNAL_NUMBERS; ++x) set_lane(one.p[x], l, numbers[x]);
+            set_lane(one.low, l, NAN);  // nothing is at hand
+            if (one.kind == TONES) one.tones[l] = all + long(numbers[FIRST_TONE]) * SIGNAL_NUMBERS;
         }
         for (int m = 0; m < modes; ++m) {
             set_element<L>(z.q, s->place[m], l, batch->q[long(i) * modes + m]);
@@ -256,7 +261,11 @@ template <class L> struct Group {
             totals.rest.d.set(k, t.rest[observed]), totals.later.d.set(k, totals.late / end * t.end[row]);
             for (int m = 0; m < modes; ++m) totals.row[s->place[m]].d.set(k, t.rows[observed * modes + m]);
             for (int x = 0; x < z.signals; ++x)
-                for (int y = 0; y < snapbeam::SIGNAL_NUMBERS; ++y) z.signal[x].p[y].d.set(k, t.signals[(row * z.signals + x) * snapbeam::SIGNAL_NUMBERS + y]);
+                for (int y = 0; y < snapbeam::SIGNAL_NUMBERS; ++y) z.signal[x].p[y].d.set(k, t.signals[(row * problem->signals + x) * snapbeam::SIGNAL_NUMBERS + y]);
+        }
+        for (int x = 0; x < z.signals; ++x) {
+            Signal<L> &one = z.signal[x];
+            one.all = problem->signals, one.slopes = long(i) * L::directions * one.all + long(lane(one.p[snapbeam::FIRST_TONE], 0));
         }
         for (int j = 0; j < channels; ++j) {
             Channel<L> &c = z.channel[j];

@@ -75,6 +75,15 @@ template <class T, class X> SNAPBEAM_FN T as(const X &x) {
     if constexpr (requires(T with) { with.d; }) return T(x);
     else return T(value(x));
 }
+// A number of one run, with its derivatives if it has any.
+template <class T> SNAPBEAM_FN auto part(const T &x, int l) {
+    if constexpr (requires { x.d; }) return x;
+    else return lane(x, l);
+}
+template <class T, class X> SNAPBEAM_FN void set_part(T &to, int l, const X &x) {
+    if constexpr (requires { to.d; }) to = x;
+    else set_lane(to, l, x);
+}
 // The root of a cubic moves with it.
 template <int K> SNAPBEAM_FN Dual<K> root(const Cubic<Dual<K>> &u, const Dual<K> &high, bool wanted) {
     Cubic<double> plain(0.0, 0.0, 0.0, 0.0, 0.0);

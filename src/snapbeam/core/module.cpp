@@ -175,7 +175,11 @@ static Problem problem_of(Arguments &a) {
     for (int i = 0; i < p.signals; ++i) {
         if (p.signal_kinds[i] < 0 || p.signal_kinds[i] >= snapbeam::SIGNAL_KINDS) a.refuse("signal_kinds", "must be numbers of kinds");
         const int by = p.windows[i];
-        if (by < -1 || by >= p.signals || (by >= 0 && p.windows[by] != -1)) a.refuse("windows", "must be numbers of signals without a window, or -1");
+        if (by < -1 || by >= p.signals || (by >= 0 && (p.windows[by] != -1 || p.signal_kinds[by] == snapbeam::PARTIAL))) a.refuse("windows", "must be numbers of signals without a window, or -1");
+        if (p.signal_kinds[i] != snapbeam::PARTIAL) continue;
+        if (i + 1 < p.signals && p.signal_kinds[i + 1] != snapbeam::PARTIAL) a.refuse("signal_kinds", "must have the partials after the others");
+        for (size_t j = 0; j < channels; ++j)
+            if (p.uses[j * size_t(p.signals) + size_t(i)] != 0.0) a.refuse("uses", "must have no partials");
     }
     p.jumps = a.integer("jumps", 0, 1000000);
     p.law_numbers = a.integer("law_numbers", 0, 64);
@@ -236,6 +240,9 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
         if (kind == PIECES && !(s[FIRST_PIECE] >= 0.0 && s[PIECE_COUNT] >= 1.0 && s[FIRST_PIECE] + s[PIECE_COUNT] <= double(pieces) &&
                                 s[FIRST_PIECE] == std::floor(s[FIRST_PIECE]) && s[PIECE_COUNT] == std::floor(s[PIECE_COUNT])))
             a.refuse("signals", "must have pieces of the table");
+        if (kind == TONES && !(s[RATE] >= 0.0 && s[FIRST_TONE] >= 0.0 && s[TONE_COUNT] >= 1.0 && s[FIRST_TONE] + s[TONE_COUNT] <= double(p.signals) &&
+                               s[FIRST_TONE] == std::floor(s[FIRST_TONE]) && s[TONE_COUNT] == std::floor(s[TONE_COUNT]) && p.signal_kinds[int(s[FIRST_TONE])] == PARTIAL))
+            a.refuse("signals", "must have tones of which the first is a partial");
     }
     b.jumps = a.array<double>("jumps", {runs, size_t(p.jumps)}, false);
     for (size_t i = 0; i < runs * size_t(p.jumps); ++i)

@@ -3,6 +3,8 @@
 //   TONE     s(t) = mean + amplitude sin(rate t + phase)
 //   PIECES   s(t) = gain sum_k c_ik x^k, x = t - begin_i in [0, begin_(i+1) - begin_i): polynomials of degree five, from a table
 //   SWEEP    s(t) = size/w(t)^p sin(integral of w), w from first to last within a duration, linear in time or exponential; p = 0, 1, 2
+//   TONES    the sum of many tones (PARTIALs, which are no signals of their own), by its power series about the middles of cells in
+//            which the fastest turns by 1 rad:  c_0 = A sin, c_1 = A rate cos, c_(n+2) = -c_n rate^2/((n + 1)(n + 2))
 //
 // with t from the signal's own beginning.  A signal may have a window, another signal by which it is multiplied: a burst is a tone in
 // a window of pieces.  A channel adds its signals with factors.  A signal is taken to the end of a step at once, and to the kicks
@@ -21,6 +23,7 @@ constexpr bool ONLY_TONES = false;
 #endif
 constexpr double ANCHOR = 64.0;
 constexpr int WHOLE = MOST_DISTINCT;  // the whole step, among the flows
+constexpr int SERIES = 14;  // coefficients of a sum of tones: .5^14/14! = 7e-16
 
 // Where a signal is: sine and cosine of a tone; time (s), value and derivatives of the others.
 template <class L> struct Moment {
@@ -31,14 +34,20 @@ template <class L> struct Signal {
     typedef typename L::Number Number;
     typedef typename L::Real Real;
     typedef typename L::Marks Marks;
+    typedef decltype(part(Number(0.0), 0)) One;           // a number of one run
     int kind;
     const double *pieces;                                 // rows of PIECE_NUMBERS
-    const snapbeam::Tangent *tangent;                     // and their derivatives; null: none
+    const double *tones[L::runs];                         // of each run the partials, rows of SIGNAL_NUMBERS
+    const snapbeam::Tangent *tangent;                     // derivatives of both; null: none
+    long slopes, all;                                     // of the partials the first there, and all signals
     Signal *window;                                       // null: none
     bool acts, formed;                                    // in the kicks of the step; advances over its flows are at hand
     Number p[snapbeam::SIGNAL_NUMBERS];                   // numbers, in the order of api.hpp
     Moment<L> at, begun, kept;                            // at the kick, at the beginning of the step, put aside
     Number ahead_sine[WHOLE + 1], ahead_cosine[WHOLE + 1];  // over each flow of the step and all of it; of others than tones times
+    // The polynomial at hand of others than tones and sweeps: it holds from low to high (s), or in the cell low of a sum of tones.
+    Real low, high;
+    Number origin, series[ONLY_TONES ? 1 : SERIES];
     int piece[L::runs];                                   // the piece at hand, at which the search begins
 
     SNAPBEAM_FN bool is_tone() const { return ONLY_TONES || kind == snapbeam::TONE; }
@@ -66,65 +75,91 @@ template <class L> struct Signal {
     // Error of the cubic through values and slopes at the ends of *h*.
     SNAPBEAM_FN Number doubt(Number h) const {
         const Number w = p[snapbeam::RATE] * h, square = w * w;
-        if (is_tone() && !windowed()) return abs(p[snapbeam::AMPLITUDE]) * min(square * square * Number(1.0 / 384.0), Number(2.5));
+        const bool sum = !ONLY_TONES && kind == snapbeam::TONES;
+        if ((is_tone() || sum) && !windowed()) return (sum ? greatest_value() : abs(p[snapbeam::AMPLITUDE])) * min(square * square * Number(1.0 / 384.0), Number(2.5));
         return min(greatest_bend() * h * h * Number(1.0 / 16.0), Number(2.5) * greatest_value());
     }
 
     // Value and derivatives of others than tones at at.now.
     SNAPBEAM_CALLED void evaluate() {
-        if constexpr (L::directions > 0) {
-            evaluate(0, at.now, p, at.value, at.slope, at.bend);
-        } else {
-            for (int l = 0; l < L::runs; ++l) {
-                double own[snapbeam::SIGNAL_NUMBERS], value, slope, bend;
-                for (int k = 0; k <= snapbeam::POWER; ++k) own[k] = lane(p[k], l);
-                evaluate(l, lane(at.now, l), own, value, slope, bend);
-                set_lane(at.value, l, value), set_lane(at.slope, l, slope), set_lane(at.bend, l, bend);
-            }
-        }
+        if (kind == snapbeam::SWEEP) return of_sweep(at.now);
+        const bool sum = kind == snapbeam::TONES;
+        const Real now = value(at.now), cell = nearest(now * value(p[snapbeam::RATE]));
+        const Marks stale = sum ? differ(cell, low) : !((now >= low) & (now < high));
+        if (any(stale))
+            for (int l = 0; l < L::runs; ++l)
+                if (lane(stale, l)) sum ? expand(l, lane(cell, l)) : take_piece(l, lane(now, l));
+        const Number x = at.now - origin;
+        int k = sum ? SERIES - 1 : 5;
+        Number found = series[k], slope = Number(0.0), bend = slope;
+        while (--k >= 0) bend = fma(bend, x, slope), slope = fma(slope, x, found), found = fma(found, x, series[k]);
+        at.value = found, at.slope = slope, at.bend = Number(2.0) * bend;
     }
-    template <class T> SNAPBEAM_FN void evaluate(int l, T t, const T *own, T &value, T &slope, T &bend) {
-        if (kind == snapbeam::PIECES) of_pieces(l, t, own, value, slope, bend);
-        else of_sweep(t, own, value, slope, bend);
-    }
-    template <class T> SNAPBEAM_FN void of_pieces(int l, T t, const T *own, T &value, T &slope, T &bend) {
+    SNAPBEAM_SELDOM void take_piece(int l, double now) {
         using namespace snapbeam;
-        const long begins = long(lane(own[FIRST_PIECE], 0)) * PIECE_NUMBERS;
-        const double *rows = pieces + begins, at = lane(t, 0);
-        const int count = int(lane(own[PIECE_COUNT], 0));
+        const long begins = long(lane(p[FIRST_PIECE], l)) * PIECE_NUMBERS;
+        const double *rows = pieces + begins;
+        const int count = int(lane(p[PIECE_COUNT], l));
         int &i = piece[l];
         if (i >= count) i = 0;
-        while (i + 1 < count && at >= rows[(i + 1) * PIECE_NUMBERS]) ++i;
-        while (i > 0 && at < rows[i * PIECE_NUMBERS]) --i;
+        while (i + 1 < count && now >= rows[(i + 1) * PIECE_NUMBERS]) ++i;
+        while (i > 0 && now < rows[i * PIECE_NUMBERS]) --i;
         const auto number = [&](int k) {
-            T found = T(rows[i * PIECE_NUMBERS + k]);
+            One found = One(rows[i * PIECE_NUMBERS + k]);
             if constexpr (L::directions > 0)
                 for (int d = 0; tangent->pieces && d < L::directions; ++d) found.d.set(d, tangent->pieces[d * tangent->all_pieces + begins + i * PIECE_NUMBERS + k]);
             return found;
         };
-        const T x = t - number(0), gain = own[GAIN];
-        value = number(6), slope = bend = T(0.0);
-        for (int k = 5; k >= 1; --k) bend = fma(bend, x, slope), slope = fma(slope, x, value), value = fma(value, x, number(k));
-        value = gain * value, slope = gain * slope, bend = T(2.0) * gain * bend;
+        set_lane(low, l, i > 0 ? rows[i * PIECE_NUMBERS] : -INFINITY), set_lane(high, l, i + 1 < count ? rows[(i + 1) * PIECE_NUMBERS] : INFINITY);
+        set_part(origin, l, number(0));
+        for (int k = 0; k < 6; ++k) set_part(series[k], l, part(p[GAIN], l) * number(k + 1));
     }
-    template <class T> SNAPBEAM_FN static void of_sweep(T t, const T *own, T &value, T &slope, T &bend) {
+    SNAPBEAM_SELDOM void expand(int l, double cell) {
         using namespace snapbeam;
-        const T first = own[FIRST_RATE], last = own[LAST_RATE], duration = own[DURATION], size = own[SIZE], s = min(t, duration);
-        T now, angle, change, curve = T(0.0);
-        if (lane(own[EXPONENTIAL], 0) != 0.0 && differ(last, first)) {
-            const T grows = log(last / first) / duration;
-            now = first * exp(grows * s), angle = (now - first) / grows, change = grows * now, curve = grows * change;
-        } else {
-            change = (last - first) / duration, now = first + change * s, angle = s * (first + T(0.5) * change * s);
+        constexpr int W = L::directions > 0 ? 1 : SNAPBEAM_WIDTH;
+        const double middle = cell / lane(p[RATE], l);
+        const auto number = [&](int i, int k) {
+            One found = One(tones[l][i * SIGNAL_NUMBERS + k]);
+            if constexpr (L::directions > 0)
+                for (int d = 0; d < L::directions; ++d) found.d.set(d, tangent->signals[(slopes + d * all + i) * SIGNAL_NUMBERS + k]);
+            return found;
+        };
+        One sum[SERIES];
+        for (One &x : sum) x = One(0.0);
+        for (int from = 0, count = int(lane(p[TONE_COUNT], l)); from < count; from += W) {
+            typename Either<(L::directions > 0), One, Wide>::Type angle(0.0);
+            for (int i = from; i < from + W && i < count; ++i) set_part(angle, i - from, fma(number(i, RATE), One(middle), number(i, PHASE)));
+            const auto at = turn(angle);
+            for (int i = from; i < from + W && i < count; ++i) {
+                const One size = number(i, AMPLITUDE), rate = number(i, RATE), falls = -(rate * rate);
+                One even = size * part(at.sine, i - from), odd = size * rate * part(at.cosine, i - from);
+                sum[0] += number(i, MEAN);
+                for (int n = 0; n < SERIES; n += 2) {
+                    sum[n] += even, sum[n + 1] += odd;
+                    even *= falls * One(1.0 / ((n + 1) * (n + 2))), odd *= falls * One(1.0 / ((n + 2) * (n + 3)));
+                }
+            }
+        }
+        set_lane(low, l, cell), set_part(origin, l, One(middle));
+        for (int k = 0; k < SERIES; ++k) set_part(series[k], l, sum[k]);
+    }
+    SNAPBEAM_FN void of_sweep(Number t) {
+        using namespace snapbeam;
+        const Number first = p[FIRST_RATE], last = p[LAST_RATE], duration = p[DURATION], size = p[SIZE], s = min(t, duration), zero = Number(0.0);
+        const Marks over = !(t < duration), exponential = differ(p[EXPONENTIAL], zero) & differ(last, first);
+        Number change = (last - first) / duration, now = first + change * s, angle = s * (first + Number(0.5) * change * s), curve = zero;
+        if (any(exponential)) {
+            const Number grows = log(last / first) / duration, faster = first * exp(grows * s);
+            assign(exponential, angle, (faster - first) / grows), assign(exponential, change, grows * faster);
+            assign(exponential, curve, grows * change), assign(exponential, now, faster);
         }
         angle = angle + last * (t - s);
-        if (!(t < duration)) now = last, change = curve = T(0.0);
-        const Turn<T> of = turn(angle - T(6.283185307179586 * ::floor(lane(angle, 0) / 6.283185307179586)));
-        const double p = lane(own[POWER], 0);
-        const T a = p == 0.0 ? size : p == 1.0 ? size / now : size / (now * now), falls = T(-p) * a * change / now;
-        const T curves = T(p) * a * (T(p + 1.0) * change * change / (now * now) - curve / now);
-        value = a * of.sine, slope = a * now * of.cosine + falls * of.sine;
-        bend = (curves - a * now * now) * of.sine + (T(2.0) * falls * now + a * change) * of.cosine;
+        assign(over, now, last), assign(over, change, zero), assign(over, curve, zero);
+        const Turn<Number> of = turn(angle);
+        const Number n = p[POWER], a = size / select(n < Number(0.5), Number(1.0), select(n < Number(1.5), now, now * now)), falls = -n * a * change / now;
+        const Number curves = n * a * ((n + Number(1.0)) * change * change / (now * now) - curve / now);
+        at.value = a * of.sine, at.slope = a * now * of.cosine + falls * of.sine;
+        at.bend = (curves - a * now * now) * of.sine + (Number(2.0) * falls * now + a * change) * of.cosine;
     }
 
     // The beginning of a step at *t* ticks: of a tone where it is anchored, of others where the step is a new one.

@@ -49,9 +49,9 @@ template <class Real> SNAPBEAM_FN Real kick_parts(int composition, Real decay) {
     return min(max(nearest(max(few, many) + Real(0.5)), Real(1.0)), Real(256.0));
 }
 
-template <int K> struct SlopesOf { typedef Pack<K> Type; };
-template <> struct SlopesOf<0> { typedef double Type; };
-template <class L> using Slopes = typename SlopesOf<L::directions>::Type;  // derivatives beside a plain number
+template <bool FIRST, class A, class B> struct Either { typedef A Type; };
+template <class A, class B> struct Either<false, A, B> { typedef B Type; };
+template <class L> using Slopes = typename Either<(L::directions > 0), Pack<L::directions>, double>::Type;  // derivatives beside a plain number
 constexpr int FEWEST_PARTS = 8, PARTS_PER_TURN = 12;
 
 // The four numbers of the flow of a mode over a time.

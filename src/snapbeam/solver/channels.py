@@ -66,6 +66,8 @@ SIGNAL = (
     "mean", "amplitude", "rate", "phase", "period", "exponential", "power", "most_value", "most_slope", "most_bend"
 )  # fmt: skip
 """Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep size, first and last rate, time, duration, power."""
+TONE, PIECES, SWEEP, TONES, PARTIAL = range(5)
+"""Kinds of signals, in the order of ``core/api.hpp: SignalKind``."""
 STEEP = tuple(LAWS[kind][0] for kind in (ElectrostaticForce, MagneticForce))
 """Laws whose force grows without bound towards an end of their range."""
 
@@ -84,7 +86,7 @@ class Channels:
     signals: _Array
     """Numbers of the signals, in the order of ``core/api.hpp: SignalNumber``; shape (runs, signals, 10)."""
     kinds: NDArray[np.int32]
-    """0: tone, 1: pieces, 2: sweep; shape (signals,)."""
+    """Kind of each signal, shape (signals,); partials, the tones of a sum, follow the others."""
     windows: NDArray[np.int32]
     """Signal by which each is multiplied, -1: none; shape (signals,)."""
     pieces: _Array
@@ -109,7 +111,9 @@ class Channels:
     def moves(self) -> bool:
         """True if a signal changes with time."""
         return bool(
-            np.any(self.signals[:, :, 1] * (self.kinds != 1)) or np.any(self.pieces[:, 1:]) or np.any(self.kinds == 2)
+            np.any(self.signals[:, :, 1] * (self.kinds != PIECES))
+            or np.any(self.pieces[:, 1:])
+            or np.any(self.kinds == SWEEP)
         )
 
 
@@ -125,6 +129,7 @@ class _Builder:
         """Row of each run, and the displacement along it at rest."""
         self.signals: list[tuple[str, int, _Array, int]] = []
         """Section, kind, numbers and window."""
+        self.partials: list[_Array] = []
         self.pieces: list[_Array] = []
         self.jumps: dict[str, _Array] = {}
         self.of_user: list[UserLaw] = []
@@ -169,6 +174,14 @@ class _Builder:
         self.signals.append((section, kind, numbers, -1 if window is None else window))
         return len(self.signals) - 1
 
+    def add_tones(self, section: str, tones: list[_Array], most: _Array, window: int | None) -> None:
+        """Add the sum of many tones as one signal."""
+        numbers = np.zeros((self.runs, len(SIGNAL)))
+        numbers[:, 1], numbers[:, 4] = len(self.partials), len(tones)
+        numbers[:, 2], numbers[:, -3:] = np.max([each[:, 2] for each in tones], axis=0), most
+        self.partials += tones
+        self.add_signal(section, TONES, numbers, window)
+
     def add_pieces(self, section: str, each: Pieces, begun: _Array, most: _Array | None = None, sign: float = 1.0) -> int:  # fmt: skip
         """Add a signal of pieces; runs with the same pieces share them."""
         tables = np.concatenate((each.begins[..., None], each.coefficients), axis=2)
@@ -183,7 +196,7 @@ class _Builder:
         numbers[:, 2], numbers[:, 3] = length, begun
         numbers[:, -3:] = 0.0 if most is None else most
         self.pieces.append(tables.reshape(-1, 7))
-        return self.add_signal(section, 1, numbers)
+        return self.add_signal(section, PIECES, numbers)
 
     def built(self, contacts: int, circuits: int) -> Channels:
         """Everything as arrays."""
@@ -191,6 +204,9 @@ class _Builder:
         numbers = np.zeros((self.runs, count, most))
         for j, (_, own, *_) in enumerate(self.channels):
             numbers[:, j, : own.shape[1]] = own
+        for _, kind, own, _ in self.signals:
+            own[:, 1] += len(self.signals) if kind == TONES else 0
+        self.signals += [("", PARTIAL, each, -1) for each in self.partials]
         sections, kinds, signals, windows = zip(*self.signals, strict=True) if self.signals else ((), (), (), ())
         offset, since = np.array([each[3:] for each in self.channels]).reshape(count, 2, self.runs).transpose(1, 2, 0)
         row_of, rest = np.array(self.places).transpose(1, 2, 0)
@@ -280,6 +296,8 @@ def _motions(system: System) -> list[tuple[str, Drive]]:
 
 _FAR = 1e300
 """Bound of a motion that has none."""
+_FEW_TONES = 4
+"""Components of a motion, at most, whose tones are signals each; more are a sum, which costs as much as one."""
 
 
 def _bounds(drive: Drive, own: Mapping[str, _Array], system: System) -> _Array:
@@ -303,9 +321,10 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
     bounds = _bounds(drive, own, system)
     components = drive.components_until(own, system.scale, begun + table["end"] * table["tick"])
     windows: dict[int, int] = {}
+    many: dict[int | None, list[_Array]] = {}
     for each in components:
         signal = np.zeros((runs, len(SIGNAL)))
-        most, window, kind_of = bounds, None, 0
+        most, window, kind_of = bounds, None, TONE
         if isinstance(each, Tone):
             size, rate = np.abs(each.amplitude), each.rate
             signal[:, 0], signal[:, 1], signal[:, 2] = each.mean, each.amplitude, rate
@@ -321,7 +340,7 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
         elif isinstance(each, Sweep):
             signal[:, 0], signal[:, 1], signal[:, 2], signal[:, 3] = each.size, each.first, each.last, begun
             signal[:, 4], signal[:, 5], signal[:, 6] = each.duration, float(each.exponential), each.power
-            kind_of = 2
+            kind_of = SWEEP
         else:
             built.add_pieces(section, each, begun, most, side_of(system, section, drive))
             bounds = np.zeros((runs, 3))
@@ -329,6 +348,11 @@ def _add_motion(built: _Builder, system: System, ensemble: Any, columns: Mapping
         if most is bounds:  # those of the whole motion, stated once; a tone alone has its own
             bounds = np.zeros((runs, 3))
         signal[:, -3:] = most
-        built.add_signal(section, kind_of, signal, window)
+        if kind_of == TONE and len(components) > _FEW_TONES:
+            many.setdefault(window, []).append(signal)
+        else:
+            built.add_signal(section, kind_of, signal, window)
+    for window, tones in many.items():
+        built.add_tones(section, tones, np.sum([each[:, -3:] for each in tones], axis=0), window)
     for name, times in drive.jumps(own, system.scale).items():
         built.jumps[f"{section} {name}"] = times - begun

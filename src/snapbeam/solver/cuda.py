@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from snapbeam import _core
+from snapbeam.solver.channels import PARTIAL
 from snapbeam.solver.native import Progress
 from snapbeam.util.packages import needing, needs
 from snapbeam.util.validation import InputError
@@ -48,7 +49,7 @@ def definitions(problem: dict[str, Any]) -> dict[str, str]:
         "CELLS": modes,
         "BLOCKS": len(sizes),
         "CHANNELS": channels,
-        "SIGNALS": problem["signal_kinds"].size,
+        "SIGNALS": np.count_nonzero(problem["signal_kinds"] != PARTIAL),
         "LAW_NUMBERS": problem["law_numbers"],
         "LEVELS": problem["levels"],
         "DISTINCT_FLOWS": (len(_core.COMPOSITIONS[problem["composition"]][0]) + 1) // 2,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snapbeam import _core
 from snapbeam.model.matrix_pairs import coupled_blocks
-from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, STEEP
+from snapbeam.solver.channels import AXIAL_LOAD, BASE, EXTERNAL_FORCE, LINEAR_DAMPING, PIECES, STEEP, SWEEP, TONE, TONES
 from snapbeam.solver.ensemble import Ensemble, Records
 from snapbeam.solver.statistics import OF_CONTACT, OF_CORE, SAMPLED, OutputStates, Recorded, empty_accumulators, updated
 from snapbeam.solver.step_size import CALM, barrier_of, composition_of
@@ -68,10 +68,10 @@ def reversed_in_time(ensemble: Ensemble) -> Ensemble | None:
     channels, structure = ensemble.channels, ensemble.structure
     if channels is None or structure.circuits or structure.indentations or np.isin(channels.laws, _core.LOSSY).any():
         return None
-    if channels.kinds.any() or channels.jumps.size:
+    if np.isin(channels.kinds, (PIECES, SWEEP)).any() or channels.jumps.size:
         return None
-    signals = channels.signals.copy()
-    signals[:, :, 3] = math.pi - signals[:, :, 3]
+    signals, tones = channels.signals.copy(), channels.kinds != TONES
+    signals[:, tones, 3] = math.pi - signals[:, tones, 3]
     return replace(
         ensemble,
         structure=replace(structure, damping_ratio=-structure.damping_ratio),
@@ -138,7 +138,7 @@ class _Arrays:
             "dividing_height": float(structure.dividing_height),
             "levels": int(halvings.max()) + 2, "update": np.array([each.address for each in self.updates], np.int64),
         }  # fmt: skip
-        signals, tones, tick = channels.signals.copy(), channels.kinds == 0, run[:, :1]
+        signals, tones, tick = channels.signals.copy(), channels.kinds == TONE, run[:, :1]
         signals[:, tones, 4] *= finer
         signals[:, :, 4][(signals[:, :, 4] > _MOST_TICKS) & tones] = 0.0
         jumps = np.sort(np.maximum(np.floor(channels.jumps / tick) + 1.0, 0.0), axis=1)
@@ -231,7 +231,7 @@ class _Arrays:
             found = {name: np.nan_to_num((parts[0][name] - parts[1][name]) / distance) for name in parts[0]}
         if not found["pieces"].any():
             del found["pieces"]
-        found["signals"][:, self.problem["signal_kinds"] == 0, 4] = 0.0  # periods in ticks of another clock
+        found["signals"][:, self.problem["signal_kinds"] == TONE, 4] = 0.0  # periods in ticks of another clock
         found["signals"][:, :, 6:] = 0.0  # bounds
         return found
 
