@@ -248,40 +248,34 @@ SNAPBEAM_FN typename L::Number power_lost(const Channel<L> &c, typename L::Numbe
     });
 }
 
-// phi_1, phi_2, phi_3 for |x| <= 1.
+// phi_1, phi_2, phi_3 for |x| <= 1, and psi(x) = int_0^1 (t phi_1(x t))^2 dt = sum_k (-x)^k (2^(k+2) - 2)/((k+2)! (k+3)) within 1e-8.
 template <class T> struct Phi {
-    T one, two, three;
+    T one, two, three, square;
     SNAPBEAM_FN explicit Phi(T x) {
         const T z = -x;
         T s = T(1.0 / 1307674368000.0);  // 1/15!
         for (int k = 14; k >= 3; --k) s = fma(s, z, T(RECIPROCAL_FACTORIAL[k]));
-        three = s, two = fma(s, z, T(0.5)), one = fma(two, z, T(1.0));
+        three = s, two = fma(s, z, T(0.5)), one = fma(two, z, T(1.0)), square = T(0.0);
+        for (int k = 12; k >= 0; --k) square = fma(square, z, T(((4 << k) - 2) * RECIPROCAL_FACTORIAL[k + 2] / (k + 3)));
     }
     static constexpr double RECIPROCAL_FACTORIAL[15] = {
         1.0, 1.0, 1.0 / 2, 1.0 / 6, 1.0 / 24, 1.0 / 120, 1.0 / 720, 1.0 / 5040, 1.0 / 40320, 1.0 / 362880, 1.0 / 3628800,
         1.0 / 39916800, 1.0 / 479001600, 1.0 / 6227020800.0, 1.0 / 87178291200.0};
 };
 
-// One force that is linear in the velocity, exactly; *a* and *v* along its row, where |M B w| <= 1.
+// One force that is linear in the velocity, f = elastic + side B y, exactly; *a* and *v* along its row, where |M B w| <= 1.
 template <class L, class Number = typename L::Number>
-SNAPBEAM_FN void affine_kick(const Channel<L> &c, typename L::Number w, typename L::Number M, typename L::Number a, typename L::Number v,
-                             typename L::Number tip, typename L::Number *impulse, typename L::Number *twice, typename L::Number *lost) {
-    const Number side = c.contact ? Number(1.0) : Number(-1.0), y0 = c.contact ? tip - v : v;
-    const Number f0 = force_at(c, c.x, y0), elastic = force_at(c, c.x, Number(0.0));
-    const Number B = side * (force_at(c, c.x, Number(1.0)) - elastic), decay = M * B, x = decay * w;  // f = f_e + side B y
-    const Phi<Number> phi(x);
+SNAPBEAM_FN void affine_kick(const Channel<L> &c, Number w, Number M, Number a, Number v, Number tip, Number elastic, Number B,
+                             Number *impulse, Number *twice, Number *lost) {
+    const Number side = c.contact ? Number(1.0) : Number(-1.0), y0 = c.contact ? tip - v : v, decay = M * B;
+    const Number f0 = fma(side * B, y0, elastic);
+    const Phi<Number> phi(decay * w);
     // f' = -B a - M B f, of a contact and of a force alike
     *impulse = w * fma(f0, phi.one, -(B * a * w * phi.two));
     *twice = w * w * fma(f0, phi.two, -(B * a * w * phi.three));
-    // the power lost by Gauss's rule of three points
-    const Number drive = -side * fma(M, elastic, a);  // y' = drive - M B y
-    const double at[3] = {0.1127016653792583, 0.5, 0.8872983346207417}, share[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
-    *lost = Number(0.0);
-    for (int i = 0; i < 3; ++i) {
-        const Number t = Number(at[i]) * w, xt = decay * t, one = Phi<Number>(xt).one;
-        const Number y = fma(y0, fma(-xt, one, Number(1.0)), drive * t * one);
-        *lost = fma(Number(share[i]) * w, power_lost(c, c.x, y, fma(side * B, y, elastic), elastic), *lost);
-    }
+    // lost is B y^2, y' = -side (a + M elastic) - M B y, of a circuit P_0 f^2:  u = u_0 + u_0' t phi_1(M B t)
+    const Number rate = c.circuit ? -(B * a) - decay * f0 : fma(-decay, y0, -side * fma(M, elastic, a)), u = c.circuit ? f0 : y0, each = rate * w;
+    *lost = w * (c.circuit ? c.P[0] : B) * fma(u, fma(Number(2.0) * each, phi.two, u), each * each * phi.square);
 }
 
 // Product of what a channel sees with the row of channel j: the row itself, or along_p.
@@ -318,7 +312,7 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
     const int n = s.size();
     Number *v = z.block, *a = v + z.channels, *y = a + z.channels, *slope = y + z.channels, *change = slope + z.channels;
     Number *f = change + z.channels, *impulse = f + z.channels, *lost = impulse + z.channels, *elastic = lost + z.channels;
-    Number *tip = elastic + z.channels, *twice = tip + z.channels, *pushed = twice + z.channels, *wanted = pushed + z.channels;
+    Number *tip = elastic + z.channels, *twice = tip + z.channels, *pushed = twice + z.channels, *wanted = pushed + z.channels, *linear = wanted + z.channels;
     int held = 0;
     bool following = false;
     Real decay = Real(0.0);
@@ -336,10 +330,17 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
         impulse[i] = lost[i] = twice[i] = f[i] = slope[i] = Number(0.0);
         if (c.impulsive) ++held, wanted[i] = signal_bend(z, c) - a[i] - linear_acceleration(s, c.row, z.q1, z.p1);
         tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
-        elastic[i] = c.contact ? force_at(c, c.x, Number(0.0)) : Number(0.0);
-        const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]);
-        const Number damping = with_law(c.law, [&](auto law) { return law.damping(c.contact ? max(c.x, Number(0.0)) : c.x, fastest, c.numbers()); });
-        decay += value(product_seen(c, z.late[i]) * (c.contact ? select(acting(c), damping, Number(0.0)) : damping));
+        elastic[i] = c.contact || c.affine ? force_at(c, c.x, Number(0.0)) : Number(0.0);
+        Number damping;
+        if (c.affine) {
+            linear[i] = force_at(c, c.x, Number(1.0)) - elastic[i], damping = abs(linear[i]);
+            if (!c.contact) linear[i] = -linear[i];
+        } else {
+            const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]), x = c.contact ? max(c.x, Number(0.0)) : c.x;
+            damping = with_law(c.law, [&](auto law) { return law.damping(x, fastest, c.numbers()); });
+            if (c.contact) damping = select(acting(c), damping, Number(0.0));
+        }
+        decay += value(product_seen(c, z.late[i]) * damping);
     }
     const auto push = [&](Number after) {  // at the velocities v + after slope
         for (int i = 0; i < count; ++i) {
@@ -383,7 +384,7 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
             if (j != i) alone = alone & (!changing(z.channel[z.late[j]]));
         if (!any(alone)) continue;
         Number own_impulse, own_twice, own_lost;
-        affine_kick(c, w, product_seen(c, z.late[i]), a[i], v[i], tip[i], &own_impulse, &own_twice, &own_lost);
+        affine_kick(c, w, product_seen(c, z.late[i]), a[i], v[i], tip[i], elastic[i], linear[i], &own_impulse, &own_twice, &own_lost);
         assign(alone, impulse[i], own_impulse), assign(alone, twice[i], own_twice), assign(alone, lost[i], own_lost);
         exact = exact | alone;
     }
@@ -413,11 +414,11 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
     for (int i = 0; i < count; ++i)
         assign(exact, v[i], fma(product_seen(z.channel[z.late[i]], z.late[i]), impulse[i], fma(a[i], w, v[i]))), slope[i] = Number(0.0);
     if (last && following) push(Number(0.0));
+    const Number rate = select(differ(w, Number(0.0)), Number(1.0) / w, Number(0.0));
     for (int i = 0; i < count; ++i) {
         Channel<L> &c = z.channel[z.late[i]];
         const typename L::Marks here = c.circuit ? c.follows : FromBits<typename L::Marks>::of(~0u);
-        assign(here, c.f, select(differ(w, Number(0.0)), impulse[i] / w, Number(0.0)));
-        assign(here, c.early, select(differ(w, Number(0.0)), Number(2.0) * twice[i] / (w * w), Number(0.0)));
+        assign(here, c.f, impulse[i] * rate), assign(here, c.early, Number(2.0) * twice[i] * rate * rate);
         c.lost += lost[i];
         if (c.circuit) {
             const Number per = select(c.follows, c.P[1] / max(c.P[0], Number(1e-300)), Number(0.0));
