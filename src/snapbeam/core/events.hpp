@@ -130,7 +130,7 @@ SNAPBEAM_FN Real largest_push(const Runs<L> &z, const Row &row, typename L::Real
             const Real speed = L::total(sum);
             const Number x = c.x, reach = Number(Real(MARGIN) * speed * horizon);
             const Real damping = with_law(c.law, [&](auto law) {
-                const auto at = [&](Number u) { return law.damping(u, Number(speed), c.numbers()); };
+                const auto at = [&](Number u) { return abs(law.damping(u, Number(speed), c.numbers())); };
                 return value(law.rough ? most_within(law, x, reach, at) : at(x));
             });
             // where the range may be left, nothing is known

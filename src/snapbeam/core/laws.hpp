@@ -8,7 +8,7 @@
 //   potential(x, P)        energy stored, J; the elastic part of the force is its derivative (of a contact), or minus that
 //   stiffness(x, P)        magnitude of the derivative of the elastic force by x, at most a bound of it; in any interval of its
 //                          range the largest at an end
-//   damping(x, y, P)       magnitude of the derivative of the force by y, at most a bound of it for speeds up to |y|
+//   damping(x, y, P)       derivative of the force by d' or -v, exact if it is affine, else a bound of it for speeds up to |y|
 //   pressing(x, y, P)      of a lossy contact: what has the sign of the force, smooth down to x = 0
 //   low(P), high(P)        displacements between which it is valid (of a force)
 //   loss(x, y, f, P)       power lost by the force f (of a force)
@@ -191,7 +191,7 @@ struct CoulombFriction : ForceLaw<2> {  // f = -F tanh(v / v_0)
 struct LinearDamping : ForceLaw<1> {  // f = -c v, as of a circuit without inertia
     static constexpr bool lossy = true, affine = true;
     template <class T> static SNAPBEAM_FN T force(T, T v, const T *P) { return -(P[0] * v); }
-    template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return abs(P[0]); }
+    template <class T> static SNAPBEAM_FN T damping(T, T, const T *P) { return P[0]; }
 };
 // A harvester's circuit: f = z, z' = -v - lam z, of which z^2/2 is the energy.  P: lam, then g where it follows the beam, so that
 // f = g (x - v), and 0 elsewhere; z at last (step.hpp).
@@ -296,7 +296,7 @@ struct UserLossyContact : UserContact {  // f = elastic + coefficient d'
     static constexpr bool lossy = true;
     template <class T> static SNAPBEAM_FN T coefficient(T d, const T *P) { return User::each(pressed(d), T(0.0), P, User::coefficient); }
     template <class T> static SNAPBEAM_FN T force(T d, T y, const T *P) { return fma(coefficient(d, P), y, UserContact::force(d, y, P)); }
-    template <class T> static SNAPBEAM_FN T damping(T d, T, const T *P) { return abs(coefficient(d, P)); }
+    template <class T> static SNAPBEAM_FN T damping(T d, T, const T *P) { return coefficient(d, P); }
     template <class T> static SNAPBEAM_FN T pressing(T d, T y, const T *P) {  // as a velocity, nearly linear
         const T lossy = coefficient(d, P), size = abs(lossy);
         return select(size > T(0.0), fma(lossy, y, UserContact::force(d, y, P)) / size, T(1.0));

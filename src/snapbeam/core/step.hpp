@@ -331,16 +331,10 @@ template <class L, class Number = typename L::Number, class Real = typename L::R
         if (c.impulsive) ++held, wanted[i] = signal_bend(z, c) - a[i] - linear_acceleration(s, c.row, z.q1, z.p1);
         tip[i] = c.contact ? signal_slope(z, c) : Number(0.0);
         elastic[i] = c.contact || c.affine ? force_at(c, c.x, Number(0.0)) : Number(0.0);
-        Number damping;
-        if (c.affine) {
-            linear[i] = force_at(c, c.x, Number(1.0)) - elastic[i], damping = abs(linear[i]);
-            if (!c.contact) linear[i] = -linear[i];
-        } else {
-            const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]), x = c.contact ? max(c.x, Number(0.0)) : c.x;
-            damping = with_law(c.law, [&](auto law) { return law.damping(x, fastest, c.numbers()); });
-            if (c.contact) damping = select(acting(c), damping, Number(0.0));
-        }
-        decay += value(product_seen(c, z.late[i]) * damping);
+        const Number fastest = abs(v[i]) + abs(tip[i]) + abs(w * a[i]), x = c.contact ? max(c.x, Number(0.0)) : c.x;
+        linear[i] = with_law(c.law, [&](auto law) { return law.damping(x, fastest, c.numbers()); });
+        if (c.contact) linear[i] = select(acting(c), linear[i], Number(0.0));
+        decay += value(product_seen(c, z.late[i]) * abs(linear[i]));
     }
     const auto push = [&](Number after) {  // at the velocities v + after slope
         for (int i = 0; i < count; ++i) {
