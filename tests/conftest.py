@@ -6,6 +6,7 @@ import gc
 import os
 import signal
 import sys
+from collections import Counter
 
 from blas_kernel import blas_kernel
 
@@ -37,8 +38,20 @@ def pytest_configure():
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Begin with the laboratory, whose files take longest, so that two workers end at about the same time."""
+    """Make slow tests of most cases of what is sampled.
+
+    The laboratory is first, whose files take longest, so that two workers end at about the same time.
+    """
+    quick: Counter[str] = Counter()
+    for item in items:
+        sampled = item.get_closest_marker("sampled")
+        if sampled and not item.get_closest_marker("slow"):
+            name = item.nodeid.partition("[")[0]
+            if quick[name] % sampled.args[0]:
+                item.add_marker("slow")
+            quick[name] += 1
     items.sort(key=lambda item: "/tests/lab/" not in item.path.as_posix())
 
 

@@ -31,6 +31,7 @@ def test_a_range_beside_the_values_is_refused(verb: str, options: list[str], tmp
     assert result.exit_code == 2 and not list(tmp_path.iterdir())
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("verb", CASES)
 def test_verbs_write_files_and_pictures(verb: str, tmp_path) -> None:
     options, variable = CASES[verb]

@@ -95,6 +95,7 @@ def full(monkeypatch, tmp_path):
         yield patched
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("words", [RUN, BACKBONE], ids=["run", "curve"])
 def test_a_figure_that_fails_leaves_the_numbers(full, words, tmp_path):
     done = CliRunner().invoke(app, [*words, "--plot", "a.png", "-o", "it is.nc"])
@@ -107,6 +108,7 @@ def test_a_figure_that_fails_leaves_the_numbers(full, words, tmp_path):
     assert sorted(os.listdir()) == ["a.png", "it is.nc"]
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("option", ["--plot", "--animate"])
 def test_numbers_that_are_in_no_file_are_saved(full, option, tmp_path):
     name = "a.png" if option == "--plot" else "a.gif"

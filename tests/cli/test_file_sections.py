@@ -65,6 +65,7 @@ def test_every_section_is_valid_where_it_belongs(name):
     assert config.system.moving
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["own", "paper", "changed"])
 def test_every_combination_makes_a_system_or_names_the_section(tmp_path, capsys, start):
     for number, chosen in enumerate(subsets(MOVING)[0 if start == "own" else 1 :: 1 if start == "own" else 3]):
@@ -155,6 +156,7 @@ def file_of(chosen, command):
     return sections_of(chosen, "own") | (UNCERTAIN if command in ("probability", "design") else {})
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_commands_before_the_first_run(cli, monkeypatch, command):
     def reached(*_, **__):

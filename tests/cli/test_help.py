@@ -37,6 +37,7 @@ def test_first_screen(words):
     assert lines[0].startswith("Usage: ") and lines[2]
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("words", [words for words, each in commands().items() if not hasattr(each, "commands")])
 def test_all_options(words):
     """``--help-all`` lists each option; the first screen states how many it leaves out."""

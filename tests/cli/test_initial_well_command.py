@@ -31,6 +31,7 @@ def cli(tmp_path, monkeypatch):
     return run
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize(
     ("side", "options", "well", "reason"),

@@ -57,6 +57,7 @@ def test_names_of_any_bytes(tmp_path, tmp_path_factory, named):
             assert r"\xff.nc" in found.dataset.attrs["command"] and found.summary.impacts >= 0
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("place", [b"a.json", b"-"])
 def test_a_name_of_any_bytes_in_json(tmp_path, place):
     done = command(tmp_path, *RUN, "-o", b"\xff.nc", "--json", place)

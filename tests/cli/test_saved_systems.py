@@ -99,6 +99,7 @@ def test_a_file_describes_the_system_that_was_saved(kind, saved) -> None:
     assert load_config(saved).system == SYSTEMS[kind]
 
 
+@pytest.mark.sampled(4)
 def test_commands_of_runs(kind, saved) -> None:
     done("simulate", "-c", saved, *SHORT, "-o", "run.nc")
     run = sb.simulate(SYSTEMS[kind], sb.Integration(cycles=4))
@@ -115,6 +116,7 @@ def test_commands_of_runs(kind, saved) -> None:
     done("threshold", "-c", saved, *SHORT, "--parameter", name, "--values", values)
 
 
+@pytest.mark.sampled(4)
 def test_commands_at_rest(kind, saved) -> None:
     done("equilibria", "-c", saved)
     done("frequencies", "-c", saved)

@@ -25,6 +25,7 @@ def stored(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_widths_of_a_figure_are_those_of_the_style(stored, tmp_path) -> None:
     sizes = {}
     for style in ("talk", "ieee", ""):

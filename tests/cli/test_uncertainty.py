@@ -61,6 +61,7 @@ def test_probability_names_the_initial_well(tmp_path, section: str, words: str) 
     assert f"Runs begin in the {words}." in result.output
 
 
+@pytest.mark.slow
 def test_probability(tmp_path) -> None:
     target, picture = tmp_path / "p.nc", tmp_path / "p.png"
     result = run(tmp_path, SYSTEM + PROBABILITY, "probability", "-o", str(target), "--plot", str(picture), "--yes")

@@ -345,6 +345,7 @@ MOTIONS = [
 ]
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     "features",
     MOTIONS,
@@ -354,6 +355,7 @@ def test_every_motion(features: Features) -> None:
     judge([checked(5, features, ("reference", "standard"))])
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("seed", [0, 2, 3, 8])
 def test_a_random_system(seed: int) -> None:
     """Any parts with any numbers, at both levels."""

@@ -86,6 +86,7 @@ def test_every_tool_finds_every_number(name: str) -> None:
             )
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_every_number_can_be_uncertain_and_chosen(name: str) -> None:
     """Samples in Hz, g and m are those of the ratio; a design has each as a variable."""

@@ -93,6 +93,7 @@ def judge(seeds: range) -> None:
     assert compared > doubtful
 
 
+@pytest.mark.slow
 def test_derivatives_of_some_systems() -> None:
     judge(range(5, 7))
 

@@ -136,6 +136,7 @@ def judge(seeds: range) -> None:
     assert compared > 3 * doubtful and (rough <= 0.1 * compared).all()
 
 
+@pytest.mark.slow
 def test_derivatives_of_some_systems() -> None:
     judge(range(5, 9))
 

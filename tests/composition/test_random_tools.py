@@ -359,6 +359,7 @@ def judge(pairs: range) -> None:
     assert ends["result"] > 0.5 * len(pairs)
 
 
+@pytest.mark.slow
 def test_some_pairs() -> None:
     judge(range(5))
 

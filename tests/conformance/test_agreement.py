@@ -46,6 +46,7 @@ def solved(modes: int, ratio: float, velocity: float, cycles: int) -> Solution:
     return beam.solve(ratio, velocity, np.linspace(0.0, end, SAMPLES))
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     ("modes", "pair", "cycles", "measured"),
     [*CASES, *(pytest.param(*case, marks=[pytest.mark.slow] if case[1][1] < 0.1 else []) for case in DEAR)],

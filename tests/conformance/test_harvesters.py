@@ -101,6 +101,7 @@ def test_a_circuit_faster_than_the_step(strikers, decay) -> None:
     assert deviation(sb.System(model(3), harvesters=[coil], **parts), 1.0 / decay) < 3e-8
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:contact. the mass that an impulse")
 @pytest.mark.parametrize(("ratio", "velocity"), [(0.05, 0.02), (0.3, 0.2)])
 def test_a_circuit_faster_than_the_step_beside_a_tip_that_holds_the_beam(ratio, velocity) -> None:

@@ -232,6 +232,7 @@ def test_coulomb_friction_of_an_oscillator():
     np.testing.assert_allclose(found, truth.y[0], rtol=0.0, atol=1e-6 * start)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("own", [False, True])
 @pytest.mark.parametrize("seed", range(3))
 def test_friction_that_reverses_within_a_fraction_of_a_flight_step(own: bool, seed: int, friction) -> None:
@@ -286,6 +287,7 @@ def own_drag():
     LOCAL_FORCES.pop("own_drag")
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("own", [False, True])
 def test_drag_that_reverses_inside_a_step(own: bool, own_drag) -> None:
     """The force has a kink at zero velocity: a step ends close to it, so that level reference keeps its order."""

@@ -92,6 +92,7 @@ def shaken(modes, *strikers):
     return sb.System(model, contacts=contacts)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     ("modes", "strikers"),
     [(3, [(0.8, 1.21, 0.3, 0.45)]), (8, [(0.9, 0.7, 0.3, 0.45)]), (4, [(0.7, 1.1, 0.2, 0.45), (0.9, 1.1, 0.15, 0.6)])],

@@ -37,6 +37,7 @@ def struck(model: sb.ReducedModel, velocity: float = 0.3) -> sb.System:
     return sb.System(model, contacts=[sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION))])
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
 @pytest.mark.parametrize(("modes", "cycles"), [pytest.param(1, 3, marks=SLOW), (3, 2), pytest.param(8, 1, marks=SLOW)])
 def test_independent_solution(modes, cycles, ends) -> None:

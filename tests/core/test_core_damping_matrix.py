@@ -58,6 +58,7 @@ def error(system: sb.System, mass, stiffness, damping, **how) -> float:
     return float(np.linalg.norm(scale * (found - exact)) / np.linalg.norm(scale * start))
 
 
+@pytest.mark.sampled(2)
 @ENGINES
 @pytest.mark.parametrize(("modes", "rank"), [(2, 1), (2, 2), (20, 1), (20, 20)])
 def test_free_decay_by_the_matrix_exponential(engine: str, modes: int, rank: int) -> None:
@@ -143,6 +144,7 @@ def struck(modes: int, side: str = "below", **parts) -> tuple[sb.System, tuple[n
     return sb.System(model, contacts=[contact], initial_state=state, **parts), given
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("modes", "cycles"), [(2, 6), (20, 2)])
 @pytest.mark.parametrize("side", ["below", "above"])
 def test_contact_by_another_integrator(modes: int, cycles: int, side: str) -> None:

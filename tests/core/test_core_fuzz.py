@@ -248,6 +248,7 @@ def test_entries_in_processes(entry, calls):
         assert done.returncode == 0, (words, done.stdout, done.stderr[-6000:])
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("at", range(5))
 @pytest.mark.parametrize("bad", [-1, -(2**31), 2**31 - 1])
 def test_marks_beyond_the_records_are_refused(at, bad):
@@ -311,6 +312,7 @@ def test_memory_stays_while_the_core_computes(name):
         _core.integrate(fresh.problem, fresh.batch, "thread", "", 1, progress)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", ["structure", "scalars", "G", "pieces", "jumps"])
 def test_derivatives_of_another_shape_are_refused(name):
     """The structure's come together; each has the shape of what it belongs to."""

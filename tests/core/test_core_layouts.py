@@ -26,6 +26,7 @@ def same(one, other, rows=slice(None)):
     return all(np.array_equal(a, b[rows], equal_nan=True) for a, b in zip(one, other, strict=True))
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("which", SETS)
 @pytest.mark.parametrize("modes", [1, 2, 5, 8])
 @pytest.mark.parametrize("made", [struck, crowded], ids=["struck", "crowded"])

@@ -36,6 +36,7 @@ def test_a_run_in_pieces_is_the_run(modes, monkeypatch):
         assert same(whole, simulated(system, sample_times=times).dataset)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("modes", [1, 3, 16])
 def test_a_run_is_the_point_of_a_sweep_whatever_is_sampled(modes):
     system = crowded(modes)

@@ -103,6 +103,7 @@ def test_a_run_in_pieces_is_the_run(modes, monkeypatch):
 NOISE = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.2, seed=7)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("modes", [2, 40])
 @pytest.mark.parametrize("drive", [NOISE, SINE + NOISE], ids=["noise", "sine+noise"])
 def test_a_sum_of_many_tones_is_its_tones_and_has_their_derivatives(drive, modes, monkeypatch):

@@ -70,6 +70,7 @@ def test_peaks_of_strong_motions(modes):
         assert (np.abs(found[name] - exact[name])[agree] < 1e-4 * scale[agree]).all(), name
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("modes", [1, 4, 8, 16])
 def test_energy_balance(modes):
     """The works of all channels and the losses add up: 1e-6 of the gross work at level reference."""

@@ -205,6 +205,7 @@ def check_same(name: str) -> None:
     assert given.summary["impacts"] > 0
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("layout", ["runs", "modes", "thread"])
 @pytest.mark.parametrize("name", SAME)
 def test_a_users_law_is_the_packages(name, layout, monkeypatch):
@@ -212,6 +213,7 @@ def test_a_users_law_is_the_packages(name, layout, monkeypatch):
     check_same(name)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("layout", ["runs", "modes", "thread"])
 @pytest.mark.parametrize("name", ["hertz", "elastic_plastic", "both"])
 def test_without_numba_python_is_called(name, layout, monkeypatch, without_numba):

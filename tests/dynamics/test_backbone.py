@@ -149,6 +149,7 @@ def test_with_a_stop_the_solver_comes_back(side: str) -> None:
     np.testing.assert_allclose(sorted(heights), ends, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_linear_spring_makes_another_twin_well() -> None:
     """A spring at mid-span is an elliptic integral as the beam alone, with its stiffness taken from that of the hill."""
     spring = sb.LocalSpring(stiffness=150.0, location=0.5)
@@ -235,6 +236,7 @@ def test_refusals() -> None:
         sb.dynamics.backbone_curve(default_values.BEAM)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("well", ["lower", "both"])
 def test_the_progress_is_of_all_work(well, monkeypatch):
     """Every point is measured before the next is reported, so that nothing long follows the last report."""

@@ -211,6 +211,7 @@ def test_the_phase_of_observation_changes_along_a_branch() -> None:
     np.testing.assert_allclose(curve["velocity_amplitude"].values, exact, atol=5e-9)
 
 
+@pytest.mark.slow
 def test_a_branch_of_the_beam() -> None:
     """One mode, from intrawell tapping up: stable first, then a flip; product of multipliers all the way."""
     system = system_of(1, 1.6, 0.03)

@@ -160,6 +160,7 @@ PARTS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", PARTS)
 def test_tangents_are_differences_between_neighbours(name: str) -> None:
     """Of every coordinate, through impacts: releases, yields, jumps of forces and of velocities."""
@@ -328,6 +329,7 @@ IRREVERSIBLE: dict[str, Any] = {
 }
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", REVERSIBLE)
 def test_motion_back_in_time_is_the_inverse_map(name: str) -> None:
     """States through impacts and back, and the product of both derivatives, which is the identity."""

@@ -98,6 +98,7 @@ def test_bounds_on_one_side_of_a_tangency_keep_what_was_found(bounds, crosses) -
         assert found.attrs["termination_reason"] == "tolerance"
 
 
+@pytest.mark.slow
 def test_a_saddle_is_followed_to_a_value_from_which_newtons_method_would_not_find_it() -> None:
     """The hilltop saddle of the two-well oscillator (multiplier 245), in steps of its amplitude."""
     model = sb.ReducedModel.from_matrices(

@@ -38,6 +38,7 @@ def test_grebogis_map() -> None:
     assert shifted.boundary == pytest.approx(entropy.boundary, abs=4.0 * entropy.boundary_error)
 
 
+@pytest.mark.slow
 def test_the_exponent_of_grebogis_map() -> None:
     """0.2 (Grebogi et al. 1983), the dimension of the border being 1.8."""
     found = sb.dynamics.uncertainty_exponent(grebogi_basins(900))

@@ -159,6 +159,7 @@ def test_orbits_with_one_impact_in_n_periods(ratio: float, restitution: float, p
     assert math.exp(orbit.log_determinant) == pytest.approx(restitution**2, abs=1e-8)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     ("modes", "ratio", "velocity", "periods"), [(1, 1.6, 0.03, 1), (8, 1.4, 0.03, 2), (32, 3.5, 0.06, 2)]
 )

@@ -12,6 +12,7 @@ from snapbeam.util.validation import InputError
 LIFETIME, DELAY = 50.0, 8.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("runs", "limit"),
     [

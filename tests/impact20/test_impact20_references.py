@@ -56,6 +56,7 @@ def test_problems_and_references_do_not_import_snapbeam():
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("problem", "name"), CHEAP)
 def test_two_codes_reproduce_the_stored_reference(problem, name):
     case, stored = case_named(problem, name), load(problem).references[name]
@@ -145,6 +146,7 @@ for problem in sorted({*names()} - {"finite_elements_200", "threshold", "replica
 """
 
 
+@pytest.mark.slow
 def test_snapbeam_runner_reproduces_the_references():
     """In a process of its own: the runner defines a force, which every later table of parameters would have."""
     done = subprocess.run([sys.executable, "-c", SNAPBEAM], cwd=ROOT, capture_output=True, text=True, check=False)

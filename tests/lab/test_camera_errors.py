@@ -230,6 +230,7 @@ def test_a_rendered_scene_is_told_or_right(kind, tmp_path):
         assert not outcome.flagged and outcome.ratio < 5.0
 
 
+@pytest.mark.slow
 def test_a_pixel_size_ten_percent_off_beside_a_gauge_and_impossible_motions_are_told(tmp_path):
     rng = np.random.default_rng((31, 4, sum(map(ord, "pixel size ten percent off"))))
     tracked, _ = camera_scenes.measured("pixel size ten percent off", rng, tmp_path, buckling_level=20e-6)

@@ -241,6 +241,7 @@ def parting(run, cycle: float, freq: float = 100.0):
     return seen
 
 
+@pytest.mark.slow
 def test_an_overlay_shows_where_runs_part(synthetic_run):
     """Both beams on one axis, the difference below, a line where they part: the data of the picture, not its looks."""
     import matplotlib.pyplot as plt
@@ -405,6 +406,7 @@ def test_command_of_calibration(program, tmp_path):
     assert program("calibrate", "--straight", "80,x").exit_code == 2
 
 
+@pytest.mark.slow
 def test_command_of_comparison(program, tmp_path, synthetic_map, synthetic_run):
     synthetic_map.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
     synthetic_run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")

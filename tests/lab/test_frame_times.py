@@ -77,6 +77,7 @@ def test_pixels_that_are_not_square(tmp_path, unit):
         assert recording.pixel_size == recording.pixel_width == 2e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["below", "left"])
 def test_tracking_takes_the_size_of_a_pixel_along_the_motion(tmp_path, side):
     time = np.arange(120) / 5e3

@@ -189,6 +189,7 @@ def test_the_advised_limits_of_the_resolution_are_accepted():
         assert lab.frequency_response(force, motion, resolution=resolution).sizes["frequency"] >= 4
 
 
+@pytest.mark.slow
 def test_the_command_writes_what_can_be_drawn_and_exported(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     force, motion = records(9, (0.0, 0.1))

@@ -62,6 +62,7 @@ def block_means(truth, block):
     return truth[:, : WIDTH // block * block].reshape(TIME.size, -1, block).mean(2)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(("pattern", "noise"), [(speckle, 0.01), (speckle, 0.04), (bar, 0.01)])
 def test_standard_errors_cover_the_displacement(pattern, noise, tmp_path):
     """Two standard errors cover 88 to 98.5 % of all blocks and frames, and errors are hundredths of a pixel."""

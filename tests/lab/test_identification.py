@@ -108,6 +108,7 @@ def test_a_hundred_noisy_velocities():
     demand(scores(one_well(0.15, 1.0, velocity=True), 100, "m/s"), 0.97, 0.90)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_a_clean_decay(method):
     signal = make_signal(B * one_well(0.2, 2.0), "m", RATE)

@@ -41,6 +41,7 @@ def shown(case):
     return pytest.param(case, marks=marks, id=f"{case.group}: {case.mistake}")
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("case", [shown(case) for case in CASES])
 def test_a_mistake_is_right_or_flagged_or_refused(case, tmp_path):
     outcome = looked(case, tmp_path)

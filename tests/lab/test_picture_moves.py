@@ -57,6 +57,7 @@ def test_a_stabiliser_is_told_by_its_background(tmp_path):
     assert np.nanmax(np.abs(ratio)) < 5.0
 
 
+@pytest.mark.slow
 def test_a_lamp_that_pulses_is_told_by_edges_that_are_too_sharp(tmp_path):
     """The light of the last tenth of an exposure of 0.9 frames."""
     pulsed = dataclasses.replace(CAMERA, exposure=0.09 / 5e3)

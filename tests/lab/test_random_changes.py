@@ -100,6 +100,7 @@ def changed(whole, rng, name):
     return bytes(content)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     ("name", "changes"),
     [*((name, 200) for name in WRITERS if name != SEPARATE), pytest.param(SEPARATE, 60, marks=pytest.mark.slow)],

@@ -31,6 +31,7 @@ def test_a_short_decay_of_few_amplitudes_leaves_its_law_open(seed, k):
     assert max(abs(off), abs(other)) < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "k"), [(6001, 4), (6001, 52), (6001, 195), (6001, 215)])
 def test_a_curve_begins_at_the_amplitude_of_the_start_and_is_no_mode(seed, k):
     """Off by 3 to 15 standard errors: the start by the mean rate, or what a law leaves taken out as another mode."""
@@ -65,6 +66,7 @@ def test_the_envelope_of_a_free_form_is_that_of_the_law_in_closed_form():
     assert drag == pytest.approx(envelope(DampingLaw("quadratic", 0.7), time, 1.3), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_beats_are_still_two_modes():
     found = [decay_signal(np.random.default_rng((17, k)), "close modes")[0] for k in range(6)]
     codes = [{one.code for one in identify_decay(signal).diagnostics} for signal in found]

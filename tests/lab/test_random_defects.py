@@ -104,6 +104,7 @@ def test_a_few(what, good, spoiled, tmp_path):
     hold(what, tmp_path, range(good + spoiled), good=good)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "k", "kind"),
     [
@@ -117,6 +118,7 @@ def test_what_went_by_in_silence_once(seed, k, kind, tmp_path):
     assert outcome.flagged and outcome.ratio < SURE
 
 
+@pytest.mark.slow
 def test_a_good_scene_whose_columns_agreed_by_chance(tmp_path):
     """Ten of fourteen columns lay on a line by chance, the others were left out: 0.39 px, 5.4 standard errors off."""
     outcome = MAKERS["scene"][1]("", np.random.default_rng((24, 89)), tmp_path)

@@ -42,6 +42,7 @@ def of_a_start(cycles, level):
     return make_signal(0.02 * (rise * np.cos(200.0 * np.pi * since + 0.7) + noise), "m/s", 2e4)
 
 
+@pytest.mark.slow
 def test_a_sudden_start_excludes_a_filter_and_a_gentle_one_does_not():
     sudden, gentle = (measure_drive(of_a_start(cycles, 0.01)) for cycles in (0.0, 12.0))
     assert not diagnostics_of(sudden)
@@ -52,6 +53,7 @@ def test_a_sudden_start_excludes_a_filter_and_a_gentle_one_does_not():
     assert abs(gentle.steady.amplitude - 0.02) < 2.0 * gentle.steady.amplitude_se
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("start, most", [("linear", 0.06), ("overshoot", 0.16), ("gentle", 0.1)])
 def test_white_noise_makes_a_high_pass_less_likely_and_a_start_is_no_notch(start, most):
     """Shakers at 54 Hz, near the mains: the noise is white to its lowest line, and each start is that of a control."""
@@ -70,6 +72,7 @@ def test_white_noise_makes_a_high_pass_less_likely_and_a_start_is_no_notch(start
     assert abs(drive.steady.amplitude - 0.02) < 2.0 * drive.steady.amplitude_se < 2.0 * 0.02 * most
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("seed, k", [(811, 6), (811, 45), (811, 50), (811, 114), (9001, 0), (9001, 39), (9001, 106)])
 def test_a_high_pass_that_white_noise_or_an_odd_start_hides_is_in_the_standard_error(seed, k):
     """Off by 7 to 3,700 standard errors without a word when white noise, or a start that nothing explains, excluded it."""

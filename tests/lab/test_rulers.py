@@ -48,6 +48,7 @@ def found(kind, seed, folder, **asked):
     return {one.code: one for one in diagnostics_of(tracked)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "severity"),
     [

@@ -76,6 +76,7 @@ def test_a_shaker_on_another_side_sees_the_turned_picture(side):
     np.testing.assert_array_equal(turned.frame(40), expected)
 
 
+@pytest.mark.slow
 def test_files_of_every_kind_hold_the_same_frames(tmp_path):
     recording = render_recording(*STILL, camera=CAMERA, rest_frames=0)
     for name in ("a.cihx", "b.cih", "c.avi"):

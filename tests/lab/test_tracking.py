@@ -32,6 +32,7 @@ def followed(recording, folder, name="a.cihx", **options):
         return track(read, buckling_level=BUCKLING_LEVEL, **options)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("seed", "name"), [(0, "a.cihx"), pytest.param(1, "b.cih", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("stage", [STICKER, PLAIN_TIP], ids=["sticker", "tip"])
 @pytest.mark.parametrize(
@@ -51,6 +52,7 @@ def test_displacements_within_the_promised_error(tmp_path, name, snr, error, bia
     assert stated == pytest.approx(np.nanstd(beam), rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_sticker_that_is_not_looked_for_does_not_mislead(tmp_path):
     recording = rendered(stage=PLAIN_TIP | {"marker_thickness": 0.25e-3})
     tracked = followed(recording, tmp_path, marker=False)
@@ -59,6 +61,7 @@ def test_a_sticker_that_is_not_looked_for_does_not_mislead(tmp_path):
     assert (tracked["flags"] != 0).mean() < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "side", [pytest.param("above", marks=pytest.mark.slow), "left", pytest.param("right", marks=pytest.mark.slow)]
 )
@@ -78,6 +81,7 @@ def test_every_side_and_dark_objects_before_bright_light(tmp_path, side):
     assert tracked["penetration_normalised"].max() > -0.02
 
 
+@pytest.mark.slow
 def test_the_result_follows_the_schema_of_a_run(tmp_path):
     calls = []
     tracked = followed(rendered(), tmp_path, progress=lambda done, total: calls.append((done, total)))
@@ -153,6 +157,7 @@ def test_a_flat_tip_without_sticker_merges_at_contact_and_says_so(tmp_path):
     assert rms(errors_px(tracked, recording.truth, "shaker_displacement_mm")) < 0.1
 
 
+@pytest.mark.slow
 def test_leaving_the_region_is_flagged(tmp_path):
     time, beam, shaker, *_ = impacts(4)
     up = beam + 45.0 * PIXEL * np.sin(np.pi * time / time[-1]) ** 2
@@ -164,6 +169,7 @@ def test_leaving_the_region_is_flagged(tmp_path):
     assert rms(errors_px(tracked, recording.truth, "displacement_mm")) < 0.1
 
 
+@pytest.mark.slow
 def test_frames_missing_from_the_numbering_stay_missing(tmp_path):
     import cv2
 
@@ -180,6 +186,7 @@ def test_frames_missing_from_the_numbering_stay_missing(tmp_path):
     assert rms(errors_px(tracked, recording.truth, "displacement_mm")) < 0.1
 
 
+@pytest.mark.slow
 def test_the_beam_alone_and_a_picture_of_the_background(tmp_path):
     recording = rendered(stage={"shaker_width": 1e-6, "marker_thickness": 0.0})
     path = recording.write(tmp_path / "a.cihx")
@@ -210,6 +217,7 @@ def test_frames_without_anything_to_find_are_refused(tmp_path):
             track(read)
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize(
     ("options", "name"),
     [
@@ -234,6 +242,7 @@ def test_bad_parameters_are_refused_by_name(tmp_path, options, name):
             track(read, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("snr", [pytest.param(30.0, marks=pytest.mark.slow), 15.0])
 @pytest.mark.parametrize("gap_px", [4.6, *(pytest.param(gap, marks=pytest.mark.slow) for gap in (9.0, 25.0))])
 def test_onsets_of_isolated_impacts_within_one_frame(tmp_path, snr, gap_px):
@@ -252,6 +261,7 @@ def test_onsets_of_isolated_impacts_within_one_frame(tmp_path, snr, gap_px):
     assert found["bounded"].values[1:-1].all() and not found["bounded"].values[0]
 
 
+@pytest.mark.slow
 def test_a_contact_that_borders_on_lost_frames_is_not_bounded(tmp_path):
     tracked = followed(rendered(), tmp_path)
     onsets = contact_onsets(tracked)

@@ -128,6 +128,7 @@ def test_a_steady_start_and_a_start_outside_the_record():
     assert running.startup is None and "in motion" in running.summary()["startup"]
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("snr", "accepted"), [(14.0, False), (16.0, True)])
 def test_fifteen_decibels_decide(snr, accepted):
     drive = measure_drive(record(snr=snr)[0])
@@ -143,6 +144,7 @@ def test_distortion_alone_refuses_a_test():
     assert drive.steady.snr > 60.0
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("snr", "share"), [(60.0, 0.003), (25.0, 0.02)])
 def test_integration_does_not_drift(snr, share):
     signal, truth = record(snr=snr, cycles=200)
@@ -155,6 +157,7 @@ def test_integration_does_not_drift(snr, share):
     assert abs(late.mean()) < share  # plain integration of the 1 mm/s offset ends 40 amplitudes away
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("freq", "over", "polarity", "delay"),
     [
@@ -183,6 +186,7 @@ def test_alignment_with_a_camera(freq, over, polarity, delay):
     assert told.certain and abs(told.delay - delay) < 2e-5
 
 
+@pytest.mark.slow
 def test_alignment_refuses_two_motions():
     other = make_signal(1e-4 * np.cos(2.0 * np.pi * 90.0 * np.arange(8000) / 1e4), "m", 1e4)
     with pytest.raises(InputError, match="same motion"):
@@ -245,6 +249,7 @@ def _of_the_sensor(change):
     return make_signal(change(shaker(time - 0.1)[1] + noise, time), "m/s", 2e4, name="velocity")
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     ("kind", "change"),
     [
@@ -278,6 +283,7 @@ def told_of_noise(noise):
     return {one.code[11:]: one for one in measure_drive(signal, 100.0).diagnostics}
 
 
+@pytest.mark.slow
 def test_integrated_noise_is_no_filter():
     rng = np.random.default_rng(3)
     for _ in range(3):
@@ -292,6 +298,7 @@ def test_noise_behind_a_filter_of_first_order_tells_its_corner():
     assert told["low_pass"].numbers["corner"] == pytest.approx(300.0, rel=0.6)
 
 
+@pytest.mark.sampled(5)
 @pytest.mark.parametrize(
     ("kind", "least"),
     [
@@ -316,6 +323,7 @@ def test_an_error_of_electronics_is_told_by_its_name(kind, least):
     assert all(one.flagged or one.ratio < 5.0 for one in outcomes)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("k", "kind", "told"), [(62, "notch", True), (93, "notch of 60 Hz", False)])
 def test_a_notch_rings_whatever_the_start_is(k, kind, told):
     """They were wrong without a word where a start that no filter explains to the noise spoke for none."""
@@ -323,6 +331,7 @@ def test_a_notch_rings_whatever_the_start_is(k, kind, told):
     assert ("vibrometer.notch" in outcome.codes) >= told and outcome.ratio < 5.0
 
 
+@pytest.mark.slow
 def test_a_third_harmonic_of_the_shaker_itself_is_no_saturation():
     rng = np.random.default_rng(4)
     for third in (0.06, 0.11, 0.11, 0.15):
@@ -336,6 +345,7 @@ def test_a_third_harmonic_of_the_shaker_itself_is_no_saturation():
         assert "vibrometer.saturated" not in [one.code for one in found.diagnostics]
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("kind", ["slew", "crossover", "samples_lost", "drifts", "beat", "high_pass", "notch"])
 def test_an_error_of_electronics_is_named_and_covered(kind):
     rng = np.random.default_rng(5)
@@ -397,6 +407,7 @@ def _tone(amplitude, frequency):
     return amplitude * np.cos(2.0 * np.pi * frequency * time), time
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("frequency", "start_up"), [(200.0, 0.02), (300.0, 0.01)])
 def test_a_start_that_is_not_over_is_in_the_standard_error(frequency, start_up):
     """Twenty cycles of a shaker that is within a percent of its amplitude: 10 to 20 standard errors in silence once."""

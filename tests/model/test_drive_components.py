@@ -156,6 +156,7 @@ def test_rate_and_acceleration_are_the_derivatives(drive):
             assert np.abs(np.diff(gained) - change).max() <= allowed
 
 
+@pytest.mark.sampled(4)
 @EVERY
 def test_only_a_named_time_has_a_jump(drive):
     """The displacement has no jump at any time, the velocity none but at a named time."""

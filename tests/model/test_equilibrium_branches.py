@@ -64,6 +64,7 @@ def test_critical_points_need_no_search(monkeypatch: pytest.MonkeyPatch) -> None
     assert 5 <= searches <= 10, searches
 
 
+@pytest.mark.slow
 def test_motions_settle_in_wells_that_nobody_looked_for() -> None:
     """As descent, which knows the wells, tells; next to a magnet nothing settles."""
     model = sb.ReducedModel.from_beam(BEAM, modes=2)
@@ -163,6 +164,7 @@ def test_what_becomes_of_the_wells_under_a_magnet(side: float) -> None:
     assert sorted(sum(each != "none" for each in own) for own in kinds) == [0, 1]
 
 
+@pytest.mark.slow
 def test_a_bifurcation_of_unstable_branches() -> None:
     """Of two buckled coordinates the second one branches off where the first is unstable already."""
     two = sb.ReducedModel.from_matrices(

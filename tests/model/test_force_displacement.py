@@ -82,6 +82,7 @@ def test_sideways_buckling_of_a_pinned_arch() -> None:
     assert float(curve.snap_through_force) == pytest.approx(force, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_many_modes_against_the_beam_equation() -> None:
     """A clamped buckled beam under E I w'''' + P w'' = F delta, where it buckles sideways at k L = 8.9868."""
     wave = 8.986818915818128
@@ -185,6 +186,7 @@ def test_finite_elements_with_springs() -> None:
     assert curve.attrs["snap_through_kind"] == modal.attrs["snap_through_kind"] == "limit"
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("modes", [1, pytest.param(3, marks=pytest.mark.slow), pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", ["spring", "magnet", "electrode"])
 def test_local_forces_where_the_force_acts_add_to_it(modes: int, law: str) -> None:

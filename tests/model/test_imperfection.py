@@ -141,6 +141,7 @@ def test_secular_equation_against_newton(seed) -> None:
     assert np.abs(left).max() < 1e-9
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("modes", [1, 2, 3, pytest.param(6, marks=pytest.mark.slow)])
 def test_bound_behind_early_termination(modes) -> None:
     """The dual against SciPy's constrained minimum: never above it, and equal to it."""

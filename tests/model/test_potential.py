@@ -296,6 +296,7 @@ def test_magnets_on_both_sides_at_nearly_the_same_place():
 ATTRACTION = 1e-9
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     ("modes", "magnets", "directions"),
     [

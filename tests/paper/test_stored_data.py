@@ -30,6 +30,7 @@ def test_data_are_kept():
     assert set(paper.FIGURES) == set(KEPT)
 
 
+@pytest.mark.sampled(5)
 @pytest.mark.parametrize("name", KEPT)
 def test_says_what_made_it(name):
     for dataset in loaded(name).values():
@@ -90,6 +91,7 @@ def test_a_point_of_the_map_is_computed_again():
     np.testing.assert_array_equal(again.response_class.values, part.response_class.values)
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize(
     "name", [name for name in ("fig2", "fig6", "fig7", "fig8", "figA9", "figB10", "si5", "two_tips") if name in KEPT]
 )

@@ -29,6 +29,7 @@ def test_the_four_points_come_again() -> None:
         assert float(one["end_probability"].sel(well="other")) == 1.0
 
 
+@pytest.mark.slow
 def test_three_measurements_of_sensitivity_agree() -> None:
     """alpha = kappa/lambda, each measured by itself."""
     found = study.sensitivity()

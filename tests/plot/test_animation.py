@@ -29,6 +29,7 @@ def test_a_measured_run_without_force_has_no_slow_motion(synthetic_run):
     assert frame_times(measured, duration=1.0, fps=10.0).size == 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".mp4", pytest.param(".gif", marks=pytest.mark.slow)])
 def test_the_file_plays(tmp_path, synthetic_run, suffix):
     seen = []

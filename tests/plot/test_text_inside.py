@@ -125,6 +125,7 @@ def check(figure: Figure, words: str) -> None:
             assert np.abs(drawn - color).max(axis=1).min() < 0.01, f"{words}: {text.get_text()} does not occur"
 
 
+@pytest.mark.sampled(5)
 @pytest.mark.parametrize("result", RESULTS)
 def test_the_default_figure(result: str, style: str) -> None:
     """In three styles, at both widths of each."""
@@ -146,6 +147,7 @@ def test_the_text_of_every_figure_is_inside(result: str) -> None:
         plt.close(figure)
 
 
+@pytest.mark.slow
 def test_every_kind_of_result_is_drawn_here() -> None:
     """A new kind fails here until a small result of it is among those of ``every_kind``; one is drawn in ``tests/lab``."""
     assert {figures_of(each())[0] for each in RESULTS.values()} == {kind.words for kind in _KINDS} - {
@@ -156,6 +158,7 @@ def test_every_kind_of_result_is_drawn_here() -> None:
 GALLERY = ("run", "map", "map of a line", "attractors", "probability map", "lifetimes")
 
 
+@pytest.mark.sampled(5)
 @pytest.mark.parametrize(
     "result", [pytest.param(name, marks=pytest.mark.slow if name == "run" else ()) for name in GALLERY]
 )

@@ -265,6 +265,7 @@ def plain(text: str) -> str:
     return re.sub(r"\$[^$]*\$", "", text)
 
 
+@pytest.mark.sampled(5)
 @pytest.mark.parametrize("case", CASES)
 def test_figures_have_the_units_that_were_given(case: str, systems: dict[str, sb.System]) -> None:
     of, compute, labels = CASES[case]

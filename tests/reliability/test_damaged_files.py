@@ -58,6 +58,7 @@ def test_commands_say_it_in_a_line(written, tmp_path, monkeypatch, command):
     assert not (tmp_path / "out.png").exists()
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"a": ' * 50_000, "nothing", "[1]"])
 def test_a_description_that_is_none(written, tmp_path, text):
     with xr.open_dataset(written / "map.nc", engine="h5netcdf") as ds:

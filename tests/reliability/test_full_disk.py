@@ -100,6 +100,7 @@ def test_a_run_that_cannot_be_saved_is_not_lost(mounted, tmp_path, monkeypatch, 
     xr.testing.assert_identical(sb.load(kept).impacts, run.impacts)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("kind", [pytest.param("pdf", marks=pytest.mark.slow), "png", "svg"])
 @pytest.mark.parametrize("size", ["4k", pytest.param("12k", marks=pytest.mark.slow), "20k"])
 def test_a_figure_that_does_not_fit(mounted, synthetic_run, tried, size, kind):

@@ -33,6 +33,7 @@ def limited(words, megabytes, folder, **variables):
     )  # fmt: skip
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize(
     "megabytes", [170, 290, 420, *(pytest.param(size, marks=pytest.mark.slow) for size in (230, 340, 520, 720))]
 )

@@ -40,6 +40,7 @@ def values(found):
     return {name: np.asarray(table[name]) for name in table if np.asarray(table[name]).dtype.kind == "f"}
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("stops", [2, pytest.param(70, marks=pytest.mark.slow)])

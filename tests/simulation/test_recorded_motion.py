@@ -82,6 +82,7 @@ def test_bad_records_are_refused():
         sb.Striker(drive=sb.RecordedMotion(displacement=np.full(9, np.nan), velocity=np.zeros(9), **good))
 
 
+@pytest.mark.slow
 def test_samples_reach_the_end_of_the_last_cycle_whatever_ticks_it_lies_between(tmp_path):
     """A run ends on a tick: up to 1.4e-9 of its length from the end of the cycles that are asked for."""
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.03)

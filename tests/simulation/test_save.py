@@ -42,6 +42,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 def test_parts_of_a_run(tmp_path) -> None:
     """Without the modes or all samples a file has the same statistics, impacts and final state, and says what it lacks."""
     run = sb.simulate(*CASES["plain"])
@@ -102,6 +103,7 @@ def test_save_of_the_command(tmp_path) -> None:
 QUICK = ("tolerance", "decided", "failed", "no impact ends")
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CASES]
 )

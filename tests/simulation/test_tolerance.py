@@ -31,6 +31,7 @@ def both(run: sb.Run) -> np.ndarray:
     return np.column_stack((run.dataset.displacement_at_striker, run.dataset.midspan_displacement))
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
 @pytest.mark.parametrize(
     ("modes", "omega", "speed"),

@@ -54,6 +54,7 @@ def assert_integrated(system: sb.System, how: sb.Integration, period: float) -> 
     return run
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("accuracy", ["standard", "reference"])
 @pytest.mark.parametrize("modes", [1, 3, 8, pytest.param(32, marks=pytest.mark.slow)])
 def test_random_runs_with_contact(modes: int, accuracy: str) -> None:

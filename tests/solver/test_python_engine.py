@@ -36,6 +36,7 @@ def how(engine="python", cycles=1):
     return sb.Integration(cycles=cycles, engine=engine, accuracy="reference")
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("modes", [1, 4])
 def test_the_papers_system(modes):
     system = sb.System(beam(modes), contacts=[striking()])
@@ -57,6 +58,7 @@ def test_the_papers_system(modes):
     assert run.impacts["onset"].values == pytest.approx(runs[1].impacts["onset"].values, abs=1e-9)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     ("seed", "features"),
     [
@@ -70,6 +72,7 @@ def test_systems_of_many_parts_against_the_reference(seed, features):
     assert report.failures == [] and not report.refused
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("midspan_amplitude", [0.0, 4e-6])
 def test_energy_of_high_modes_across_the_wells(midspan_amplitude):
     """Counted from the well on whose side mid-span is, equal or not."""
@@ -96,6 +99,7 @@ def several():
     return sb.System(beam(2), contacts=[striking(), *further])
 
 
+@pytest.mark.slow
 def test_several_contacts_of_which_one_loses_energy():
     times = np.linspace(0.0, 0.009, 80)
     own, core = (sb.simulate(several(), how(engine), sample_times=times) for engine in ("python", "native"))
@@ -109,6 +113,7 @@ def test_several_contacts_of_which_one_loses_energy():
     assert abs(own.dataset.attrs["energy_error"]) < 1e-8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["python", "native"])
 def test_energies_of_several_contacts_are_balanced_at_every_sample(engine):
     """Beam, all contacts and losses together change by the work of the striker alone; a contact counts once."""

@@ -94,6 +94,7 @@ def test_why_there_are_none(objective: str, words: str) -> None:
     assert not problem("striker_work", U.Constraint(quantity="stroke", upper=1.0)).not_smooth
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", ["beam.thickness", "beam.buckling_level", "model.damping_ratio"])
 def test_a_variable_of_the_structure(name: str) -> None:
     """It changes the modes and the scales by which constraints are measured: differences of order six of the runs."""

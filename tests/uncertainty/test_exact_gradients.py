@@ -133,9 +133,11 @@ def slopes_of(
     return here, exact, found, doubt
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("accuracy", ["standard", pytest.param("reference", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
-    "kind", [pytest.param(each, marks=pytest.mark.slow) if each == "force" else each for each in SYSTEMS]
+    "kind",
+    [pytest.param(each, marks=pytest.mark.slow) if each in ("force", "held and damped") else each for each in SYSTEMS],
 )
 def test_derivatives_of_statistics(kind: str, accuracy: str) -> None:
     make, names = SYSTEMS[kind]

@@ -286,6 +286,7 @@ def test_refusals(make, words: str) -> None:
         make()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:constraints. no reported design is known to satisfy them")
 def test_a_search_that_was_stopped_goes_on_from_its_checkpoint(tmp_path) -> None:
     """The resumed search is the uninterrupted one, and computes none of the runs that the stopped one had computed."""

@@ -48,6 +48,7 @@ def test_what_is_written_carries_its_mark(suffix, tmp_path):
     assert is_ours(ours) and not is_ours(other)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(("option", "name"), [("-o", "data.nc"), ("--plot", "photo.png"), ("--json", "notes.json")])
 def test_a_foreign_file_is_kept_unless_forced(option, name, tmp_path):
     file = tmp_path / name

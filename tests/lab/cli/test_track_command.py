@@ -55,6 +55,7 @@ def test_the_whole_command(recorded, tmp_path):
         np.testing.assert_array_equal(dataset["flags"].values.nonzero()[0], [40])
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -50,6 +50,7 @@ def test_edges_are_drawn_where_they_are(tracked):
     assert {"shaker tip", "sticker", "beam, near edge (far edge + thickness)"} <= set(lines)
 
 
+@pytest.mark.sampled(2)
 def test_a_frame_and_its_flags(tracked, tmp_path):
     read, dataset, _ = tracked
     figure = plot_frame(read, dataset, 50)
@@ -65,6 +66,7 @@ def test_a_frame_and_its_flags(tracked, tmp_path):
     plt.close("all")
 
 
+@pytest.mark.sampled(2)
 def test_the_quality_page_shows_displacement_error_and_flags(tracked):
     _, dataset, _ = tracked
     figure = plot_tracking_quality(dataset)
