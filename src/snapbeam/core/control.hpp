@@ -71,7 +71,7 @@ template <class L> struct Group {
     Held<Event<L>, CHANNELS> events;  // of each channel
     Held<Cell, 0, false> spare;          // rows and channels that a record puts aside
     Held<Channel<L>, 0, false> spare_channel;
-    Real jump, turned;            // next jump of a signal, ticks; steps since tones were taken from the time
+    Real jump, turned;            // next jump of a signal, ticks; steps since signals were taken from the time
     Held<Real, LEVELS> lengths;   // of steps, ticks
     bool circuits;
     Real step, contact_step, end, limit, output_interval, next_output, halvings, most_steps, stretch, stretch_at_rest, calm, energy, lowest;
@@ -324,7 +324,7 @@ template <class L> struct Group {
         if (!fresh) return;
         const Marks which = FromBits<Marks>::of(fresh);
         const int n = s->size();
-        begin_signals(which, which);
+        begin_signals(which);
         for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].begun;
         assign(which, turned, Real(0.0));
         for (int j = 0; j < z.channels; ++j)
@@ -370,8 +370,8 @@ template <class L> struct Group {
         }
     }
 
-    SNAPBEAM_FN void begin_signals(Marks anchored, Marks fresh) {
-        for (int i = 0; i < z.signals; ++i) z.signal[i].begin(anchored, fresh, z.t, z.tick, z.drift);
+    SNAPBEAM_FN void begin_signals(Marks which) {
+        for (int i = 0; i < z.signals; ++i) z.signal[i].begin(which, z.t, z.tick, z.drift);
     }
 
     // --- propose --------------------------------------------------------------------------------------------------------
@@ -379,7 +379,7 @@ template <class L> struct Group {
         const Marks fresh = alive & (!again);
         const int n = s->size();
         const Marks anchored = fresh & (turned >= Real(ANCHOR));
-        begin_signals(anchored, fresh);
+        begin_signals(anchored);
         assign(anchored, turned, Real(0.0));
         if (problem->shift) {  // modes about the well that the beam is near
             const Marks crossed = fresh & (z.sign * totals.center.u * Real(problem->center_rest) < Real(0.0));
@@ -794,7 +794,7 @@ template <class L> struct Group {
         }
         totals.add_modes(z, ok, z.h);  // before an impact changes the energy
         z.t = select(ok, z.t + ticks, z.t), turned += select(ok, Real(1.0), Real(0.0));
-        for (int i = 0; i < z.signals; ++i) assign(ok, z.signal[i].begun.sine, z.signal[i].at.sine), assign(ok, z.signal[i].begun.cosine, z.signal[i].at.cosine);
+        for (int i = 0; i < z.signals; ++i) z.signal[i].go_on(ok);
         for (int j = 0; j < z.channels; ++j) {
             Channel<L> &c = z.channel[j];
             if (c.circuit) assign(ok, c.P[c.state], c.z), assign(ok, c.r0, c.r1);
@@ -808,7 +808,8 @@ template <class L> struct Group {
         if (any(jumped)) {
             for (int l = 0; l < L::runs; ++l)
                 if (lane(jumped, l)) advance_jump(l);
-            for (int i = 0; i < z.signals; ++i) z.signal[i].begin(FromBits<Marks>::of(0), jumped, z.t, z.tick, z.drift), z.signal[i].at = z.signal[i].begun;
+            begin_signals(jumped);
+            for (int i = 0; i < z.signals; ++i) z.signal[i].at = z.signal[i].begun;
             if constexpr (L::directions > 0) move_in_time(*this, -later);
         }
         assign(ok, stretch, Real(value(fma(Number(2.0), z.gq, z.qr))));

@@ -4,12 +4,12 @@
 //   PIECES   s(t) = gain sum_k c_ik x^k, x = t - begin_i in [0, begin_(i+1) - begin_i): polynomials of degree five, from a table
 //   SWEEP    s(t) = size/w(t)^p sin(integral of w), w from first to last within a duration, linear in time or exponential; p = 0, 1, 2
 //   TONES    the sum of many tones (PARTIALs, which are no signals of their own), by its power series about the middles of cells in
-//            which the fastest turns by 1 rad:  c_0 = A sin, c_1 = A rate cos, c_(n+2) = -c_n rate^2/((n + 1)(n + 2))
+//            which the fastest turns by 2 rad:  c_0 = A sin, c_1 = A rate cos, c_(n+2) = -c_n rate^2/((n + 1)(n + 2))
 //
 // with t from the signal's own beginning.  A signal may have a window, another signal by which it is multiplied: a burst is a tone in
 // a window of pieces.  A channel adds its signals with factors.  A signal is taken to the end of a step at once, and to the kicks
-// inside only where it acts there.  Of a tone, sine and cosine advance by products that were formed once for the length of the step,
-// and are taken from the time again every ANCHOR steps.  At a jump of a derivative a step ends, and its last kick sees the signal
+// inside only where it acts there.  Of a tone, sine and cosine advance by products that were formed once for the length of the step.
+// Every ANCHOR steps a signal is taken from the time again.  At a jump of a derivative a step ends, and its last kick sees the signal
 // just before.
 #pragma once
 #include "structure.hpp"
@@ -23,7 +23,8 @@ constexpr bool ONLY_TONES = false;
 #endif
 constexpr double ANCHOR = 64.0;
 constexpr int WHOLE = MOST_DISTINCT;  // the whole step, among the flows
-constexpr int SERIES = 14;  // coefficients of a sum of tones: .5^14/14! = 7e-16
+constexpr int SERIES = 18;  // coefficients of a sum of tones: 1/18! = 2e-16
+constexpr double CELL = 2.0;  // by which the fastest turns, rad
 
 // Where a signal is: sine and cosine of a tone; time (s), value and derivatives of the others.
 template <class L> struct Moment {
@@ -84,7 +85,7 @@ template <class L> struct Signal {
     SNAPBEAM_CALLED void evaluate() {
         if (kind == snapbeam::SWEEP) return of_sweep(at.now);
         const bool sum = kind == snapbeam::TONES;
-        const Real now = value(at.now), cell = nearest(now * value(p[snapbeam::RATE]));
+        const Real now = value(at.now), cell = nearest(now * value(p[snapbeam::RATE]) * Real(1.0 / CELL));
         const Marks stale = sum ? differ(cell, low) : !((now >= low) & (now < high));
         if (any(stale))
             for (int l = 0; l < L::runs; ++l)
@@ -117,7 +118,7 @@ template <class L> struct Signal {
     SNAPBEAM_SELDOM void expand(int l, double cell) {
         using namespace snapbeam;
         constexpr int W = L::directions > 0 ? 1 : SNAPBEAM_WIDTH;
-        const double middle = cell / lane(p[RATE], l);
+        const double middle = CELL * cell / lane(p[RATE], l);
         const auto number = [&](int i, int k) {
             One found = One(tones[l][i * SIGNAL_NUMBERS + k]);
             if constexpr (L::directions > 0)
@@ -162,22 +163,28 @@ template <class L> struct Signal {
         at.bend = (curves - a * now * now) * of.sine + (Number(2.0) * falls * now + a * change) * of.cosine;
     }
 
-    // The beginning of a step at *t* ticks: of a tone where it is anchored, of others where the step is a new one.
-    SNAPBEAM_FN void begin(Marks anchored, Marks fresh, Real t, Real tick, Number late) {
+    // The beginning of a step at *t* ticks, from the time itself.
+    SNAPBEAM_FN void begin(Marks which, Real t, Real tick, Number late) {
         using namespace snapbeam;
+        if (!any(which)) return;
         if (is_tone()) {
-            if (!any(anchored)) return;
             const Real wrapped = select(value(p[PERIOD]) > Real(0.0), remainder(t, max(value(p[PERIOD]), Real(1.0))), t);
             Number angle = fma(p[RATE], Number(wrapped * tick), p[PHASE]);
             if constexpr (L::directions > 0) angle += fma(p[RATE], late, Number((t - wrapped) * tick) * (p[RATE] - Number(value(p[RATE]))));
             const Turn<Number> now = turn(angle);
-            assign(anchored, begun.sine, now.sine), assign(anchored, begun.cosine, now.cosine);
-        } else if (any(fresh)) {
+            at.sine = now.sine, at.cosine = now.cosine;
+        } else {
             at.now = fma(Number(t), Number(tick), p[SHIFT]);
             if constexpr (L::directions > 0) at.now += late;
             evaluate();
-            assign(fresh, begun.now, at.now), assign(fresh, begun.value, at.value), assign(fresh, begun.slope, at.slope), assign(fresh, begun.bend, at.bend);
         }
+        go_on(which);
+    }
+    // The next step begins where the last one ended.
+    SNAPBEAM_FN void go_on(Marks which) {
+        assign(which, begun.sine, at.sine), assign(which, begun.cosine, at.cosine);
+        if (is_tone()) return;
+        assign(which, begun.now, at.now), assign(which, begun.value, at.value), assign(which, begun.slope, at.slope), assign(which, begun.bend, at.bend);
     }
     SNAPBEAM_FN void set_length(Number h) { ahead(WHOLE, h), formed = false; }
     SNAPBEAM_FN void act(const Composition &c, Number h) {
