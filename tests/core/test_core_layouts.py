@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from core_systems import arrays, crowded, struck
 
+import snapbeam as sb
 from snapbeam import _core
 from snapbeam.solver import native
 
@@ -45,6 +46,22 @@ def test_neighbours_threads_and_order_change_no_bit(made, layout):
     assert same(integrated(system, layout, "", order=np.arange(RATIOS.size)[::-1]), whole)
     alone = integrated(system, layout, "", points=RATIOS[4:5])
     assert same(alone, (whole[0][4:5], whole[1][4:5]))
+
+
+LOADED = {"axial_load": sb.AxialLoadModulation(motion=sb.HarmonicForce(frequency_ratio=2.0, amplitude=3.0))}
+NOISY = {
+    "base_excitation": sb.BaseExcitation(motion=sb.BandLimitedNoise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.05))
+}
+
+
+@pytest.mark.parametrize("parts", [LOADED, LOADED | NOISY], ids=["load", "load and noise"])
+def test_neighbours_change_no_bit_of_runs_that_change_wells(parts):
+    """Signals are taken from the time again in some runs of a pack, and the tension about another well in others."""
+    system, points = struck(8, **parts), np.linspace(0.3, 3.5, 24)
+    whole = integrated(system, "runs", "", points=points, cycles=20)
+    assert (whole[0][:, native.OF_CORE.index("zero_crossings")] > 10).any()
+    assert same(integrated(system, "runs", "", points=points, cycles=20, order=np.arange(24)[::-1]), whole)
+    assert same(integrated(system, "thread", "", points=points, cycles=20), whole)
 
 
 @pytest.mark.parametrize("which", SETS)

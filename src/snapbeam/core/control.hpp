@@ -531,7 +531,7 @@ template <class L> struct Group {
         }
     }
     SNAPBEAM_FN void form_flows(Plain *to, Marks which) {
-        if constexpr (L::lanes == 1 && L::fixed != 1) {  // few runs at a time
+        if constexpr (L::lanes == 1) {  // few runs at a time
             const unsigned some = bits(which);
             for (int l = 0; l < L::runs; ++l)
                 if (some >> l & 1u) flows_over(lane(value(z.h), l), [&](long item, int x, double a) { set_lane(to[item * 4 + x], l, a); });

@@ -9,10 +9,7 @@ static bool halves(const Problem &problem, int modes) {  // symmetric and antisy
 }
 #endif
 #if SNAPBEAM_LAYOUT == 0
-void runs_side_by_side(const Problem &problem, const Batch &batch) {
-    if (problem.modes == 1) integrate<RunLanes<SNAPBEAM_WIDTH, 1>>(problem, batch);
-    else integrate<RunLanes<SNAPBEAM_WIDTH>>(problem, batch);
-}
+void runs_side_by_side(const Problem &problem, const Batch &batch) { integrate<RunLanes<SNAPBEAM_WIDTH>>(problem, batch); }
 #elif SNAPBEAM_LAYOUT == 1
 void modes_side_by_side(const Problem &problem, const Batch &batch) {
     if (halves(problem, 32)) integrate<ModeLanes<SNAPBEAM_WIDTH, 32 / SNAPBEAM_WIDTH>>(problem, batch);

@@ -14,7 +14,7 @@
 
 namespace SNAPBEAM_SET {
 
-template <int W, int FIXED = 0> struct RunLanes {
+template <int W> struct RunLanes {
     typedef Pack<W> Number;
     typedef Pack<W> Real;
     typedef Pack<W> Cell;
@@ -22,7 +22,7 @@ template <int W, int FIXED = 0> struct RunLanes {
     typedef double Coef;
     typedef double Shared;
     typedef Mask<W> Marks;
-    static constexpr int runs = W, lanes = 1, fixed = FIXED, together = 1, directions = 0;
+    static constexpr int runs = W, lanes = 1, fixed = 0, together = 1, directions = 0;
     static SNAPBEAM_FN Number total(Cell x) { return x; }
     static SNAPBEAM_FN void totals(Cell a, Cell b, Number &of_a, Number &of_b) { of_a = a, of_b = b; }
     static SNAPBEAM_FN Cell mode(const Cell *row, int i) { return row[i]; }

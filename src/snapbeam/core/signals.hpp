@@ -172,10 +172,11 @@ template <class L> struct Signal {
             Number angle = fma(p[RATE], Number(wrapped * tick), p[PHASE]);
             if constexpr (L::directions > 0) angle += fma(p[RATE], late, Number((t - wrapped) * tick) * (p[RATE] - Number(value(p[RATE]))));
             const Turn<Number> now = turn(angle);
-            at.sine = now.sine, at.cosine = now.cosine;
+            assign(which, at.sine, now.sine), assign(which, at.cosine, now.cosine);
         } else {
-            at.now = fma(Number(t), Number(tick), p[SHIFT]);
-            if constexpr (L::directions > 0) at.now += late;
+            Number now = fma(Number(t), Number(tick), p[SHIFT]);
+            if constexpr (L::directions > 0) now += late;
+            assign(which, at.now, now);
             evaluate();
         }
         go_on(which);
