@@ -229,10 +229,7 @@ template <class L> struct Group {
         double length = of_run(i, STEP);
         for (int level = 0; level < problem->levels; ++level) {
             Plain *to = tables + long(level) * distinct * n * 4;
-            flows_over(length * of_run(i, TICK), [&](long item, int x, typename L::Coef a) {
-                if constexpr (L::runs > 1) set_lane(to[item * 4 + x], l, a);
-                else to[item * 4 + x] = a;
-            });
+            form_flows(to, l, length * of_run(i, TICK));
             if constexpr (L::directions > 0) slopes_over(length * of_run(i, TICK), table_slopes + long(level) * distinct * n * 4);
             const double half = 0.5 * length;
             set_lane(lengths[level], l, length);
@@ -472,20 +469,17 @@ template <class L> struct Group {
     SNAPBEAM_FN void new_flows(Marks changed, Real level, Marks odd) {
         key = select(changed, ticks, key);
         const long flow = long(s->composition.distinct) * s->size() * 4;
-        if (any(changed & odd)) form_flows(own, changed & odd);
+        const unsigned some = bits(changed & odd), usual = bits(changed & (!odd));
+        for (int l = 0; l < L::runs; ++l) {
+            if (some >> l & 1u) form_flows(own, l, lane(value(z.h), l));
+            if (L::runs == 1 || !(usual >> l & 1u)) continue;
+            const Plain *from = tables + long(lane(level, l)) * flow;
+            for (long i = 0; i < flow; ++i) set_lane(own[i], l, lane(from[i], l));
+        }
+        if constexpr (L::runs == 1) z.flows = odd ? own : tables + long(level) * flow;
         if constexpr (L::directions > 0) {
             if (odd) slopes_over(value(z.h), own_slopes);
             z.flow_slopes = !s->changes ? nullptr : odd ? own_slopes : table_slopes + long(level) * flow;
-        }
-        if constexpr (L::runs == 1) {
-            z.flows = odd ? own : tables + long(level) * flow;
-        } else {
-            const unsigned usual = bits(changed & (!odd));
-            for (int l = 0; l < L::runs; ++l) {
-                if (!(usual >> l & 1u)) continue;
-                const Plain *from = tables + long(lane(level, l)) * flow;
-                for (long i = 0; i < flow; ++i) set_lane(own[i], l, lane(from[i], l));
-            }
         }
         set_lengths();
     }
@@ -498,15 +492,11 @@ template <class L> struct Group {
                 z.channel[j].decay[f] = decay_of(select(follows(z.channel[j], j, x), Number(0.0), x) * Number(s->composition.flow[f]));
             }
     }
-    // Flows of the modes of one run over a step of *length*, modes and flows side by side: *put* gets each number of each.
-    template <class F> SNAPBEAM_FN void flows_over(double length, F put) {
+    // Flows of the modes of one run over a step of *length*, modes and flows side by side.
+    SNAPBEAM_FN void form_flows(Plain *to, int l, double length) {
         const int n = s->size(), all = s->composition.distinct * n;
         if constexpr (L::lanes > 1) {
-            for (long i = 0; i < all; ++i) {
-                typename L::Coef a[4];
-                set_flow(typename L::Coef(s->composition.flow[i / n] * length), s->sigma[i % n], s->omega[i % n], a);
-                for (int x = 0; x < 4; ++x) put(i, x, a[x]);
-            }
+            for (int i = 0; i < all; ++i) set_flow(typename L::Coef(s->composition.flow[i / n] * length), s->sigma[i % n], s->omega[i % n], to + 4 * i);
         } else {
             constexpr int W = SNAPBEAM_WIDTH;
             for (int from = 0, f = 0, m = 0; from < all; from += W) {
@@ -517,8 +507,7 @@ template <class L> struct Group {
                     if (++m == n) m = 0, ++f;
                 }
                 set_flow(time, sigma, omega, a);
-                for (int k = 0; k < count; ++k)
-                    for (int x = 0; x < 4; ++x) put(long(from + k), x, lane(a[x], k));
+                for (int k = 0; k < 4 * count; ++k) set_lane(to[4 * from + k], l, lane(a[k % 4], k / 4));
             }
         }
     }
@@ -530,21 +519,6 @@ template <class L> struct Group {
             for (int x = 0; x < 4; ++x) to[4 * i + x] = a[x].d;
         }
     }
-    SNAPBEAM_FN void form_flows(Plain *to, Marks which) {
-        if constexpr (L::lanes == 1) {  // few runs at a time
-            const unsigned some = bits(which);
-            for (int l = 0; l < L::runs; ++l)
-                if (some >> l & 1u) flows_over(lane(value(z.h), l), [&](long item, int x, double a) { set_lane(to[item * 4 + x], l, a); });
-            return;
-        }
-        for (int f = 0; f < s->composition.distinct; ++f)
-            for (int i = 0; i < s->size(); ++i, to += 4) {
-                Plain a[4];
-                set_flow(Plain(value(z.h) * Real(s->composition.flow[f])), Plain(value(s->sigma[i])), Plain(value(s->omega[i])), a);
-                for (int x = 0; x < 4; ++x) to[x] = select(which, a[x], to[x]);
-            }
-    }
-
     SNAPBEAM_FN static Number yield_of(const Channel<L> &c) {
         return with_law(c.law, [&](auto law) { return law.yield(c.numbers()); });
     }

@@ -73,7 +73,7 @@ template <class L> void record_inside(Group<L> &run) {
         double part = to.times[to.marks[0]] - start;
         part = part < 0.0 ? 0.0 : part > end - start ? end - start : part;
         z.h = typename L::Number(part), z.jumping = FromBits<typename L::Marks>::of(jumps && part + 1.5 * tick >= end - start);
-        run.form_flows(run.own, FromBits<typename L::Marks>::of(1u));
+        run.form_flows(run.own, 0, part);
         z.flows = run.own;
         run.set_lengths();
         take_step(z);
