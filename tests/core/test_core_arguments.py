@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from core_systems import arrays, crowded
+from core_systems import arrays, beam, crowded
 
+import snapbeam as sb
 from snapbeam import _core
+from snapbeam.model import default_values
 from snapbeam.solver import native
 
 SYSTEM = crowded(3)
@@ -88,3 +90,27 @@ def test_indices_are_checked():
 
 def test_the_module_is_left_as_it_was():
     call()
+
+
+@pytest.mark.parametrize(
+    ("which", "name", "index", "value"),
+    [
+        ("problem", "signal_kinds", 5, 1),  # pieces between partials
+        ("problem", "uses", (0, -1), 1.0),  # a force by a partial
+        ("problem", "windows", 0, 5),
+        ("batch", "signals", (0, 1, 1), 1.0),  # whose first partial is none
+        ("batch", "signals", (0, 1, 2), 0.0),
+        ("batch", "signals", (0, 1, 4), 33.0),
+        ("batch", "signals", (0, 1, 4), 1.5),
+    ],
+)
+def test_sums_of_tones_have_their_partials(which, name, index, value):
+    noise = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.02)
+    contact = sb.Contact(default_values.CONTACT, sb.Striker(drive=noise))
+    given = arrays(sb.System(beam(2), contacts=[contact]), 1)
+    assert given.problem["signal_kinds"].tolist() == [1, 3] + 32 * [4]
+    changed = getattr(given, which)[name].copy()
+    changed[index] = value
+    getattr(given, which)[name] = changed
+    with pytest.raises(ValueError, match=name):
+        _core.integrate(given.problem, given.batch, "runs", "", 1, None)

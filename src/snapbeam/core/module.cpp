@@ -240,9 +240,9 @@ static Batch batch_of(Arguments &a, const Problem &p, Shared &shared) {
         if (kind == PIECES && !(s[FIRST_PIECE] >= 0.0 && s[PIECE_COUNT] >= 1.0 && s[FIRST_PIECE] + s[PIECE_COUNT] <= double(pieces) &&
                                 s[FIRST_PIECE] == std::floor(s[FIRST_PIECE]) && s[PIECE_COUNT] == std::floor(s[PIECE_COUNT])))
             a.refuse("signals", "must have pieces of the table");
-        if (kind == TONES && !(s[RATE] >= 0.0 && s[FIRST_TONE] >= 0.0 && s[TONE_COUNT] >= 1.0 && s[FIRST_TONE] + s[TONE_COUNT] <= double(p.signals) &&
+        if (kind == TONES && !(s[RATE] > 0.0 && s[FIRST_TONE] >= 0.0 && s[TONE_COUNT] >= 1.0 && s[FIRST_TONE] + s[TONE_COUNT] <= double(p.signals) &&
                                s[FIRST_TONE] == std::floor(s[FIRST_TONE]) && s[TONE_COUNT] == std::floor(s[TONE_COUNT]) && p.signal_kinds[int(s[FIRST_TONE])] == PARTIAL))
-            a.refuse("signals", "must have tones of which the first is a partial");
+            a.refuse("signals", "must have sums of partials, and the rate of the fastest");
     }
     b.jumps = a.array<double>("jumps", {runs, size_t(p.jumps)}, false);
     for (size_t i = 0; i < runs * size_t(p.jumps); ++i)

@@ -65,7 +65,8 @@ USER_LAWS = {"contact": 15, "lossy contact": 16, "force": 17, "lossy force": 18,
 SIGNAL = (
     "mean", "amplitude", "rate", "phase", "period", "exponential", "power", "most_value", "most_slope", "most_bend"
 )  # fmt: skip
-"""Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep size, first and last rate, time, duration, power."""
+"""Numbers of a tone; those of pieces are gain, first piece, pieces, time, of a sweep size, first and last rate, time, duration, power,
+of a sum of tones (at 1, 2 and 4) its first partial, the rate of the fastest, and tones."""
 TONE, PIECES, SWEEP, TONES, PARTIAL = range(5)
 """Kinds of signals, in the order of ``core/api.hpp: SignalKind``."""
 STEEP = tuple(LAWS[kind][0] for kind in (ElectrostaticForce, MagneticForce))
