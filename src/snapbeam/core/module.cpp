@@ -179,7 +179,7 @@ static Problem problem_of(Arguments &a) {
         if (p.signal_kinds[i] != snapbeam::PARTIAL) continue;
         if (i + 1 < p.signals && p.signal_kinds[i + 1] != snapbeam::PARTIAL) a.refuse("signal_kinds", "must have the partials after the others");
         for (size_t j = 0; j < channels; ++j)
-            if (p.uses[j * size_t(p.signals) + size_t(i)] != 0.0) a.refuse("uses", "must have no partials");
+            if (p.uses[j * size_t(p.signals) + size_t(i)] != 0.0) a.refuse("uses", "must be 0 for partials");
     }
     p.jumps = a.integer("jumps", 0, 1000000);
     p.law_numbers = a.integer("law_numbers", 0, 64);

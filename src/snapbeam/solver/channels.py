@@ -298,7 +298,7 @@ def _motions(system: System) -> list[tuple[str, Drive]]:
 _FAR = 1e300
 """Bound of a motion that has none."""
 _FEW_TONES = 4
-"""Components of a motion, at most, whose tones are signals each; more are a sum, which costs as much as one."""
+"""Largest number of components of a motion whose tones are separate signals; the tones of a motion with more are one, their sum."""
 
 
 def _bounds(drive: Drive, own: Mapping[str, _Array], system: System) -> _Array:
