@@ -40,7 +40,7 @@ def pytest_configure():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Make slow tests of most cases of what is sampled.
+    """Make the cases of a sampled test slow, but for every nth.
 
     The laboratory is first, whose files take longest, so that two workers end at about the same time.
     """
