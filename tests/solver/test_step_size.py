@@ -75,3 +75,33 @@ def test_a_low_reference_frequency_does_not_lengthen_the_steps(frequency):
     own = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
     given = sb.ReducedModel.from_beam(default_values.BEAM, modes=2, reference_frequency=frequency)
     assert flight_step(given, 4, 2.5e-7) == flight_step(own, 4, 2.5e-7)
+
+
+DEEP = {
+    "HuntCrossley": (sb.HuntCrossley(4e8, 100.0), 0.18, None),
+    "HuntCrossley, light body": (sb.HuntCrossley(4e8, 100.0), 0.18, 1e-4),
+    "KelvinVoigt, light body": (sb.KelvinVoigt(1e5, 1000.0), 0.18, 1e-4),
+    "PowerLaw": (sb.PowerLaw(1.0, 3.0), 0.05, None),
+}
+"""Laws far stiffer, or with far more damping, than at usual speeds: where a striker begins so deep (over b), with a mass (kg)."""
+
+
+@pytest.mark.filterwarnings("ignore:engine = .python", "ignore:the energy-balance error")  # over work that is small beside what such contacts store
+@pytest.mark.parametrize("kind", DEEP)
+def test_steps_of_a_deep_contact(kind: str) -> None:
+    """Errors against the Python engine: up to 8 b of the power law, and 3e-4 b of the others, with the contact steps of usual speeds."""
+    law, depth, mass = DEEP[kind]
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 5)
+    drive = sb.DisplacementSine(frequency_ratio=2.0, displacement_amplitude=depth, phase=math.pi / 2.0)
+    system = sb.System(model, contacts=[sb.Contact(law, sb.Striker(drive=drive, location=0.4, gap=0.0, mass=mass))])
+    times = np.linspace(0.0, 0.5 / model.reference_frequency, 61)[1:] * (1.0 - 1e-9)
+    python, reference, standard = (
+        sb.simulate(system, how, sample_times=times).dataset["modal_amplitude"].values @ model.shape_at(0.4)
+        for how in (
+            sb.Integration(cycles=1, engine="python"),
+            *(sb.Integration(cycles=1, accuracy=level) for level in ("reference", "standard")),
+        )
+    )
+    size = max(model.length_scale, np.abs(python).max())
+    assert np.abs(reference - python).max() < 1e-7 * size
+    assert np.abs(standard - python).max() < 1e-5 * size

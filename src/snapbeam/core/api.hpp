@@ -44,11 +44,12 @@ enum Completed : int {
 };
 typedef double (*Update)(double held, const double *step);
 
-// Numbers of a run.  STEP is the flight step, CONTACT_STEP the longest step in contact, which is halved up to HALVINGS times; with more
-// than CALM_ENERGY (J above the first well) flight steps are shorter too.  Flights after impulsive contact lower than LOWEST (m) are none.
+// Numbers of a run.  STEP is the flight step, CONTACT_STEP the longest step in contact; both are halved, up to HALVINGS
+// times, and down to SHORTEST for an onset or a release.  With more than CALM_ENERGY (J above the first well) flight steps are shorter
+// too.  Flights after impulsive contact lower than LOWEST (m) are none.
 enum RunNumber : int {
     TICK, STEP, END, OUTPUT_INTERVAL, LAST_QUARTER, WELL_SIGN, CONTACT_STEP, HALVINGS, DECIDE_ENERGY, DECIDE_REACH, DECIDE_CROSSINGS,
-    MAX_STEPS, STRETCH, CALM_ENERGY, LOWEST, RUN_NUMBERS
+    MAX_STEPS, STRETCH, CALM_ENERGY, LOWEST, SHORTEST, RUN_NUMBERS
 };
 // Numbers of a signal (signals.hpp): of a tone, with its period in ticks, 0 if it has none; of pieces; of a sweep; of a sum of tones,
 // which names its first PARTIAL and has the rate of the fastest.  SHIFT is the time of its own at which a run begins, s; MOST_ are

@@ -2,8 +2,8 @@
 //
 // In free flight a step is the flight step.  It is halved where the tension is far beyond that in the wells (STRETCH_LIMIT), again for
 // every factor STRETCH_FACTOR, or where the energy of the beam alone is beyond CALM_ENERGY, again for every factor of four.  In contact, steps grow from the onset
-// and shrink towards the release.  By a force of stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN; towards the end of
-// the range of a law a step covers NEARER of the way.
+// and shrink towards the release, down to SHORTEST.  By a force of stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN, and by one
+// of damping B h B r.r <= CONTACT_DECAY; towards the end of the range of a law a step covers NEARER of the way.
 //
 // A step inside which a contact closes or opens, or a lossy contact begins or ceases to press, is cut to end there.  The cut is
 // corrected on the true motion, up to CORRECTIONS times: a zero of the gap to a tick, one of the force to 1e-9 of a flight step.  If
@@ -16,7 +16,7 @@
 namespace SNAPBEAM_SET {
 
 constexpr double GRADING = 0.5, RELEASE = 0.5, NEARER = 0.2, STRETCH_LIMIT = 4.0, STRETCH_FACTOR = 3.0, NOISE = 1e-12;
-constexpr double CONTACT_TURN[3] = {0.5, 0.35, 0.35};  // of each composition
+constexpr double CONTACT_TURN[3] = {0.5, 0.35, 0.35}, CONTACT_DECAY[3] = {1.5, 0.75, 0.75};  // of each composition
 constexpr double REVERSAL[3] = {1.0, 0.5, 0.5}, SLIDING = 4.0;  // friction reverses: change of speed in a step, and speed above which it slides, over the scale
 constexpr double ACROSS[3] = {1.0, 0.125, 0.125};  // drag reverses (scale 0): shortest step across zero speed, over the flight step
 constexpr int CORRECTIONS = 6, MOST_CUTS = 40;
@@ -74,7 +74,7 @@ template <class L> struct Group {
     Real jump, turned;            // next jump of a signal, ticks; steps since signals were taken from the time
     Held<Real, LEVELS> lengths;   // of steps, ticks
     bool circuits;
-    Real step, contact_step, end, limit, output_interval, next_output, halvings, most_steps, stretch, stretch_at_rest, calm, energy, lowest;
+    Real step, contact_step, end, limit, output_interval, next_output, halvings, shortest, most_steps, stretch, stretch_at_rest, calm, energy, lowest;
     int run[L::runs], output[L::runs], next_jump[L::runs];
 
     SNAPBEAM_SELDOM void lay_out(Structure<L> &structure, const Batch &b, Arena &arena) {
@@ -183,7 +183,7 @@ template <class L> struct Group {
         using namespace snapbeam;
         set_lane(z.tick, l, of_run(i, TICK)), set_lane(step, l, of_run(i, STEP)), set_lane(end, l, of_run(i, END));
         set_lane(output_interval, l, of_run(i, OUTPUT_INTERVAL)), count_outputs(l, 0), set_lane(z.sign, l, of_run(i, WELL_SIGN));
-        set_lane(contact_step, l, of_run(i, CONTACT_STEP)), set_lane(halvings, l, of_run(i, HALVINGS)), set_lane(most_steps, l, of_run(i, MAX_STEPS));
+        set_lane(contact_step, l, of_run(i, CONTACT_STEP)), set_lane(halvings, l, of_run(i, HALVINGS)), set_lane(shortest, l, of_run(i, SHORTEST)), set_lane(most_steps, l, of_run(i, MAX_STEPS));
         set_lane(stretch_at_rest, l, of_run(i, STRETCH)), set_lane(calm, l, of_run(i, CALM_ENERGY)), set_lane(lowest, l, of_run(i, LOWEST)), set_lane(z.t, l, 0.0), set_lane(stretch, l, 0.0);
         set_lane(z.parts, l, s->parts(of_run(i, STEP) * of_run(i, TICK)));
         for (int k = 0; k < z.signals; ++k) {
@@ -408,21 +408,26 @@ template <class L> struct Group {
         for (int j = 0; j < z.channels; ++j) {
             const Channel<L> &c = z.channel[j];
             if (c.timed || c.circuit || (c.contact && !any(c.closed))) continue;
-            const Real stiffness = with_law(c.law, [&](auto law) { return value(law.stiffness(c.contact ? max(c.d0, Number(0.0)) : c.x, c.numbers())); });
-            const Real by_stiffness = Real(CONTACT_TURN[problem->composition]) / (sqrt(max(stiffness * value(c.M[j]), Real(1e-300))) * z.tick);
+            const Number x = c.contact ? max(c.d0, Number(0.0)) : c.x;
+            Real rate = sqrt(value(with_law(c.law, [&](auto law) { return law.stiffness(x, c.numbers()); }) * c.M[j])) * Real(1.0 / CONTACT_TURN[problem->composition]);
+            if (c.lossy && (c.contact || !c.affine)) {  // damping that reverses has steps of its own
+                const Number y = c.contact ? c.r0 : dot<L>(c.row, z.p, n);
+                const Real damping = with_law(c.law, [&](auto law) { return select(value(law.reversal(c.numbers())) < Real(NEVER), Real(0.0), abs(value(law.damping(x, y, c.numbers())))); });
+                rate = max(rate, damping * value(c.M[j]) * Real(1.0 / CONTACT_DECAY[problem->composition]));
+            }
+            const Real by_force = Real(1.0) / (max(rate, Real(1e-150)) * z.tick);
             if (!c.contact) {
                 // towards the end of its range, where a force may be infinite, a share of the way
                 const Number space = with_law(c.law, [&](auto law) { return min(law.high(c.numbers()) - c.x, c.x - law.low(c.numbers())); });
-                want = min(want, by_stiffness);
+                want = min(want, by_force);
                 const Real reversal = with_law(c.law, [&](auto law) { return value(law.reversal(c.numbers())); });
                 if (any(reversal < Real(NEVER))) want = min(want, by_reversal(c, reversal));
                 if (any(value(space) < Real(NEVER))) want = min(want, Real(NEARER) * value(space) / (abs(value(dot<L>(c.row, z.p, n))) * z.tick));
                 continue;
             }
             const Real d = value(c.d0), r = value(c.r0);
-            Real own = min(min(Real(GRADING) * (z.t - c.onset), contact_step), by_stiffness);
-            own = select(r < Real(0.0), min(own, Real(-RELEASE) * max(d, Real(0.0)) / (r * z.tick)), own);
-            want = select(c.closed, min(want, own), want);
+            const Real own = min(Real(GRADING) * (z.t - c.onset), contact_step), left = Real(-RELEASE) * max(d, Real(0.0)) / (r * z.tick);
+            want = select(c.closed, min(want, min(by_force, max(select(r < Real(0.0), min(own, left), own), shortest))), want);
         }
         Real level = Real(0.0), length = step;
         Marks more = alive;

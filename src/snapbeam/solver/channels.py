@@ -69,8 +69,11 @@ SIGNAL = (
 of a sum of tones (at 1, 2 and 4) its first partial, the rate of the fastest, and tones."""
 TONE, PIECES, SWEEP, TONES, PARTIAL = range(5)
 """Kinds of signals, in the order of ``core/api.hpp: SignalKind``."""
-STEEP = tuple(LAWS[kind][0] for kind in (ElectrostaticForce, MagneticForce))
-"""Laws whose force grows without bound towards an end of their range."""
+STEEP = (
+    *(LAWS[kind][0] for kind in (ElectrostaticForce, MagneticForce, PowerLaw, HuntCrossley, KelvinVoigt)),
+    *USER_LAWS.values(),
+)
+"""Laws whose stiffness or damping may be far beyond that at usual speeds: deep in a contact, or close to a magnet."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ Progress = Callable[[int, int], object]
 
 RUN = (
     "tick", "step", "end", "output_interval", "last_quarter", "well_sign", "contact_step", "halvings", "decide_energy",
-    "decide_reach", "decide_crossings", "max_steps", "stretch", "calm_energy", "lowest",
+    "decide_reach", "decide_crossings", "max_steps", "stretch", "calm_energy", "lowest", "shortest",
 )  # fmt: skip
 """Numbers of a run, in the order of ``core/api.hpp: RunNumber``."""
 OF_CHANNEL = (
@@ -45,7 +45,7 @@ _MOST_TICKS = 2.0**52
 _FINER = 16
 """Halvings of a tick, at most: events lie on ticks."""
 _STEEP = 7
-"""Further halvings of the shortest step where a force grows without bound."""
+"""Further halvings of steps where a force may be far steeper than the steps are chosen for."""
 _GRADED = 6
 """The same where derivatives are wanted: at both ends of a contact that of the force is a root, whose integral errs by h^1.5."""
 _SAMPLES, _NUMBERS, _IMPACTS, _BUDGET = 50_000, 4_000_000, 4096, 50_000
@@ -101,8 +101,9 @@ class _Arrays:
         self.circuits = np.arange(count)[count - channels.circuits :]
         """Channels of the circuits."""
         halvings = (table["max_halvings"] - table["min_contact_halvings"]).astype(float) + graded
-        if np.isin(channels.laws, STEEP).any() or any(each.limited for each in channels.of_user):
-            halvings += _STEEP  # near a magnet or an electrode
+        shortest = 0.5**halvings
+        if np.isin(channels.laws, STEEP).any():
+            halvings += _STEEP
         has_two = structure.stretch > 0.0
         wells = structure.unequal_wells if has_two else None
         high = structure.high_modes(ensemble.high_omega)
@@ -118,6 +119,7 @@ class _Arrays:
         least = 2.0**halvings
         contact = np.minimum(table["contact_step"] / of["tick"], of["step"])
         of["contact_step"][:] = least * np.maximum(np.floor(contact / least), 1.0)
+        of["shortest"][:] = shortest * of["contact_step"]
         if ensemble.order == 4:  # halves of the flight step that are longer than the contact step
             between = np.ceil(np.log2(of["step"] / of["contact_step"]) - 1e-9) - 1.0
             halvings = halvings + np.maximum(between, 0.0)
