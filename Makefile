@@ -57,12 +57,23 @@ $(VENV)/.installed-run: pyproject.toml constraints.txt $(CORE) | $(BIN)/python
 # Every package is compared with its hash.  Python compiles the modules that it imports, which are the fewest: all of them
 # take half a minute.  The list is complete: with dependencies, pip 23 ignores the pin of a package
 # that another one asks for with an extra.
-$(VENV)/.locked-dev: requirements-dev.txt | $(BIN)/python
-	$(PIP) install --require-hashes --no-deps --no-compile --requirement requirements-dev.txt
+LOCKED := $(PIP) install --require-hashes --no-deps --no-compile --requirement
+
+# What builds the core comes first: with two jobs the core is built while the other packages are installed.
+$(VENV)/.locked-build: requirements-dev.txt | $(BIN)/python
+	awk '/^[^ ]/ { of_build = /^(cmake|nanobind|ninja|packaging|pathspec|scikit-build-core)==/ } of_build' $< > $(VENV)/build.txt
+	$(LOCKED) $(VENV)/build.txt
 	@touch $@
 
-$(VENV)/.installed-dev: pyproject.toml $(CORE) $(VENV)/.locked-dev
+$(VENV)/.locked-dev: requirements-dev.txt $(VENV)/.locked-build
+	$(LOCKED) $<
+	@touch $@
+
+$(VENV)/.built: pyproject.toml $(CORE) $(VENV)/.locked-build
 	PATH="$(abspath $(BIN)):$$PATH" $(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.built $(VENV)/.locked-dev
 	@touch $@
 
 core: $(VENV)/.installed-dev
@@ -157,5 +168,5 @@ dist: $(VENV)/.installed-dev
 clean:
 	rm -rf build dist docs/_build docs/gallery docs/_paper docs/_generated docs/sg_execution_times.rst .pytest_cache .mypy_cache \
 		.ruff_cache .import_linter_cache .hypothesis
-	rm -f src/snapbeam/_core*.so src/snapbeam/_core*.pyd $(VENV)/.installed-run $(VENV)/.installed-dev
+	rm -f src/snapbeam/_core*.so src/snapbeam/_core*.pyd $(VENV)/.installed-run $(VENV)/.built
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
