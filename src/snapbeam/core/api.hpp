@@ -31,7 +31,7 @@ struct Problem {
     const double *second;         // the second well about the mirror image, as q; null: the mirror image itself
     double center_rest;           // displacement of the centre in the first well
     double dividing_height;       // displacement of the centre that divides the wells
-    int levels;                   // lengths of steps: the flight step, the contact step and its halves
+    int levels;                   // lengths of steps: the flight step, of order 4 its halves, the contact step and its halves
     int updates;                  // statistics of a user
     const long long *update;      // address of the Update of each
 };
@@ -44,9 +44,9 @@ enum Completed : int {
 };
 typedef double (*Update)(double held, const double *step);
 
-// Numbers of a run.  STEP is the flight step, CONTACT_STEP the longest step in contact; both are halved, up to HALVINGS
-// times, and down to SHORTEST for an onset or a release.  With more than CALM_ENERGY (J above the first well) flight steps are shorter
-// too.  Flights after impulsive contact lower than LOWEST (m) are none.
+// Numbers of a run.  STEP is the flight step, CONTACT_STEP the longest step in contact, and a length is HALVINGS + 1 reductions below
+// STEP at most (control.hpp: load), for an onset or a release SHORTEST.  With more than CALM_ENERGY (J above the first well) flight steps
+// are shorter.  Flights after impulsive contact lower than LOWEST (m) are none if the chatter ends soon.
 enum RunNumber : int {
     TICK, STEP, END, OUTPUT_INTERVAL, LAST_QUARTER, WELL_SIGN, CONTACT_STEP, HALVINGS, DECIDE_ENERGY, DECIDE_REACH, DECIDE_CROSSINGS,
     MAX_STEPS, STRETCH, CALM_ENERGY, LOWEST, SHORTEST, RUN_NUMBERS

@@ -1,15 +1,17 @@
 // The controller, once for every layout: propose a step, take it, inspect it, accept it or take a shorter one.
 //
-// In free flight a step is the flight step.  It is halved where the tension is far beyond that in the wells (STRETCH_LIMIT), again for
-// every factor STRETCH_FACTOR, or where the energy of the beam alone is beyond CALM_ENERGY, again for every factor of four.  In contact, steps grow from the onset
-// and shrink towards the release, down to SHORTEST.  By a force of stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN, and by one
-// of damping B h B r.r <= CONTACT_DECAY; towards the end of the range of a law a step covers NEARER of the way.
+// In free flight a step is the flight step.  It is halved where the tension differs from that in the wells by more than STRETCH_LIMIT of
+// it, again for every factor STRETCH_FACTOR, or where the energy of the beam alone is beyond CALM_ENERGY, again for every factor of four
+// (it is looked at every ANCHOR steps and where a contact changes).  In contact, steps grow from the onset and shrink towards the release,
+// down to SHORTEST.  By a force of stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN, and by one of damping B h B r.r <=
+// CONTACT_DECAY as far as there are lengths; where damping reverses, by_reversal has its own, and that of constant coefficients is in the
+// flight step.  Towards the end of the range of a law a step covers NEARER of the way.  No circuit is half resolved.
 //
-// A step inside which a contact closes or opens, or a lossy contact begins or ceases to press, is cut to end there.  The cut is
-// corrected on the true motion, up to CORRECTIONS times: a zero of the gap to a tick, one of the force to 1e-9 of a flight step.  If
-// several do, the first one counts; the others are found again.  A force that begins acts from the first kick of the next step.  A
-// step to a jump of a signal ends there too.  Each run of a pack has its own time, length of step and contacts; a run that ends is
-// replaced.
+// A step inside which a contact closes or opens, a lossy contact begins or ceases to press, or one with memory yields or turns back, is
+// cut to end there.  The cut is corrected on the true motion, up to CORRECTIONS times: a zero of the gap to a tick, one of the force to
+// 1e-9 of a flight step.  If several do, the first one counts; the others are found again.  A force that begins acts from the first
+// kick of the next step.  A step to a jump of a signal ends there too.  Each run of a pack has its own time, length of step and
+// contacts; a run that ends is replaced.
 #pragma once
 #include "statistics.hpp"
 
@@ -37,7 +39,7 @@ template <int K> void move_in_time(Group<Tangents<K>> &runs, Dual<K> later);
 // What a channel does at the end of a step.
 template <class L> struct Event {
     typename L::Marks flip;       // the contact opens or closes
-    typename L::Marks force;      // a lossy contact begins or ceases to press
+    typename L::Marks force;      // a lossy contact begins or ceases to press, one with memory yields or turns back
     typename L::Real at_force;    // 1: the step is cut at such a change
     typename L::Real low, low_f, high, high_f;  // bracket of it: ticks, and the force there
 };
@@ -93,7 +95,7 @@ template <class L> struct Group {
         z.channel = channel, z.signal = signal, z.block = block, z.late = late;
         events.take(arena, channels);
         spare.take(arena, b.recorder ? 3l * n : 0), spare_channel.take(arena, b.recorder ? channels : 0);
-        totals.lay_out(*s, z, arena);
+        totals.lay_out(*s, arena);
         if constexpr (!KNOWN) {
             Channel<L> unused;
             for (int j = 0; j < channels; ++j) {
@@ -159,11 +161,6 @@ template <class L> struct Group {
             for (Number &x : c.sums) number(x);
         }
         totals.visit(number);
-    }
-    long saved_size() {
-        long size = 0;
-        visit([&](auto &x) { size += long(sizeof(x) / sizeof(double)); });
-        return size;
     }
 
     // --- runs begin -----------------------------------------------------------------------------------------------------
@@ -378,6 +375,7 @@ template <class L> struct Group {
         const Marks anchored = fresh & (turned >= Real(ANCHOR));
         begin_signals(anchored);
         assign(anchored, turned, Real(0.0));
+        if (any(anchored)) assign(anchored, energy, value(totals.energy(z, true, true)));
         if (problem->shift) {  // modes about the well that the beam is near
             const Marks crossed = fresh & (z.sign * totals.center.u * Real(problem->center_rest) < Real(0.0));
             if (any(crossed)) {
@@ -588,10 +586,10 @@ template <class L> struct Group {
         Plain speed = Plain(0.0), doubt = Plain(0.0);
         SNAPBEAM_LOOP
         for (int i = 0; i < n; ++i) {
-            const Plain h = Plain(value(z.h)), weight = abs(value(c.row[i])), w = h * Plain(value(s->omega[i]));
-            speed = fma(weight, amplitude[i], speed);
-            const Plain error = h * min(w * w * w * Plain(1.0 / 384.0), Plain(2.5) / max(w, Plain(1.0)));
-            doubt = fma(weight * error, amplitude[i], doubt);
+            const Plain weight = abs(value(c.row[i]));
+            Plain of_u, of_v;
+            totals.doubts_of_mode(Plain(value(z.h)), Plain(value(s->omega[i])), of_u, of_v);
+            speed = fma(weight, amplitude[i], speed), doubt = fma(weight * of_u, amplitude[i], doubt);
         }
         const Real horizon = Real(TRUST) * step * z.tick, h = value(z.h), d0 = value(c.d0), d1 = value(c.d1);
         const Real tip = bound_of_signals(z, c, [](const Signal<L> &one) { return one.greatest_slope(); });

@@ -6,8 +6,6 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
@@ -418,7 +416,7 @@ static void record(nb::dict problem, nb::dict batch, nb::dict recorder, const st
         if (r.marks[i] < 0 || r.marks[i] > most[i]) of_recorder.refuse("marks", "must count what is recorded");
     const size_t saved = of_recorder.length("saved");
     // as many numbers as any layout of any width holds of a run
-    const size_t wanted = (size_t(p.modes + 64) * 3 + size_t(p.channels) * (12 + OF_CHANNEL) + STATISTICS + 32) * 8;
+    const size_t wanted = (size_t(p.modes + 64) * 3 + size_t(p.channels) * (12 + OF_CHANNEL) + STATISTICS + size_t(p.signals) * 6 + 32) * 8;
     if (saved < wanted) of_recorder.refuse("saved", "has no room for the state of a run");
     r.saved = of_recorder.array<double, true>("saved", {saved}, false);
     r.budget = long(of_recorder.number("budget", 1.0, 2e9));

@@ -37,7 +37,7 @@ template <class L> struct Totals {
     Number length;             // of the last step, s
     Number later;              // of the beginning of the last quarter, s: 0, and derivatives where it moves
 
-    void lay_out(const Structure<L> &structure, const Runs<L> &, Arena &arena) {
+    void lay_out(const Structure<L> &structure, Arena &arena) {
         s = &structure;
         row.take(arena, s->cells), swing_u.take(arena, s->cells), swing_v.take(arena, s->cells);
     }

@@ -624,7 +624,7 @@ template <class L> SNAPBEAM_FN void take_step(Runs<L> &outer) {
         SNAPBEAM_LOOP
         for (int stage = 0; stage <= flows; ++stage) take_stage(z, stage);
         for (int i = 0; i < N; ++i) outer.q1[i] = z.q1[i], outer.p1[i] = z.p1[i], outer.k1[i] = z.k1[i], outer.r[i] = z.r[i];
-        outer.gq = z.gq, outer.qr = z.qr, outer.next_gq = z.next_gq, outer.dissipated = z.dissipated;
+        outer.gq = z.gq, outer.qr = z.qr, outer.dissipated = z.dissipated;
     } else {
         begin_step(outer);
         SNAPBEAM_LOOP

@@ -17,7 +17,7 @@ using snapbeam::Recorder;
 // Compositions S(h) = B(b_0 h) A(a_0 h) B(b_1 h) ... A(a_(s-1) h) B(b_s h) of kicks B and flows A, symmetric, of Blanes and Moan,
 // J. Comput. Appl. Math. 142 (2002) 313-330: SRKN_6^b of order 4 and SRKN_11^b of order 6 (Table 3; order 4 holds for kicks that
 // depend on the velocity too, order 6 does not), and S_10 of order 6 (Table 2), which asks nothing of its parts.
-constexpr int MOST_FLOWS = 11, MOST_DISTINCT = 6;
+constexpr int MOST_DISTINCT = 6;
 struct Composition {
     int flows, distinct;
     double flow[MOST_DISTINCT], kick[MOST_DISTINCT];  // first halves
