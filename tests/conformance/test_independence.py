@@ -70,7 +70,7 @@ def test_runs_of_different_contact_are_what_they_are_alone(model_of) -> None:
             sb.System(model_of(2), contacts=[sb.Contact(sb.HertzContact(float(value)), shaker)]), integration
         )
         assert alone.runs["tick"][0] == whole.runs["tick"][i]
-        assert alone.runs["max_halvings"][0] == whole.runs["max_halvings"][i]
+        assert alone.runs["contact_step"][0] == whole.runs["contact_step"][i]
         found = native.run_ensemble(alone)
         for name in accumulators_of_runs.dtype.names:
             np.testing.assert_array_equal(found[name][0], accumulators_of_runs[name][i], err_msg=name)

@@ -119,7 +119,7 @@ def test_parameter_file_names_the_well(tmp_path):
 
 
 def test_every_result_names_the_well():
-    plan = Plan(step=1e-6, order=4, min_contact_halvings=1, max_halvings=2)
+    plan = Plan(order=4, step=1e-6, contact=5e-7, halvings=1)
     for well in ("lower", "upper"):
         system = stopped("below", initial_well=well)
         attrs = attributes_of("", system, sb.Integration(), plan, {})

@@ -209,6 +209,20 @@ def test_sample_times_are_returned_exactly() -> None:
     np.testing.assert_array_equal(some.dataset.striker_work, run.dataset.striker_work[::7])
 
 
+@pytest.mark.parametrize("part", ["coil", "indentation"])
+def test_a_run_with_a_state_beside_its_modes_is_the_point_of_a_sweep(part: str) -> None:
+    """To the bit with 16 modes, the most that stand side by side in lanes of runs: a charge or an indentation is no mode there."""
+    coil = sb.ElectromagneticHarvester(force_factor=0.7, resistance=47.0, coil_resistance=8.0, inductance=0.0175)
+    law = sb.ElasticPlasticContact(1e5, 2e5) if part == "indentation" else default_values.CONTACT
+    shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 16)
+    system = sb.System(model, contacts=[sb.Contact(law, shaker)], harvesters=[coil] if part == "coil" else [])
+    summary = sb.simulate(system, sb.Integration(cycles=2)).summary
+    point = sb.sweep(system, {"velocity_amplitude": [0.18]}, sb.Integration(cycles=2))
+    for name in ("peak_force", "rms_displacement", "impulse", "energy_dissipated"):
+        assert float(point[name][0]) == summary[name], name
+
+
 @pytest.mark.parametrize("modes", [1, 32])
 def test_recording_does_not_disturb(modes: int) -> None:
     default = simulate(modes, 1.21, 0.3, 4)

@@ -19,14 +19,14 @@ from snapbeam.solver.step_size import choose_base_step, flight_step
 def test_steps_in_contact_resolve_the_impact_and_the_fastest_mode(modes: int, accuracy: str) -> None:
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes)
     plan = choose_base_step(model, default_values.CONTACT, accuracy=accuracy)
-    longest = plan.step / 2**plan.min_contact_halvings
+    longest = plan.contact
     assert longest * model.omega.max() <= math.pi
     if accuracy == "reference":
         assert plan.step * model.omega.max() <= 4.0
     speed = 0.2 * model.length_scale * 2.0 * math.pi * model.reference_frequency
     mass = min(model.contact_mass(x) for x in np.linspace(0.02, 0.5, 25))
     assert longest <= default_values.CONTACT.impact_duration(mass, speed) / 6.0 * (1.0 + 1e-12)
-    assert plan.max_halvings > plan.min_contact_halvings
+    assert plan.shortest < longest
 
 
 def test_steps_a_period_are_those_of_the_page() -> None:
@@ -86,7 +86,9 @@ DEEP = {
 """Laws far stiffer, or with far more damping, than at usual speeds: where a striker begins so deep (over b), with a mass (kg)."""
 
 
-@pytest.mark.filterwarnings("ignore:engine = .python", "ignore:the energy-balance error")  # over work that is small beside what such contacts store
+@pytest.mark.filterwarnings(
+    "ignore:engine = .python", "ignore:the energy-balance error"
+)  # over work that is small beside what such contacts store
 @pytest.mark.parametrize("kind", DEEP)
 def test_steps_of_a_deep_contact(kind: str) -> None:
     """Errors against the Python engine: up to 8 b of the power law, and 3e-4 b of the others, with the contact steps of usual speeds."""
@@ -105,3 +107,29 @@ def test_steps_of_a_deep_contact(kind: str) -> None:
     size = max(model.length_scale, np.abs(python).max())
     assert np.abs(reference - python).max() < 1e-7 * size
     assert np.abs(standard - python).max() < 1e-5 * size
+
+
+def test_steps_of_a_motion_far_above_the_barrier_without_contacts() -> None:
+    """Of a beam on a strongly shaken base: 6e-6 b while the energy was evaluated at contacts alone."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 16)
+    shaken = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.7, acceleration_amplitude=10.0))
+    system = sb.System(model, base_excitation=shaken)
+    times = np.linspace(0.0, 6.0 / (0.7 * model.reference_frequency), 201)[1:] * (1.0 - 1e-9)
+    levels = (sb.Integration(cycles=6, accuracy=level) for level in ("reference", "standard"))
+    runs = (sb.simulate(system, how, sample_times=times).dataset["modal_amplitude"].values for how in levels)
+    fine, coarse = (amplitude @ model.shape_at(0.4) for amplitude in runs)
+    assert np.abs(fine).max() > 4.0 * model.length_scale
+    assert np.abs(coarse - fine).max() < 1.5e-6 * model.length_scale
+
+
+@pytest.mark.parametrize("step", [None, 1e-4])
+def test_contact_steps_of_a_dataset_are_those_of_the_run(step: float | None) -> None:
+    """Steps in contact are no longer than stated, and as long in the middle of an impact."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 2)
+    shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
+    data = sb.simulate(system, sb.Integration(cycles=3, step=step)).dataset
+    pressed = data["contact_force"].values > 0.0
+    steps = np.diff(data["time"].values)[pressed[1:] & pressed[:-1]]
+    assert data.attrs["longest_contact_step"] / 2.0 < steps.max() <= data.attrs["longest_contact_step"] * (1.0 + 1e-9)
+    assert data.attrs["shortest_contact_step"] <= data.attrs["longest_contact_step"] <= data.attrs["step"]

@@ -68,8 +68,8 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         "reference_frequency": model.reference_frequency,
         "step": plan.step,
         "order": plan.order,
-        "longest_contact_step": plan.step / 2**plan.min_contact_halvings,
-        "shortest_contact_step": plan.step / 2**plan.max_halvings,
+        "longest_contact_step": plan.contact,
+        "shortest_contact_step": plan.shortest,
     }
     if system.contacts:
         attrs["contact_type"] = system.contacts[0].law.name

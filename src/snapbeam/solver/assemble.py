@@ -219,7 +219,6 @@ def make_ensemble(
     _require_valid(system, state)
     clock = clock_of(system, columns, runs)
     table = np.zeros(runs, dtype=run_dtype(len(system.contacts)))
-    table["rest_center"] = structure.center_rest
     table["contact_time"] = state.flat.contact_times(max(1, len(system.contacts)))
     units = np.array([each.unit for each in system.harvesters] or [1.0])
     starts = _starts(structure, table, state, units)
@@ -348,6 +347,9 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     ]
     of_contacts = [_plans_of(system, integration, columns, *each) for each in laws or [("contact", None)]]
     plans = [each[0] if len(each) == 1 else _serving(each) for each in zip(*of_contacts, strict=True)]
+    if masses := [each.striker.mass for each in system.contacts if each.striker.mass is not None]:
+        more = max(0, math.ceil(0.5 * math.log2(1.0 + system.struck_model.lightest_contact_mass / min(masses)) - 1e-9))
+        plans = [each._replace(contact=each.contact * 0.5**more) for each in plans]
     if integration.step is None:
         if plans[0].order == 6 and _depends_on_velocity(system):
             plans = [each.scaled(_GENERAL) for each in plans]
@@ -358,15 +360,8 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
             longest = np.minimum(longest, _longest_with_circuits(step, system, columns, integration.accuracy))
         if system.local_forces:
             longest = np.minimum(longest, _longest_with_local_forces(system, integration.accuracy))
-        plans = [each._replace(step=min(each.step, own)) for each, own in zip(plans, longest.tolist(), strict=True)]
-    masses = [each.striker.mass for each in system.contacts if each.striker.mass is not None]
-    if not masses:
-        return plans
-    more = max(0, math.ceil(0.5 * math.log2(1.0 + system.struck_model.lightest_contact_mass / min(masses)) - 1e-9))
-    return [
-        Plan(order, step, longest + more, shortest + more, contact * 0.5**more)
-        for order, step, longest, shortest, contact in plans
-    ]
+        plans = [each.no_longer(own) for each, own in zip(plans, longest.tolist(), strict=True)]
+    return plans
 
 
 def _depends_on_velocity(system: System) -> bool:
@@ -414,11 +409,9 @@ def _longest_with_circuits(step: _Array, system: System, columns: Mapping[str, _
 
 def _serving(plans: Sequence[Plan]) -> Plan:
     """Steps that serve several contacts: as short as the shortest of them, in flight and in contact."""
-    step = min(each.step for each in plans)
-    longest = min(each.step * 0.5**each.min_contact_halvings for each in plans)
-    shortest = min(each.step * 0.5**each.max_halvings for each in plans)
-    least, most = (max(0, math.ceil(math.log2(step / each) - 1e-9)) for each in (longest, shortest))
-    return Plan(plans[0].order, step, least, max(least, most), min(each.contact for each in plans))
+    contact = min(each.contact for each in plans)
+    halvings = math.ceil(math.log2(contact / min(each.shortest for each in plans)) - 1e-9)
+    return Plan(plans[0].order, min(each.step for each in plans), contact, halvings)
 
 
 def _plans_of(

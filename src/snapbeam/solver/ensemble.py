@@ -14,7 +14,6 @@ from snapbeam.solver.structure import Structure
 
 _REALS = (
     "phase",  # argument of the drive at the start, rad
-    "rest_center",  # displacement of the centre in the well that q is counted from
     "tick",  # s
     "decide_energy",  # energy above the well below which a beam in the far well stays there; -inf: never decide
     "decide_reach",  # highest future position of the tip, or 0 if that is higher
@@ -29,8 +28,7 @@ _INTEGERS = (
     "end",
     "last_quarter",
     "decide_crossings",  # crossings in the last quarter beyond which it is continuous; -1: never decide
-    "min_contact_halvings",  # halvings of the flight step that make the longest contact step
-    "max_halvings",  # and the shortest
+    "halvings",  # of the contact step, at most
     "start_row",
 )
 _OF_CONTACTS = (
@@ -124,7 +122,7 @@ class Ensemble:
     def first_side(self) -> _Integers:
         """-1 for a run that starts in the well away from which the striker pushes, +1 for the other one."""
         moved = np.array([float(start[0] @ self.structure.center) for start in self.starts])
-        center = self.runs["well_sign"] * self.runs["rest_center"] + moved[self.runs["start_row"]]
+        center = self.runs["well_sign"] * self.structure.center_rest + moved[self.runs["start_row"]]
         return np.asarray(np.where(center - self.structure.dividing_height > 0.0, 1, -1))
 
     @property

@@ -39,7 +39,7 @@ STATUS = (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.INTERRUPTED, RunStatus.D
 OF_SAMPLE, CHANNEL_SAMPLE = 3, 6
 """Numbers of a sample, and of each channel in it."""
 _WORKS = {EXTERNAL_FORCE: "force_work", BASE: "base_work", AXIAL_LOAD: "load_work", LINEAR_DAMPING: "dissipated"}
-FEW_MODES = 16
+_FEW_MODES = 16
 """Modes up to which runs are integrated side by side."""
 _MOST_TICKS = 2.0**52
 _FINER = 16
@@ -50,13 +50,6 @@ _GRADED = 6
 """The same where derivatives are wanted: at both ends of a contact that of the force is a root, whose integral errs by h^1.5."""
 _SAMPLES, _NUMBERS, _IMPACTS, _BUDGET = 50_000, 4_000_000, 4096, 50_000
 """Room for samples, their numbers and impacts, and steps, of one piece of a recorded run."""
-
-
-def layout_of(ensemble: Ensemble) -> str:
-    """The layout of a structure: few modes in lanes of runs, a single run as a thread with the same bits."""
-    if ensemble.structure.omega.size > FEW_MODES:
-        return "modes"
-    return "runs" if ensemble.size > 1 else "thread"
 
 
 def reversed_in_time(ensemble: Ensemble) -> Ensemble | None:
@@ -100,10 +93,6 @@ class _Arrays:
         count = channels.laws.size
         self.circuits = np.arange(count)[count - channels.circuits :]
         """Channels of the circuits."""
-        halvings = (table["max_halvings"] - table["min_contact_halvings"]).astype(float) + graded
-        shortest = 0.5**halvings
-        if np.isin(channels.laws, STEEP).any():
-            halvings += _STEEP
         has_two = structure.stretch > 0.0
         wells = structure.unequal_wells if has_two else None
         high = structure.high_modes(ensemble.high_omega)
@@ -116,10 +105,12 @@ class _Arrays:
             of[name][:] = table[name] * (finer if name in _IN_TICKS else 1.0)
         of["tick"] /= finer
         np.minimum(of["output_interval"], of["end"], out=of["output_interval"])
-        least = 2.0**halvings
         contact = np.minimum(table["contact_step"] / of["tick"], of["step"])
-        of["contact_step"][:] = least * np.maximum(np.floor(contact / least), 1.0)
-        of["shortest"][:] = shortest * of["contact_step"]
+        most = np.minimum(table["halvings"] + float(graded + _STEEP), np.floor(np.log2(contact)))  # to a tick
+        usual = np.minimum(table["halvings"] + float(graded), most)
+        of["contact_step"][:] = 2.0**most * np.floor(contact / 2.0**most)  # the same whether a law is steep or not
+        of["shortest"][:] = 0.5**usual * of["contact_step"]
+        halvings = most if np.isin(channels.laws, STEEP).any() else usual
         if ensemble.order == 4:  # halves of the flight step that are longer than the contact step
             between = np.ceil(np.log2(of["step"] / of["contact_step"]) - 1e-9) - 1.0
             halvings = halvings + np.maximum(between, 0.0)
@@ -250,6 +241,12 @@ class _Arrays:
         """Functions of a user."""
         return [*(each for law in self.channels.of_user for each in law.functions), *self.updates]
 
+    @property
+    def layout(self) -> str:
+        """The layout of the core: few modes in lanes of runs, a single run as a thread with the same bits."""
+        alone, chosen = self.ensemble.size == 1, os.environ.get("SNAPBEAM_LAYOUT")
+        return chosen or ("modes" if self.order.size > _FEW_MODES else "thread" if alone else "runs")
+
     def check(self) -> None:
         """Raise the first error that a function of a user raised in the core."""
         for each in self._functions:
@@ -302,8 +299,9 @@ def _integrate(arrays: _Arrays, threads: int | None, progress: Progress | None) 
 
         cuda.integrate(arrays.problem, arrays.batch, progress)
     else:
-        layout = os.environ.get("SNAPBEAM_LAYOUT") or layout_of(arrays.ensemble)
-        _core.integrate(arrays.problem, arrays.batch, layout, instruction_set(), arrays.threads(threads), progress)
+        _core.integrate(
+            arrays.problem, arrays.batch, arrays.layout, instruction_set(), arrays.threads(threads), progress
+        )
     arrays.check()
     if progress is not None:
         progress(arrays.ensemble.size, arrays.ensemble.size)
@@ -510,12 +508,11 @@ def pieces(
     arrays: _Arrays, recorder: dict[str, Any], progress: Callable[[float], object] | None = None
 ) -> Iterator[Recorded]:
     """Integrate a run from its beginning, and return its records, one part after the other."""
-    layout = os.environ.get("SNAPBEAM_LAYOUT") or ("modes" if arrays.order.size > FEW_MODES else "thread")
     arrays.begin()
     recorder["marks"][:] = 0
     running = True
     while running:
-        _core.record(arrays.problem, arrays.batch, recorder, layout, instruction_set())
+        _core.record(arrays.problem, arrays.batch, recorder, arrays.layout, instruction_set())
         arrays.check()
         piece = _recorded(arrays, recorder)
         running = piece.accumulators_of_runs["status"][0] == RunStatus.INTERRUPTED

@@ -348,12 +348,19 @@ class Plan(NamedTuple):
     order: int
     step: float
     """Flight step, s."""
-    min_contact_halvings: int
-    """Halvings of the flight step that make the longest contact step."""
-    max_halvings: int
-    """Halvings of the flight step that make the shortest contact step."""
-    contact: float = math.inf
+    contact: float
     """Longest contact step, s."""
+    halvings: int
+    """Halvings of it, at most."""
+
+    @property
+    def shortest(self) -> float:
+        """Shortest contact step, s."""
+        return self.contact * 0.5**self.halvings
+
+    def no_longer(self, longest: float) -> Plan:
+        """Steps that are at most so long, s."""
+        return self._replace(step=min(self.step, longest), contact=min(self.contact, longest))
 
     def scaled(self, factor: float) -> Plan:
         """Steps that are all so many times as long."""
@@ -399,13 +406,11 @@ def choose_base_step(
         flight = min(flight, impact * 2 ** _MOST_HALVINGS[accuracy])
         if fastest > 0.0:
             impact = min(impact, _CONTACT_TURN[accuracy] / fastest)
-    min_contact_halvings = max(0, math.ceil(math.log2(flight / impact)))
     if step is not None:
         impact *= positive("step", step, "s") / flight
         flight = step
     # steps in contact are chosen apart from those in flight
-    halvings = _NATIVE_HALVINGS if longer else _HALVINGS[order]
-    return Plan(order, flight, min_contact_halvings, min_contact_halvings + halvings, impact)
+    return Plan(order, flight, impact, _NATIVE_HALVINGS if longer else _HALVINGS[order])
 
 
 # The clock of a run: time in ticks, so that halved steps and located events are whole numbers.
@@ -433,9 +438,8 @@ def clocked(
     drive = None if system.primary_excitation is None else system.primary_excitation[1]
     alone = len(system.moving) < 2
     repeats = drive is None or (drive.is_periodic and alone)
-    _, lengths, least, most, contact = np.array(plans).T
-    table["step"], table["min_contact_halvings"], table["max_halvings"] = SUBDIVISION, least, most
-    table["contact_step"] = np.where(contact == math.inf, lengths * 0.5**least, contact)
+    _, lengths, table["contact_step"], table["halvings"] = np.array(plans).T
+    table["step"] = SUBDIVISION
     if isinstance(drive, RecordedMotion):
         # the argument makes one turn over a record alone, and over HORIZON cycles of several motions
         left = 1.0 - table["phase"] / (2.0 * math.pi) * (1.0 if alone else HORIZON * cycle / drive.duration)

@@ -37,8 +37,6 @@ class UnequalWells:
     """Potential energy of -a above that of a, 2 B . a, J."""
     second: _Array
     """The second well about -a, as q."""
-    depth: float
-    """Potential energy of the second well above the first, J."""
     level: float
     """Displacement of the centre that divides the wells, m."""
 
@@ -343,15 +341,12 @@ def _uneven(model: ReducedModel, sign: float, dividing_height: float | None) -> 
         if level == model.dividing_height:
             return None
         load = lower = away = np.zeros(model.modes)
-        depth = 0.0
     else:
         lower, away = landscape.lower.amplitude, landscape.upper.amplitude + landscape.lower.amplitude
-        depth = landscape.upper.energy - landscape.lower.energy
     return UnequalWells(
         force=sign * 2.0 * (model.linear_modes.T @ load),
         lift=2.0 * float(load @ lower),
         second=sign * (model.linear_modes.T @ (model.mass @ away)),
-        depth=depth,
         level=level,
     )
 

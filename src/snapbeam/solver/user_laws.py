@@ -149,7 +149,6 @@ class UserLaw:
     """Law of the core that calls it."""
     functions: tuple[Function, ...]
     head: tuple[float, ...]
-    limited: bool = False
 
 
 def contact_law(law: ContactLaw) -> UserLaw:
@@ -188,11 +187,11 @@ def local_force(force: LocalForce, largest: float, fastest: float) -> UserLaw:
     limits = force.displacement_range(force.numbers)
     return _law_of(
         kind, core, [*elastic, None, *lossy, None, None], limits, span if force.is_conservative else 0.0,
-        min(force.reversal_speed(largest, fastest), _FAR), kind.is_limited(),
+        min(force.reversal_speed(largest, fastest), _FAR),
     )  # fmt: skip
 
 
-def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float, reversal: float, limited: bool = False) -> UserLaw:  # fmt: skip
+def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, float], span: float, reversal: float) -> UserLaw:  # fmt: skip
     numbers = kind.numbers_type()
     count = len(numbers._fields)
     if count > MOST_NUMBERS:
@@ -210,4 +209,4 @@ def _law_of(kind: Any, core: str, hooks: Iterable[Any], limits: tuple[float, flo
     addresses = struct.unpack(
         f"{len(made)}d", struct.pack(f"{len(made)}Q", *(each.address if each else 0 for each in made))
     )
-    return UserLaw(core, functions, (*addresses, low, high, span, reversal, float(count)), limited)
+    return UserLaw(core, functions, (*addresses, low, high, span, reversal, float(count)))

@@ -1096,7 +1096,8 @@ def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
     required = np.array([constraint.required for constraint in problem.constraints])
     own = np.array([constraint._quantity.kind == "design" for constraint in problem.constraints], dtype=bool)
     wanted = np.where(own, 1.0, required)
-    short = float(np.maximum(wanted - found.constraints[:, 1], 0.0).sum()) if required.size else 0.0
+    deficits: _Array = np.maximum(wanted - found.constraints[:, 1], 0.0)
+    short = float(deficits.sum())
     if short == 0.0:
         return 2, 0.0
     return (0 if (found.constraints[:, 2] < wanted).any() else 1), short
