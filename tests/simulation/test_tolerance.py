@@ -13,7 +13,7 @@ from snapbeam.model import default_values
 from snapbeam.simulation.dataset import joined
 from snapbeam.simulation.tolerance import PERTURBATION, _perturbed
 from snapbeam.solver import native
-from snapbeam.solver.assemble import make_ensemble, plans_of
+from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
 
 CONTACT = sb.HertzContact(stiffness=4e8)
 CYCLES = 4
@@ -114,7 +114,7 @@ def test_named_levels() -> None:
     }
     step = levels["reference"].dataset.attrs["step"]
     reference = sb.Integration(cycles=5, accuracy="reference")
-    (plan,) = plans_of(system, reference, {})
+    (plan,) = plans_of(system, reference, run_columns(system, {}))
     assert plan.step == pytest.approx(step)
     ensemble = make_ensemble(system, reference, plan=plan._replace(step=0.5 * step))
     recorded = joined(list(native.record(ensemble, times, False)))

@@ -133,3 +133,58 @@ def test_contact_steps_of_a_dataset_are_those_of_the_run(step: float | None) -> 
     steps = np.diff(data["time"].values)[pressed[1:] & pressed[:-1]]
     assert data.attrs["longest_contact_step"] / 2.0 < steps.max() <= data.attrs["longest_contact_step"] * (1.0 + 1e-9)
     assert data.attrs["shortest_contact_step"] <= data.attrs["longest_contact_step"] <= data.attrs["step"]
+
+
+@pytest.mark.filterwarnings("ignore:.*is it given in Hz")
+@pytest.mark.parametrize("kind", ["a second striker", "a sum of sines", "one sine"])
+@pytest.mark.parametrize("ratio", [50.0, 400.0])
+def test_no_impact_of_a_fast_striker_is_missed(kind: str, ratio: float) -> None:
+    """A tip that moves many times in a step of the beam alone; up to half of the impacts were missed."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 3)
+    drive: sb.Drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=0.5)
+    gap, contacts = 0.9 * 0.5 / ratio * model.length_scale, []
+    if kind == "a sum of sines":
+        drive = sb.Sine(frequency_ratio=0.2, velocity_amplitude=1e-6) + drive
+    elif kind == "a second striker":
+        slow = sb.Striker(drive=sb.Sine(frequency_ratio=0.2, velocity_amplitude=0.01), location=0.3, gap=1.0)
+        contacts = [sb.Contact(default_values.CONTACT, slow)]
+    contacts += [sb.Contact(default_values.CONTACT, sb.Striker(drive=drive, location=0.45, gap=gap))]
+    system = sb.System(model, contacts=contacts)
+    cycles = 1 if kind != "one sine" else int(ratio / 0.2)
+    fine = 1.0 / (40.0 * ratio * model.reference_frequency)
+    found, wanted = (sb.simulate(system, sb.Integration(cycles=cycles, step=step)).summary for step in (None, fine))
+    assert found.impacts == wanted.impacts > 30
+    assert found["impulse"] == pytest.approx(wanted["impulse"], rel=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore:engine = .python")
+@pytest.mark.parametrize("amplitude", [0.5, 5.0, 30.0])
+def test_steps_follow_the_energy_with_one_well_too(amplitude: float) -> None:
+    """A hardening oscillator of three modes; at ten times the length that normalises energy appeared from nothing."""
+    stiffness = np.diag([1e4, 5e4, 2e5])
+    model = sb.ReducedModel.from_matrices(
+        np.eye(3), stiffness, contact_shape=[1.0, 0.5, 0.2], nonlinear_stiffness=1e4, damping_ratio=np.zeros(3)
+    )
+    start = sb.State(amplitude=amplitude * np.array([1.0, 0.1, 0.05]), velocity=np.zeros(3))
+    system = sb.System(model, initial_state=start)
+    times = np.linspace(0.0, 0.06, 61)[1:]
+    found, wanted = (
+        sb.simulate(system, sb.Integration(cycles=1, engine=engine), sample_times=times)
+        .dataset["modal_amplitude"]
+        .values
+        for engine in ("native", "python")
+    )
+    assert np.abs(found - wanted).max() < 1e-3 * amplitude
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e6, 1e8])
+def test_steps_in_contact_resolve_the_suspension_of_a_striker(stiffness: float) -> None:
+    """A light body on a spring, stiff or soft, keeps the balance of energy; kicks came in resonance with it."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 3)
+    drive = sb.Sine(frequency_ratio=0.9, velocity_amplitude=0.05)
+    body = sb.Striker(drive=drive, location=0.45, mass=1e-6, suspension_stiffness=stiffness, gap=0.0)
+    system = sb.System(model, contacts=[sb.Contact(sb.KelvinVoigt(5e3, 0.0), body)])
+    data = sb.simulate(system, sb.Integration(cycles=3)).dataset
+    assert abs(data.attrs["energy_error"]) < 1e-6
+    turn = math.sqrt(stiffness / 1e-6) * data.attrs["longest_contact_step"]
+    assert turn < math.pi * (1.0 + 1e-9)

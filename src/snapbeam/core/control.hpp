@@ -2,7 +2,7 @@
 //
 // In free flight a step is the flight step.  It is halved where the tension differs from that in the wells by more than STRETCH_LIMIT of
 // it, again for every factor STRETCH_FACTOR, or where the energy of the beam alone is beyond CALM_ENERGY, again for every factor of four
-// (it is looked at where a contact changes, and of a beam that is driven otherwise every ANCHOR steps).  In contact, steps grow from the onset and shrink towards the release,
+// (it is looked at where a contact changes, and every ANCHOR steps in contact or where something else gives energy).  In contact, steps grow from the onset and shrink towards the release,
 // down to SHORTEST.  By a force of stiffness k along a row r, h (k r.r)^(1/2) <= CONTACT_TURN, and by one of damping B h B r.r <=
 // CONTACT_DECAY as far as there are lengths; where damping reverses, by_reversal has its own, and that of constant coefficients is in the
 // flight step.  Towards the end of the range of a law a step covers NEARER of the way.  No circuit is half resolved.
@@ -75,7 +75,7 @@ template <class L> struct Group {
     Held<Channel<L>, 0, false> spare_channel;
     Real jump, turned;            // next jump of a signal, ticks; steps since signals were taken from the time
     Held<Real, LEVELS> lengths;   // of steps, ticks
-    bool circuits, driven;        // there are circuits; a base, a load or a force drives the beam
+    bool circuits, driven;        // there are circuits; others than contacts give energy to the beam
     Real step, contact_step, end, limit, output_interval, next_output, halvings, shortest, most_steps, stretch, stretch_at_rest, calm, energy, lowest;
     int run[L::runs], output[L::runs], next_jump[L::runs];
 
@@ -134,7 +134,7 @@ template <class L> struct Group {
             Channel<L> &c = z.channel[j];
             c.law = problem->laws[j];
             with_law(c.law, [&](auto law) { c.contact = law.contact, c.lossy = law.lossy, c.timed = law.timed, c.affine = law.affine, c.state = law.state(batch->numbers + long(j) * problem->law_numbers), c.memory = law.memory, c.impulsive = law.impulsive; });
-            c.circuit = c.law == CIRCUIT, circuits |= c.circuit, driven |= c.timed, c.harvests = c.circuit || c.law == LINEAR_DAMPING;
+            c.circuit = c.law == CIRCUIT, circuits |= c.circuit, c.harvests = c.circuit || c.law == LINEAR_DAMPING, driven |= !c.contact && !c.harvests;
             for (int i = 0; i < z.signals; ++i)
                 if (const double factor = problem->uses[j * problem->signals + i]; factor != 0.0) c.signal[c.uses] = i, c.factor[c.uses++] = factor;
             for (int i = 0; i < problem->law_numbers; ++i) c.P[i] = Number(1.0);
@@ -375,7 +375,10 @@ template <class L> struct Group {
         const Marks anchored = fresh & (turned >= Real(ANCHOR));
         begin_signals(anchored);
         assign(anchored, turned, Real(0.0));
-        if (driven && any(anchored)) assign(anchored, energy, value(totals.energy(z, true, true)));
+        Marks pumped = anchored & FromBits<Marks>::of(driven ? ~0u : 0u);
+        for (int j = 0; j < z.channels; ++j)
+            if (z.channel[j].contact) pumped = pumped | (anchored & z.channel[j].closed);
+        if (any(pumped)) assign(pumped, energy, value(totals.energy(z, true, true)));
         if (problem->shift) {  // modes about the well that the beam is near
             const Marks crossed = fresh & (z.sign * totals.center.u * Real(problem->center_rest) < Real(0.0));
             if (any(crossed)) {

@@ -21,7 +21,7 @@ from snapbeam.solver.channels import channels_of
 from snapbeam.solver.ensemble import FAR_AWAY, CircuitCoupling, Ensemble, Records, run_dtype
 from snapbeam.solver.excitation import carried, displacements, motion_of, own_columns, side_of, started
 from snapbeam.solver.restrictions import check_integrable
-from snapbeam.solver.step_size import Plan, choose_base_step, clocked, most_steps
+from snapbeam.solver.step_size import Plan, choose_base_step, clocked, for_modes, most_steps
 from snapbeam.solver.structure import Structure, structure_of
 from snapbeam.util.validation import InputError, shown
 
@@ -95,25 +95,30 @@ def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
     return drive.bounds(own, system.scale)[0]
 
 
-def _begun_at(system: System, columns: Mapping[str, _Array], clock: _Array, phase: _Array) -> _Array:
-    """Displacement of the first tip from its mid-position at the start, m, in the frame of the ends; shape (runs,)."""
-    striker, base, found = system.contacts[0].striker, system.base_excitation, np.zeros(phase.size)
-    motions: list[tuple[str, Drive, float]] = [("drive", striker.drive, 1.0)]
+def _begun_at(system: System, columns: Mapping[str, _Array], clock: _Array, phase: _Array, number: int) -> _Array:
+    """Displacement of a tip, the first being 1, from its mid-position at the start, m, in the frame of the ends; shape (runs,).
+
+    The others than the first are placed where their motions begin, wherever the state stands in them.
+    """
+    striker, base, found = system.contacts[number - 1].striker, system.base_excitation, np.zeros(phase.size)
+    motions: list[tuple[str, Drive, float]] = [(section_of("drive", number), striker.drive, 1.0)]
     if base is not None and (share := carried(system, striker)):
         motions.append(("base_excitation", base.motion, share))
     for section, drive, share in motions:
-        own, times = started(system, own_columns(columns, section, phase.size), phase, clock)
+        own, times = own_columns(columns, section, phase.size), np.zeros(phase.size)
+        if number == 1:
+            own, times = started(system, own, phase, clock)
         found = found + share * displacements(drive, own, system.scale, times)
     return found
 
 
 def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
-    """Maximum angular frequency of the base, the axial load and external forces, rad/s; 0 without them."""
+    """Maximum angular frequency of all that moves, rad/s, 0 where nothing does; of strikers a quarter, which act in contact alone."""
     found = np.zeros(runs)
     for section, drive in system.moving:
-        if _is_around(section):
-            numbers = drive.numbers(own_columns(columns, section, runs), system.scale)
-            found = np.maximum(found, numbers["fastest" if "fastest" in numbers else "omega"])
+        numbers = drive.numbers(own_columns(columns, section, runs), system.scale)
+        own = numbers["fastest" if "fastest" in numbers else "omega"]
+        found = np.maximum(found, own if _is_around(section) else 0.25 * own)
     return found
 
 
@@ -157,7 +162,7 @@ def _is_around(section: str) -> bool:
 _LOWEST = {"standard": 1e-9, "reference": 1e-13}
 """Height of a flight after an impact that lasts no time, over b, below which chatter ends in sticking."""
 _RESOLVED = 24.0
-"""Flight steps, at least, in a period of a base's or an axial load's fastest part."""
+"""Flight steps, at least, in a period of the fastest part of a base's motion, a load or a force."""
 _TAPPED = {"standard": 0.35, "reference": 0.1}
 """Longest step over the reciprocal of the angular frequency or rate of what is in the kicks beside tension and contacts."""
 _DECAY, _FOLLOWS = 3.0, 8.0
@@ -350,6 +355,7 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     if masses := [each.striker.mass for each in system.contacts if each.striker.mass is not None]:
         more = max(0, math.ceil(0.5 * math.log2(1.0 + system.struck_model.lightest_contact_mass / min(masses)) - 1e-9))
         plans = [each._replace(contact=each.contact * 0.5**more) for each in plans]
+        plans = [for_modes(each, *_suspensions(system), integration) for each in plans]
     if integration.step is None:
         if plans[0].order == 6 and _depends_on_velocity(system):
             plans = [each.scaled(_GENERAL) for each in plans]
@@ -364,10 +370,23 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     return plans
 
 
+def _suspensions(system: System) -> tuple[float, float]:
+    """Greatest frequency and decay rate of the strikers' bodies on their suspensions, rad/s and 1/s."""
+    bodies = [(each.striker, each.striker.mass) for each in system.contacts if each.striker.mass is not None]
+    return (
+        max(math.sqrt(striker.suspension_stiffness / mass) for striker, mass in bodies),
+        max(0.5 * striker.suspension_damping / mass for striker, mass in bodies),
+    )
+
+
 def _depends_on_velocity(system: System) -> bool:
-    """True if a force depends on velocities, so that the kicks need the general composition of order 6."""
+    """True if a force depends on velocities, so that the kicks need the general composition of order 6.
+
+    It also holds contacts of no duration together, whose steps have far less error.
+    """
     return (
         any(each.law.rate_dependent for each in system.contacts)
+        or bool(system.struck_model.modal_damping.coefficients.size)
         or any(each.dissipative for each in system.local_forces)
         or bool(system.harvesters)
     )
@@ -492,14 +511,10 @@ def _place(
             continue
         # the gap is that to the beam at rest, which a local force moves out of the well of the structure
         resting = touching = _reach_at_rest(system, structure, which, own)
-        if j:
-            drive = system.contacts[j].striker.drive
-            parameters = own_columns(columns, section_of("drive", j + 1), runs)
-            begun = displacements(drive, parameters, system.scale, np.zeros(runs))
-        else:
+        begun = _begun_at(system, columns, clock, table["phase"], j + 1)
+        if not j:
             pairs = zip(which.tolist(), table["start_row"].tolist(), strict=True)
             touching = np.array([float(own[place] @ starts[at, 0]) for place, at in pairs])
-            begun = _begun_at(system, columns, clock, table["phase"])
         gap = columns.get(f"{section}.gap", np.full(runs, np.nan))
         table["offset"][:, j] = np.where(np.isnan(gap), touching - begun, resting - gap)
     given, modal = state.flat.striker_position, state.flat.modal

@@ -115,7 +115,8 @@ class _Arrays:
             between = np.ceil(np.log2(of["step"] / of["contact_step"]) - 1e-9) - 1.0
             halvings = halvings + np.maximum(between, 0.0)
         of["halvings"][:], of["max_steps"][:], of["stretch"][:] = halvings, ensemble.max_steps, structure.stretch
-        of["calm_energy"][:] = CALM[ensemble.order] * barrier_of(structure) or math.inf
+        nonlinear = structure.nonlinear_stiffness != 0.0 and structure.coupling.any()
+        of["calm_energy"][:] = CALM[ensemble.order] * barrier_of(structure) if nonlinear else math.inf
         row = self.row
         self.problem = {
             "omega": row(structure.omega), "sigma": row(structure.damping_ratio * structure.omega), "g": row(structure.well),

@@ -28,6 +28,7 @@ from scipy.integrate import solve_ivp
 
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.quantity import section_of
+from snapbeam.solver.assemble import fastest_of, run_columns
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.excitation import carried, motion_of, side_of, started
 from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records, nodes_of
@@ -209,7 +210,9 @@ class Simulation(Records):
         sums = np.zeros(len(SUMS) + 2 * len(eq.contacts) + len(eq.circuits))
         super().__init__(ensemble, run, eq, np.concatenate((q, p, sums)), times, in_contact)
         self.cycle, first = self.end / ensemble.cycles, 2.0 * math.pi / ensemble.scale.omega
-        self.longest, self.rtol = min(first, self.cycle) / _STEPS_PER_PERIOD, _RTOL[ensemble.order]
+        system, self.rtol = ensemble.systems[run], _RTOL[ensemble.order]
+        shortest = 2.0 * math.pi / max(float(fastest_of(system, run_columns(system, {}), 1)[0]), 1e-300)
+        self.longest = min(first, self.cycle, shortest) / _STEPS_PER_PERIOD
         size = 0.1 * self.rtol * ensemble.scale.length / max(float(np.linalg.norm(self.places[1])), 1e-300)
         sizes = (np.full(eq.n, size), np.full(eq.n, size * ensemble.scale.omega), np.full(sums.size, np.inf))
         self.atol = np.concatenate(sizes)

@@ -235,14 +235,24 @@ def growth(structure: Structure, order: int, step: float) -> float:
 
 
 def barrier_of(structure: Structure) -> float:
-    """Energy of the lowest barrier between the wells above the deepest one, J; 0 of a structure with one well."""
+    """Energy of the lowest barrier between the wells above the deepest one, J.
+
+    Of a structure with one well that of its first mode with the length that normalises as its amplitude.
+    """
     model = structure.model
     if not structure.wells_are_mirror_images and model.landscape is not None:
         return model.saddle_energy - model.landscape.deepest.energy
     if not model.is_bistable:
-        return 0.0
+        return 0.5 * (2.0 * math.pi * _first_frequency(model) / np.abs(_rows_of(model)[:, 0]).max()) ** 2
     straight, well = np.zeros(model.modes), structure.equilibrium
     return float(model.potential_energy(straight) - model.potential_energy(well))
+
+
+def _rows_of(model: ReducedModel) -> _Array:
+    """Rows of the displacements of a few places, that of the contact last, over the length that normalises."""
+    own = [] if model.contact_shape is None else [model.contact_shape]
+    shapes = [model.midspan_shape, *own] if model.beam is None else [*map(model.shape_at, _PLACES), *own]
+    return np.asarray(np.array(shapes) @ model.linear_modes / (model.length_scale or 1.0))
 
 
 class _Bench:
@@ -252,14 +262,12 @@ class _Bench:
         model, n = structure.model, min(structure.omega.size, _MOST_MODES)
         self.structure, self.order = structure, order
         self.period = 1.0 / _first_frequency(model)
-        own = [] if model.contact_shape is None else [model.contact_shape]
-        shapes = [model.midspan_shape, *own] if model.beam is None else [*map(model.shape_at, _PLACES), *own]
-        rows = (np.array(shapes) @ model.linear_modes)[:, :n] / (model.length_scale or 1.0)
-        tip = shapes[-1] if model.beam is None else model.shape_at(_STRUCK)
-        impulse_shape = (tip @ model.linear_modes)[:n]
+        rows = _rows_of(model)[:, :n]
+        # only its direction counts
+        impulse_shape = rows[-1] if model.beam is None else (model.shape_at(_STRUCK) @ model.linear_modes)[:n]
         if not impulse_shape.any():
             impulse_shape = np.ones(n)
-        barrier = barrier_of(structure) or 0.5 * (2.0 * math.pi / self.period / np.abs(rows[:, 0]).max()) ** 2
+        barrier = barrier_of(structure)
         # modes that the tension couples follow each other
         placed, self.blocks = coupled_blocks(structure.coupling[:n, :n] != 0.0)
         self.omega, self.damping = structure.omega[placed], (structure.damping_ratio * structure.omega)[placed]
@@ -394,23 +402,33 @@ def choose_base_step(
         duration = contact.time_scale(mass, speed)
     longer = order == 4 and not (contact is not None and contact.impulsive)
     flight = flight_step(model, order, limits[accuracy], duration if duration > 0.0 else math.inf, resonances=longer)
-    if accuracy == "reference" and fastest * flight > _FREE_TURN:
-        flight = _FREE_TURN / fastest
     damping = model.modal_damping
     decay = max(float((damping.ratio * model.omega).max()), 0.5 * float(np.abs(damping.coefficients).max(initial=0.0)))
-    if decay * flight > _MOST_DECAY:
-        flight = _MOST_DECAY / decay
+    flight = min(flight, _longest_flight(fastest, decay, accuracy))
     impact = flight
     if duration > 0.0:
         impact = _CONTACT_SHARE[accuracy] * duration
         flight = min(flight, impact * 2 ** _MOST_HALVINGS[accuracy])
-        if fastest > 0.0:
-            impact = min(impact, _CONTACT_TURN[accuracy] / fastest)
+        impact = min(impact, _CONTACT_TURN[accuracy] / max(fastest, 1e-300))
     if step is not None:
         impact *= positive("step", step, "s") / flight
         flight = step
     # steps in contact are chosen apart from those in flight
     return Plan(order, flight, impact, _NATIVE_HALVINGS if longer else _HALVINGS[order])
+
+
+def _longest_flight(fastest: float, decay: float, accuracy: str) -> float:
+    """Longest flight step, s, with modes up to an angular frequency (rad/s) and a decay rate (1/s)."""
+    turn = _FREE_TURN if accuracy == "reference" else math.inf
+    return min(turn / max(fastest, 1e-300), _MOST_DECAY / max(decay, 1e-300))
+
+
+def for_modes(plan: Plan, fastest: float, decay: float, integration: Integration) -> Plan:
+    """Steps that also serve modes of such a frequency (rad/s) and decay rate (1/s), as of strikers on suspensions."""
+    turn = _CONTACT_TURN[integration.accuracy] / max(fastest, 1e-300)
+    if integration.step is None:
+        plan = plan.no_longer(_longest_flight(fastest, decay, integration.accuracy))
+    return plan._replace(contact=min(plan.contact, turn))
 
 
 # The clock of a run: time in ticks, so that halved steps and located events are whole numbers.
