@@ -74,6 +74,15 @@ def test_refusals(tmp_path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_what_a_run_in_memory_refuses_is_refused(tmp_path) -> None:
+    """A beam to which nothing happens."""
+    still = sb.System(CASES["plain"][0].model)
+    for call in (sb.simulate, lambda system: sb.simulate_to_file(system, path=tmp_path / "run.nc")):
+        with pytest.raises(InputError, match="without a striker the beam needs an initial_state"):
+            call(still)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_run_that_is_stopped_leaves_nothing(tmp_path) -> None:
     def stop(share: float) -> None:
         raise KeyboardInterrupt

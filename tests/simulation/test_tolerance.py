@@ -115,7 +115,7 @@ def test_named_levels() -> None:
     step = levels["reference"].dataset.attrs["step"]
     reference = sb.Integration(cycles=5, accuracy="reference")
     (plan,) = plans_of(system, reference, run_columns(system, {}))
-    assert plan.step == pytest.approx(step)
+    assert 0.9 * plan.step < step <= plan.step  # fitted to the cycle
     ensemble = make_ensemble(system, reference, plan=plan._replace(step=0.5 * step))
     recorded = joined(list(native.record(ensemble, times, False)))
     alpha = ensemble.structure.amplitudes(recorded.q)

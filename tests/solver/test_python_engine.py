@@ -138,6 +138,14 @@ def test_a_statistic_that_needs_every_step_is_refused_by_name():
     assert sb.simulate(system, how("python")).summary.impacts > 0
 
 
+def test_gross_work_is_that_of_the_core():
+    """Of strikers, base, load and external forces; a local force does none."""
+    damper = sb.QuadraticDamping(coefficient=0.05, location=0.3)
+    system = sb.System(beam(2), contacts=[striking()], forces=[damper])
+    own, core = (sb.simulate(system, how(engine)).summary for engine in ("python", "native"))
+    assert own.gross_work == pytest.approx(core.gross_work, rel=1e-4)
+
+
 def test_energy_of_everything_at_once_is_balanced():
     system = sb.System(
         beam(2),

@@ -188,3 +188,15 @@ def test_steps_in_contact_resolve_the_suspension_of_a_striker(stiffness: float) 
     assert abs(data.attrs["energy_error"]) < 1e-6
     turn = math.sqrt(stiffness / 1e-6) * data.attrs["longest_contact_step"]
     assert turn < math.pi * (1.0 + 1e-9)
+
+
+def test_the_step_of_a_dataset_is_that_of_its_run() -> None:
+    """Fitted to the cycle, and accepted as the step of the next run."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 2)
+    shaker = sb.Shaker(frequency_ratio=9.7, velocity_amplitude=0.18)
+    system = sb.System(model, contacts=[sb.Contact(default_values.CONTACT, shaker)])
+    step = sb.simulate(system, sb.Integration(cycles=2)).dataset.attrs["step"]
+    in_a_cycle = 1.0 / (9.7 * model.reference_frequency) / step
+    assert in_a_cycle == pytest.approx(round(in_a_cycle), rel=1e-12)
+    again = sb.simulate(system, sb.Integration(cycles=2, step=step)).dataset.attrs["step"]
+    assert again == pytest.approx(step, rel=1e-12)

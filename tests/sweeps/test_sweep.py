@@ -336,6 +336,21 @@ def test_points_that_differ_in_structure_alone(system) -> None:
 # ---------------------------------------------------------------------- refusals
 
 
+@pytest.mark.parametrize(
+    ("name", "values", "vary"),
+    [
+        ("contact.stiffness", [1e8, 1e12], True),
+        ("frequency_ratio", [1.1, 1.3], False),
+        ("damping_ratio", [0.005, 0.5], True),
+    ],
+)
+def test_a_step_is_stated_only_where_all_points_have_it(name: str, values: list[float], vary: bool, system) -> None:
+    """Those of a stiffer contact are shorter, whatever kind of parameter it is."""
+    found = sb.sweep(system, {name: values}, sb.Integration(cycles=1)).attrs
+    for each in ("step", "longest_contact_step", "shortest_contact_step"):
+        assert (each not in found) == vary, each
+
+
 def test_a_structure_that_is_none_is_refused_before_any_run(system, monkeypatch) -> None:
     from snapbeam.sweeps.setup import SweepSetup
 

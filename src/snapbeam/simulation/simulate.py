@@ -194,6 +194,7 @@ def prepared(system: System, integration: Integration, sample_times: ArrayLike |
     times = None if sample_times is None else _checked_times(sample_times, end, float(ensemble.runs["tick"][0]))
     count = _regular_count(system, end, period) if times is None else times.size
     steps = float(ensemble.runs["end"][0]) / SUBDIVISION
+    plan = plan.no_longer(float(ensemble.step_times[0]))  # fitted to the cycle
     tell(long_run(system.model.modes, plan.step, steps, _causes(system, integration)))
     return Prepared(system, integration, plan, accuracy, ensemble, times, count, end, period)
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import impact_table, joined, run_dataset
+from snapbeam.simulation.request import checked_request
 from snapbeam.simulation.save import compressed, description, summary_dataset
 from snapbeam.simulation.simulate import (
     Prepared,
@@ -31,7 +32,6 @@ from snapbeam.util.files import NoRoomError, check_writable, missing_room
 from snapbeam.util.interrupts import raise_held
 from snapbeam.util.netcdf import netcdf_stream, read_netcdf
 from snapbeam.util.status_codes import RunStatus
-from snapbeam.util.validation import instance
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -94,10 +94,7 @@ def simulate_to_file(
     >>> system = paper.struck_beam(frequency_ratio=1.2, velocity_amplitude=0.18)
     >>> summary = sb.simulate_to_file(system, sb.Integration(cycles=2), path="run.nc")
     """
-    instance("system", system, System, "a System")
-    integration = instance(
-        "integration", Integration() if integration is None else integration, Integration, "an Integration"
-    )
+    system, integration = checked_request(system, integration)
     target, report = check_writable(path, "path", (".nc",)), sharing(progress, "run")
     run = prepared(system, integration, sample_times)
     if words := missing_room(target, least_file_size(system, integration, run.samples), "path"):

@@ -141,7 +141,7 @@ def perturbation_growth(
         "title": "perturbation growth of a run",
         "length_scale": system.scale.length,
         "perturbation": size,
-        "step": plan.step,
+        "step": float(ensemble.step_times[0]),
         "order": plan.order,
     }
     return xr.Dataset(
@@ -199,7 +199,7 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, ErrorEsti
         predictability_horizon=float(times[last]),
         perturbation_growth=float(response[-1]),
         reached=reached,
-        step=plan.step,
+        step=float(ensemble.step_times[0]),
         order=plan.order,
     )
 

@@ -180,7 +180,8 @@ class Equations:
             touched += [f, f * self.tip(j, t)[1]]
             if contact.law.rate_dependent and self.state[j] == PRESSING:
                 power["lost"] += (f - self.pressure(j, d, 0.0, numbers)) * d_rate
-        power["gross_work"] = sum(map(abs, touched[1::2])) + sum(abs(power[name]) for name in WORKS)
+        given = [power[name] for name in WORKS if name != "local_force_work"]
+        power["gross_work"] = sum(map(abs, [*touched[1::2], *given]))
         return np.concatenate((dq, total, [power[name] for name in SUMS], touched, lost))
 
     def energy(self, s: _Array) -> float:

@@ -272,7 +272,7 @@ _TABLE: dict[str, tuple[Any, ...]] = {
     "peak_force": ("float64", "N", lambda reading: reading.peak_force, "peak contact force"),
     "impacts": ("int32", "1", _column("impacts"), "impacts"),
     "contact_time_fraction": ("float64", "1", lambda reading: _over(reading.seen("contact_time"), reading.duration),
-        "fraction of time in contact"),
+        "time in contact over the duration, of all strikers together"),
     "early_stop_time": ("float64", "s", _column("early_stop_time"), "time at which the class became certain"),
     "peak_displacement":
         ("float64", "1", _peak("displacement"), "maximum distance of the contact point from the straight beam, over b"),

@@ -244,6 +244,15 @@ class SweepSetup:
         return found
 
     @cached_property
+    def _steps_vary(self) -> bool:
+        """True if runs at the ends of the axes have other steps than each other."""
+        found: set[Plan] = set()
+        for system, integration, _, points in self.groups(self.points.take(np.array(_ends(self.points)))):
+            own = {name: values for name, values in points.items() if not name.startswith("initial_state.")}
+            found |= set(plans_of(system, integration, run_columns(system, own)))
+        return len(found) > 1
+
+    @cached_property
     def length_varies(self) -> bool:
         """True if the length that displacements are normalised by differs between the points."""
         lengths = [system.scale.length for system in self._outermost]
@@ -277,8 +286,10 @@ class SweepSetup:
         more = own | (more or {})
         attrs = attributes_of(title, self.system, self.integration, self.plan, more, self.points.describe())
         varied = {lookup(ratio_of(name)).short for name in self.points.names}
+        if self._steps_vary:
+            varied |= {"step", "longest_contact_step", "shortest_contact_step"}
         if self.structural:
-            varied |= {"reference_frequency", "step", "longest_contact_step", "shortest_contact_step", "length_scale"}
+            varied |= {"reference_frequency", "length_scale"}
             varied |= {"reference_well", "initial_well", "initial_well_reason"}
             if any(system.model.is_bistable for system in self._outermost):
                 varied.add("wells")
