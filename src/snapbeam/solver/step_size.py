@@ -243,7 +243,8 @@ def barrier_of(structure: Structure) -> float:
     if not structure.wells_are_mirror_images and model.landscape is not None:
         return model.saddle_energy - model.landscape.deepest.energy
     if not model.is_bistable:
-        return 0.5 * (2.0 * math.pi * _first_frequency(model) / np.abs(_rows_of(model)[:, 0]).max()) ** 2
+        shown = np.abs(_rows_of(model)).max(axis=0)
+        return float(0.5 * (2.0 * math.pi * _first_frequency(model) / (shown[0] or shown.max() or 1.0)) ** 2)
     straight, well = np.zeros(model.modes), structure.equilibrium
     return float(model.potential_energy(straight) - model.potential_energy(well))
 
