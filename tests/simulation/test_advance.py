@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from functools import cache
 
@@ -504,3 +505,71 @@ def test_what_cannot_be_reached_is_nan_and_says_why() -> None:
     whole = sb.advance(SYSTEM, periods=40, save_every_period=True)
     np.testing.assert_array_equal(limited.amplitude[reached], whole.amplitude[reached])
     assert reached.tolist() == sorted(reached.tolist(), reverse=True)
+
+
+LOOSE = {"KelvinVoigt": sb.KelvinVoigt(3e2, 1.0), "HuntCrossley": sb.HuntCrossley(1e6, 200.0)}
+"""Laws under which a tip that withdraws stays inside the beam for long without a force."""
+
+
+def loosened(law: str) -> sb.System:
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 2, damping_ratio=0.02)
+    drive = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2, phase=0.74 * math.pi)
+    gap = -0.1 * model.length_scale
+    return sb.System(model, contacts=[sb.Contact(LOOSE[law], sb.Striker(drive=drive, gap=gap, location=0.5))])
+
+
+@pytest.mark.parametrize("law", LOOSE)
+def test_outputs_while_a_tip_inside_does_not_press(law: str) -> None:
+    """The force at an output was taken from the jump of a gap that was not there: 4e10 N, and an impact more."""
+    system, run = loosened(law), sb.simulate(loosened(law), sb.Integration(cycles=6)).summary
+    found = sb.advance(system, periods=6).statistics
+    assert int(found["impacts"]) == run.impacts
+    for name in ("peak_force", "impulse", "energy_dissipated"):
+        assert float(found[name]) == pytest.approx(run[name], rel=1e-6), name
+
+
+@pytest.mark.filterwarnings("ignore:engine = .python")
+@pytest.mark.parametrize("law", LOOSE)
+def test_a_run_that_begins_while_a_tip_inside_does_not_press(law: str) -> None:
+    """Goes on as the Python engine says."""
+    system = loosened(law)
+    for periods in np.arange(1.0, 2.0, 0.05):
+        begun = sb.advance(system, periods=periods)
+        first = sb.simulate(system.replace(initial_state=begun), sb.Integration(cycles=1)).dataset.isel(time=0)
+        if float(begun.contact_time[0]) < 0.0 and float(first["penetration_normalised"]) > 1e-3:
+            break
+    else:
+        pytest.fail("no such state")
+    own, core = (
+        sb.simulate(system.replace(initial_state=begun), sb.Integration(cycles=1, engine=engine, accuracy="reference"))
+        for engine in ("python", "native")
+    )
+    assert own.summary.impacts == core.summary.impacts
+    for name in ("peak_force", "impulse", "energy_dissipated", "energy_lost_contact", "gross_work"):
+        assert own.summary[name] == pytest.approx(core.summary[name], rel=2e-3), name
+    assert own.impacts["onset"].values == pytest.approx(core.impacts["onset"].values, abs=1e-8)
+
+
+PARTS = {"body": {"mass": 2e-3, "suspension_stiffness": 2e3}, "circuit": {}}
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_tangents_of_several_periods_take_other_parts_along(part: str) -> None:
+    """Changes of a body or a circuit act on the beam in the next period, too."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 2, damping_ratio=0.02)
+    drive = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.05)
+    striker = sb.Striker(drive=drive, location=0.45, gap=0.0, **PARTS[part])
+    piezo = (
+        [sb.PiezoelectricHarvester(moment_per_volt=2e-4, capacitance=6e-8, resistance=2e4)] if part == "circuit" else []
+    )
+    system = sb.System(model, contacts=[sb.Contact(sb.KelvinVoigt(3e2, 0.2), striker)], harvesters=piezo)
+    start, change = sb.advance(system, integration=REFERENCE), np.array([[1.0, -0.4], [300.0, 200.0]])
+    size = 1e-9
+    sides, own = [], {name: getattr(start, name) for name in ("striker_shift", "striker_rate", "circuit")}
+    for sign in (size, -size):
+        moved = {"amplitude": start.amplitude + sign * change[0], "velocity": start.velocity + sign * change[1]}
+        sides.append(sb.advance(system, dataclasses.replace(plain(start), **own, **moved), 2, integration=REFERENCE))
+    found = sb.advance(system, start, 2, tangent=change[None], integration=REFERENCE).tangent[0]
+    for i, name in enumerate(("amplitude", "velocity")):
+        wanted = (getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * size)
+        np.testing.assert_allclose(found[i], wanted, rtol=1e-3, atol=1e-4 * np.abs(wanted).max())

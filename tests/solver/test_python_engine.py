@@ -244,3 +244,28 @@ def test_impacts_without_a_duration_and_perturbed_drives_are_refused():
         sb.simulate(sb.System(beam(1), contacts=[striking(sb.Restitution(0.6))]), how())
     with pytest.raises(InputError, match=r"engine = 'python': does not change a drive.*use engine = 'native'"):
         sb.perturbation_growth(sb.System(beam(1), contacts=[striking()]), how())
+
+
+def test_an_impact_that_has_not_ended_counts_in_every_engine():
+    """A run that ends while a stop presses."""
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 2, damping_ratio=0.02)
+    stop = striking(sb.HertzContact(1e6), drive=sb.FixedStop(), gap=-2e-5)
+    system = sb.System(model, contacts=[stop], initial_state=sb.State(amplitude=model.well_amplitude))
+    own, core = (sb.simulate(system, how(engine)) for engine in ("python", "native"))
+    assert own.summary.impacts == core.summary.impacts > 0
+    assert float(core.final_state.contact_time[0]) > 0.0
+    assert own.impacts.sizes == core.impacts.sizes
+    assert own.impacts["impulse"].values == pytest.approx(core.impacts["impulse"].values, rel=1e-5)
+    assert own.summary.contact_time_fraction == pytest.approx(core.summary.contact_time_fraction, rel=1e-6)
+    state = sb.advance(system, periods=1, integration=how("python"))
+    assert int(state.statistics["impacts"]) == core.summary.impacts - 1
+
+
+def test_gross_work_of_forces_against_each_other():
+    """Each by itself, as in the core."""
+    forces = [
+        sb.ExternalForce(history=sb.HarmonicForce(frequency_ratio=0.8, amplitude=amplitude, phase=phase), location=0.4)
+        for amplitude, phase in ((0.02, 0.0), (0.015, math.pi))
+    ]
+    own, core = (sb.simulate(sb.System(beam(2), forces=forces), how(engine)).summary for engine in ("python", "native"))
+    assert own.gross_work == pytest.approx(core.gross_work, rel=1e-3)

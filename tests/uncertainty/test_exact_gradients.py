@@ -206,3 +206,15 @@ def test_chaos_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.warns(UserWarning, match="the motion is chaotic"):
         found = sb.uncertainty.gradient(system, "striker_work", "drive.velocity_amplitude", integration=how)
     assert found["growth"].values[0] > 1e3 and found["relative_error"].values[0] > 1e-4
+
+
+@pytest.mark.parametrize("law", [sb.HertzContact(1e6), sb.HuntCrossley(1e6, 0.5), sb.PowerLaw(0.05, 1.5)])
+def test_the_force_of_a_stop_that_is_preloaded(law: sb.ContactLaw) -> None:
+    """The greatest penetration is that of the start: its derivative was lost."""
+    stop = sb.Striker(drive=sb.FixedStop(), location=0.5, gap=-0.02 * MODEL.length_scale)
+    system = sb.System(MODEL, [sb.Contact(law, stop)], initial_state=sb.State(amplitude=MODEL.well_amplitude))
+    found = sb.uncertainty.gradient(system, "peak_force", ["contact.gap"], integration=sb.Integration(cycles=1))
+    gaps = stop.gap + 1e-3 * MODEL.length_scale * np.array([-1.0, 1.0])
+    forces = sb.sweep(system, {"contact.gap": gaps}, sb.Integration(cycles=1))["peak_force"].values
+    wanted = (forces[1] - forces[0]) / (gaps[1] - gaps[0])
+    assert float(found["derivative"].values.ravel()[0]) == pytest.approx(wanted, rel=1e-3)

@@ -336,19 +336,23 @@ template <class L> struct Group {
                 continue;
             }
             const Number d = penetration(z, c, z.q), r = signal_slope(z, c) - dot<L>(c.row, z.p, n);
-            if (continued && !c.memory) c.closed = c.closed & (c.pressing | (!which));  // what does not press begins again as apart
-            assign(which, c.d0, select(c.closed, d, continued ? min(d, Number(0.0)) : d)), assign(which, c.r0, r);
-            assign(which, c.safe, z.t);
-            if (continued) continue;
-            for (int l = 0; l < L::runs; ++l) {
-                if (!(fresh >> l & 1u)) continue;
-                const double since = batch->since[long(run[l]) * z.channels + j], depth = lane(value(d), l), rate = lane(value(r), l);
-                const bool closed = since == since ? since >= 0.0 : !c.impulsive && (depth > 0.0 || (depth == 0.0 && rate > 0.0));
-                set_lane(c.closed, l, closed), set_lane(c.pressing, l, closed && (!c.memory || (rate > 0.0 && depth >= lane(value(yield_of(c)), l))));
-                set_lane(c.onset, l, since > 0.0 ? -since : 0.0);
-                if (!closed && depth > 0.0) set_lane(c.d0, l, 0.0);
-                if (closed) set_lane(c.deepest, l, depth > 0.0 ? depth : 0.0);
+            Marks acts = acting(c);
+            if (!continued) {
+                unsigned on = 0;
+                for (int l = 0; l < L::runs; ++l) {
+                    if (!(fresh >> l & 1u)) continue;
+                    const double since = batch->since[long(run[l]) * z.channels + j], depth = lane(value(d), l);
+                    on |= unsigned(since == since ? since >= 0.0 : !c.impulsive && (depth > 0.0 || (depth == 0.0 && lane(value(r), l) > 0.0))) << l;
+                    set_lane(c.onset, l, since > 0.0 ? -since : 0.0);
+                }
+                acts = FromBits<Marks>::of(on);
+                assign(which & acts, c.deepest, max(d, Number(0.0)));
             }
+            // a state tells no loose contact, in which a tip does not press, from one that is apart: its depth and force do
+            const Marks loose = (!acts) & (d > Number(0.0)) & (!(with_law(c.law, [&](auto law) { return law.pressing(max(d, Number(0.0)), r, c.numbers()); }) > Number(0.0)));
+            c.closed = (which & (acts | loose)) | (c.closed & (!which));
+            if (!c.memory || !continued) c.pressing = (which & acts & (c.memory ? (r > Number(0.0)) & (!(d < yield_of(c))) : acts)) | (c.pressing & (!which));
+            assign(which, c.d0, select(c.closed, d, min(d, Number(0.0)))), assign(which, c.r0, r), assign(which, c.safe, z.t);
         }
         assign(which, energy, value(totals.energy(z, true, true)));
         if (!continued) totals.start(z, which, totals.energy(z, true));

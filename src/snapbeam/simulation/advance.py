@@ -62,7 +62,7 @@ def advance(
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitudes (m^0.5) and velocities (m^0.5/s), k for each state or for all, advanced by the exact
         derivatives of every step and of the times of events, with finer steps at both ends of a contact; under a user's
-        law by differences. Strikers with mass, indentations and circuits begin unchanged and are not returned.
+        law by differences. Strikers with mass, indentations and circuits begin unchanged in each call and are not returned.
     integration : Integration, optional
         Solver settings, without early termination.
     save_every_period : bool
@@ -132,18 +132,20 @@ def advance(
 
 def _tangents(system: System, begun: State, span: float, tangents: _Array, integration: Integration) -> _Array:
     """Tangents of shape (runs, k, 2, N) some periods on, period by period: their own steps are finer than those of the motion."""
-    how = integration.replace(early_termination=False)
+    how, structure = integration.replace(early_termination=False), None
+    q = p = np.empty(0)
     while span > 0.0:
         part = min(span, 1.0)
         ensemble = make_ensemble(system, how, start=begun, periods=part)
-        rest = ensemble.structure.equilibrium
-        pairs = [ensemble.structure.to_modal(rest + each, each) for each in np.eye(begun.modes)]
-        q, p = (tangents[:, :, i] @ np.array([pair[i] for pair in pairs]) for i in (0, 1))
-        moved = np.stack(native.tangents(ensemble, q, p, integration.threads), axis=2)
-        tangents, span = ensemble.structure.velocities(moved), span - part
+        if structure is None:  # circuits, bodies and indentations begin unchanged
+            structure = ensemble.structure
+            pairs = [structure.to_modal(structure.equilibrium + each, each) for each in np.eye(begun.modes)]
+            q, p = (tangents[:, :, i] @ np.array([pair[i] for pair in pairs]) for i in (0, 1))
+        q, p = native.tangents(ensemble, q, p, integration.threads)
+        span -= part
         if span > 0.0:
             begun = advance(system, begun, part, integration=integration)
-    return tangents
+    return tangents if structure is None else structure.velocities(np.stack((q, p), axis=2))
 
 
 def _checked_tangent(tangent: ArrayLike, flat: State) -> _Array:

@@ -386,8 +386,8 @@ def simulate(
     integration : Integration, optional
         Solver settings; always on the CPU.
     sample_times : array_like, optional
-        Times to record, s, ascending, from 0 to the end of the run; by default 200 per cycle, and the ends of the steps
-        of each impact. Times that a run did not reach are NaN, with ``valid`` = 0.
+        Times to record, s, ascending, from 0 to the end of the run; by default 200 per cycle, and the ends of the first 96
+        steps of each impact. Times that a run did not reach are NaN, with ``valid`` = 0.
     progress : callable, optional
         Called with the finished fraction of the run or, for several, as ``progress(done, total)``; True prints it.
 

@@ -32,7 +32,7 @@ from snapbeam.solver.assemble import fastest_of, run_columns
 from snapbeam.solver.ensemble import Ensemble
 from snapbeam.solver.excitation import carried, motion_of, side_of, started
 from snapbeam.solver.python_records import APART, LOOSE, PRESSING, SUMS, Records, nodes_of
-from snapbeam.solver.statistics import WORKS, OutputStates, Recorded
+from snapbeam.solver.statistics import OutputStates, Recorded
 from snapbeam.solver.step_size import seconds_of
 from snapbeam.util.diagnostics import Diagnostic, Severity, tell
 from snapbeam.util.status_codes import RunStatus
@@ -153,15 +153,15 @@ class Equations:
         total = -damping - self.omega**2 * q
         total -= self.gamma * (square * self.g + (2.0 * float(self.g @ q) + square) * Gq)
         power["dissipated"] = float(damping @ p)
+        pushes = [("force_work", history(t)[0] * row) for row, history in self.external]
         if self.load is not None:
-            change = self.load(t)[0] * (self.g + Gq)
-            total, power["load_work"] = total + change, float(change @ p)
+            pushes.append(("load_work", self.load(t)[0] * (self.g + Gq)))
         if self.base is not None:
-            inertia = self.up * self.base(t)[2] * self.b
-            total, power["base_work"] = total + inertia, float(inertia @ p)
-        for row, history in self.external:
-            F = history(t)[0]
-            total, power["force_work"] = total + F * row, power["force_work"] + F * float(row @ p)
+            pushes.append(("base_work", self.up * self.base(t)[2] * self.b))
+        for name, push in pushes:
+            work = float(push @ p)
+            total, power[name] = total + push, power[name] + work
+            power["gross_work"] += abs(work)
         for each, law in self.local:
             u, v = each.rest + float(each.row @ q), float(each.row @ p)
             lossy = law.damping_force(each.law, u, v)
@@ -180,8 +180,7 @@ class Equations:
             touched += [f, f * self.tip(j, t)[1]]
             if contact.law.rate_dependent and self.state[j] == PRESSING:
                 power["lost"] += (f - self.pressure(j, d, 0.0, numbers)) * d_rate
-        given = [power[name] for name in WORKS if name != "local_force_work"]
-        power["gross_work"] = sum(map(abs, [*touched[1::2], *given]))
+        power["gross_work"] += sum(map(abs, touched[1::2]))
         return np.concatenate((dq, total, [power[name] for name in SUMS], touched, lost))
 
     def energy(self, s: _Array) -> float:
@@ -278,8 +277,10 @@ class Simulation(Records):
             self.loads[j] = True
         self.s[2 * self.eq.n] += stored - self.eq.stored(j, self.t, self.s)
 
-    def march(self, stops: list[float], progress: Callable[[float], object] | None = None) -> list[Any]:
-        """Integrate to the end; q, p and contact times at the *stops*."""
+    def march(
+        self, stops: list[float], progress: Callable[[float], object] | None = None, over: bool = True
+    ) -> list[Any]:
+        """Integrate to the end, where an impact ends if all is *over*; q, p and contact times at the *stops*."""
         kept, losses = [], slice(self.s.size - len(self.eq.circuits), None)
         early, turns = self.s[losses].copy(), np.arange(self.cycle, self.end, self.cycle)
         if not all(self.space(each, self.t, self.s) > 0.0 for each in self.limited):
@@ -304,7 +305,7 @@ class Simulation(Records):
                 early = self.s[losses].copy()
             if progress is not None:
                 progress(self.t / self.end)
-        self.close(early)
+        self.close(early, over)
         return kept
 
     def closed_inside(self, part: Any) -> float | None:
@@ -367,13 +368,17 @@ def run_ensemble(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
 ) -> NDArray[Any]:
     """Integrate every run of an ensemble, one after the other; returns a record of accumulators a run."""
-    return integrate_with_output_states(ensemble, threads, progress).accumulators_of_runs
+    return _integrated(ensemble, progress, True).accumulators_of_runs
 
 
 def integrate_with_output_states(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
 ) -> OutputStates:
-    """Integrate as :func:`run_ensemble`, with the states at every output time."""
+    """Integrate as :func:`run_ensemble`, with the states at every output time, from which the runs go on."""
+    return _integrated(ensemble, progress, False)
+
+
+def _integrated(ensemble: Ensemble, progress: Callable[[int, int], object] | None, over: bool) -> OutputStates:
     _say_how_slow(ensemble)
     runs, count, n = ensemble.runs, max(1, len(ensemble.systems[0].contacts)), ensemble.structure.omega.size
     outputs = int(-(-runs["end"][0] // runs["output_interval"][0]))
@@ -382,7 +387,7 @@ def integrate_with_output_states(
     for i in range(ensemble.size):
         run = Simulation(ensemble, i, np.empty(0))
         ticks = np.minimum(np.arange(1, outputs + 1) * runs["output_interval"][i], runs["end"][i])
-        for k, kept in enumerate(run.march((ticks * run.tick).tolist())):
+        for k, kept in enumerate(run.march((ticks * run.tick).tolist(), over=over)):
             q[i, k], p[i, k], lasting[i, k] = kept
         found.append(run.found)
         if progress is not None:

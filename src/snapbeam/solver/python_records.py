@@ -122,9 +122,12 @@ class Records:
         pairs = zip(self.eq.state, self.onset, strict=True)
         return [(self.t - at) / self.tick if state == PRESSING else -1.0 for state, at in pairs] or [-1.0]
 
-    def close(self, early: _Array) -> None:
-        """Enter what is known at the end; *early* are the losses of circuits before the last quarter."""
+    def close(self, early: _Array, over: bool) -> None:
+        """Enter what is known at the end, where an impact ends if all is *over*; *early* are the losses of circuits before the last quarter."""
         found, s, n, lasting = self.found, self.s, self.eq.n, self.lasting()
+        for j, each in enumerate(lasting):
+            if over and each >= 0.0:
+                self.impact_ended(j)
         for name, value in zip(SUMS, s[2 * n :].tolist(), strict=False):
             found[name] = value
         found["dissipated"] += found["lost"]
@@ -133,7 +136,7 @@ class Records:
         found["time"], found["energy"] = round(self.t / self.tick), self.energy()
         found["displacement"], found["center"] = self.at_rest + self.places @ s[:n]
         found["side"] = 1 if found["center"][0] > self.level else -1
-        found["contact_time"] += sum(min(each * self.tick, self.t) for each in lasting if each >= 0.0)
+        found["contact_time"] += 0.0 if over else sum(min(each * self.tick, self.t) for each in lasting if each >= 0.0)
         found["peak_force"] = max(self.peaks, default=0.0)
         if self.eq.circuits:
             losses = s[s.size - early.size :]

@@ -270,7 +270,7 @@ _TABLE: dict[str, tuple[Any, ...]] = {
     "min_midspan_displacement": ("float64", "1", _low_high("center", False), "minimum mid-span displacement, over b"),
     "max_midspan_displacement": ("float64", "1", _low_high("center", True), "maximum mid-span displacement, over b"),
     "peak_force": ("float64", "N", lambda reading: reading.peak_force, "peak contact force"),
-    "impacts": ("int32", "1", _column("impacts"), "impacts"),
+    "impacts": ("int32", "1", _column("impacts"), "impacts, also those that have not ended"),
     "contact_time_fraction": ("float64", "1", lambda reading: _over(reading.seen("contact_time"), reading.duration),
         "time in contact over the duration, of all strikers together"),
     "early_stop_time": ("float64", "s", _column("early_stop_time"), "time at which the class became certain"),
