@@ -295,7 +295,7 @@ def test_questions_of_dynamics() -> None:
     assert any(each.orbit is not None for each in found.attractors)
     grid = {"amplitude[1]": np.linspace(-1.2, 1.2, 4), "velocity[1]": [-0.1, 0.1]}
     with pytest.warns(sb.DiagnosticWarning, match=r"undecided .* search for further attractors"):
-        basin = sb.dynamics.basins_of_attraction(found, grid, periods=50).basin
+        basin = sb.dynamics.basins_of_attraction(found, grid, periods=30).basin
     assert basin.shape == (4, 2) and int(basin.max()) >= 0
     diagram = sb.dynamics.bifurcation_diagram(
         system, "drive.2.velocity_amplitude", [0.04, 0.05], periods=(100, 8), grazing=True
