@@ -371,7 +371,7 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
 
 
 def _suspensions(system: System) -> tuple[float, float]:
-    """Greatest frequency and decay rate of the strikers' bodies on their suspensions, rad/s and 1/s."""
+    """Maximum frequency (rad/s) and decay rate (1/s) of the bodies of strikers on their suspensions."""
     bodies = [(each.striker, each.striker.mass) for each in system.contacts if each.striker.mass is not None]
     return (
         max(math.sqrt(striker.suspension_stiffness / mass) for striker, mass in bodies),
