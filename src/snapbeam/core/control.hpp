@@ -4,8 +4,8 @@
 // of it, again for every factor STRETCH_FACTOR, or where the energy of the beam alone is beyond CALM_ENERGY, again for every factor of
 // four (it is looked at where a contact changes, and every ANCHOR steps in contact or where something else gives energy).  In contact,
 // steps grow from the onset and shrink towards the release, down to SHORTEST.  By a force of stiffness k along a row r, h (k r.r)^(1/2)
-// <= CONTACT_TURN, and by one of damping B h B r.r <= CONTACT_DECAY as far as there are lengths; where damping reverses, by_reversal
-// has its own, and that of constant coefficients is in the flight step.  Towards the end of the range of a law a step covers NEARER of
+// <= CONTACT_TURN, and by one of damping B, h (B r.r) <= CONTACT_DECAY, down to the shortest length; where damping reverses,
+// by_reversal has its own, and that of constant coefficients is in the flight step.  Towards the end of the range of a law a step covers NEARER of
 // the way.  No circuit is half resolved.
 //
 // A step inside which a contact closes or opens, a lossy contact begins or ceases to press, or one with memory yields or turns back, is

@@ -98,7 +98,7 @@ def highest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
 def _begun_at(system: System, columns: Mapping[str, _Array], clock: _Array, phase: _Array, number: int) -> _Array:
     """Displacement of a tip, the first being 1, from its mid-position at the start, m, in the frame of the ends; shape (runs,).
 
-    The others than the first are placed where their motions begin, wherever the state stands in them.
+    All tips but the first are placed as their motions begin, even if the state is later in them.
     """
     striker, base, found = system.contacts[number - 1].striker, system.base_excitation, np.zeros(phase.size)
     motions: list[tuple[str, Drive, float]] = [(section_of("drive", number), striker.drive, 1.0)]
@@ -113,7 +113,7 @@ def _begun_at(system: System, columns: Mapping[str, _Array], clock: _Array, phas
 
 
 def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
-    """Maximum angular frequency of all that moves, rad/s, 0 where nothing does; of strikers a quarter, which act in contact alone."""
+    """Maximum angular frequency of all that moves, rad/s, or 0; that of a striker, which acts in contact only, counts a quarter."""
     found = np.zeros(runs)
     for section, drive in system.moving:
         numbers = drive.numbers(own_columns(columns, section, runs), system.scale)
