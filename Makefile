@@ -68,7 +68,7 @@ $(VENV)/.locked-dev: requirements-dev.txt $(VENV)/.locked-build
 
 $(VENV)/.pinned-run: pyproject.toml constraints.txt $(VENV)/.locked-build
 	$(BIN)/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies'], sep='\n')" > $(VENV)/run.txt
-	$(PIP) install --no-compile --constraint constraints.txt --requirement $(VENV)/run.txt
+	$(PIP) install --constraint constraints.txt --requirement $(VENV)/run.txt
 	@touch $@
 
 $(VENV)/.built: pyproject.toml $(CORE) $(VENV)/.locked-build
